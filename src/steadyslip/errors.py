@@ -1,0 +1,105 @@
+"""Exceptions: each names the thing, shows what came, says what is allowed and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+
+class SteadyslipError(Exception):
+    """Base of every exception that this package raises on purpose."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with an input.
+
+    Parameters
+    ----------
+    name : str
+        Dotted name of the parameter, such as ``friction.a``.
+    message : str
+        What came and what is allowed, in one sentence.
+    line : int, optional
+        Line of the rig file, counted from 1.
+    """
+
+    name: str
+    message: str
+    line: int | None = None
+
+    def __str__(self) -> str:
+        where = f"line {self.line}: " if self.line is not None else ""
+        return f"{where}{self.name}: {self.message}"
+
+    def under(self, prefix: str) -> Problem:
+        """The same problem with `prefix` put before its name."""
+        name = ".".join(part for part in (prefix, self.name) if part)
+        return Problem(name, self.message, self.line)
+
+
+class ParameterError(SteadyslipError, ValueError):
+    """One or more parameters are missing, misspelt or outside their domain."""
+
+    def __init__(self, problems: Iterable[Problem], title: str = "") -> None:
+        self.problems = tuple(problems)
+        self.title = title
+        super().__init__(self._text())
+
+    def _text(self) -> str:
+        lines = [str(problem) for problem in self.problems]
+        if self.title and len(lines) == 1:
+            return f"{self.title}: {lines[0]}"
+        if self.title:
+            return "\n".join([f"{self.title}: {len(lines)} problems", *(f"  {i}" for i in lines)])
+        return "\n".join(lines)
+
+
+class RigFileError(ParameterError):
+    """A rig file cannot be read; ``problems`` lists everything wrong with it."""
+
+
+class QuantityError(SteadyslipError, ValueError):
+    """A text is not a quantity of the expected dimension."""
+
+
+class UnknownNameError(SteadyslipError, LookupError):
+    """A name is not one of those allowed."""
+
+    def __init__(self, what: str, name: object, allowed: Iterable[str]) -> None:
+        self.message = unknown_name(what, name, allowed)
+        super().__init__(self.message)
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class NoSteadySliding(SteadyslipError, ValueError):
+    """Steady sliding at the drive's velocity does not exist.
+
+    Attributes
+    ----------
+    condition : str
+        Which condition fails: ``lock-up``, ``lift-off`` or ``no solution``.
+    shortfall : float
+        By how much: the amount that would have to be positive (Pa for lift-off, dimensionless
+        for lock-up), NaN where no number tells it.
+    """
+
+    def __init__(self, message: str, condition: str, shortfall: float = float("nan")) -> None:
+        self.condition = condition
+        self.shortfall = shortfall
+        super().__init__(message)
+
+
+class NotAvailable(SteadyslipError, ValueError):
+    """The question has no answer for this rig; the message says why and what to ask instead."""
+
+
+def unknown_name(what: str, name: object, allowed: Iterable[str]) -> str:
+    """Say that `name` is unknown, with the nearest valid name or all of them."""
+    allowed = list(allowed)
+    close = get_close_matches(str(name), allowed, n=1, cutoff=0.5)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"unknown {what} {name!r}; {hint}allowed: {', '.join(allowed) or 'none'}"

@@ -1,0 +1,67 @@
+"""SymPy expressions to array functions, and the one primitive that SymPy lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from sympy.printing.numpy import NumPyPrinter
+
+
+class asinh_exp(sp.Function):  # noqa: N801  # named like the SymPy functions it stands beside
+    """asinh(x exp(y)), evaluated without overflow for large y (regularised rate-and-state friction)."""
+
+    nargs = 2
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        x, y = self.args
+        root = sp.sqrt(x**2 + sp.exp(-2 * y))
+        return 1 / root if argindex == 1 else x / root
+
+    def _eval_is_positive(self) -> bool | None:
+        return self.args[0].is_positive
+
+    def _eval_is_real(self) -> bool | None:
+        return self.args[0].is_real and self.args[1].is_real
+
+    def _latex(self, printer: Any) -> str:
+        x, y = (printer._print(argument) for argument in self.args)
+        return rf"\operatorname{{asinh}}\left({x} e^{{{y}}}\right)"
+
+    def _eval_evalf(self, prec: int) -> sp.Expr:
+        x, y = self.args
+        return sp.asinh(x * sp.exp(y))._eval_evalf(prec)
+
+
+def numpy_asinh_exp(x: Any, y: Any) -> Any:
+    """NumPy counterpart of `asinh_exp`."""
+    size = np.log(np.abs(x) + np.finfo(float).tiny) + y
+    small = np.arcsinh(np.exp(np.minimum(size, 20.0)))
+    return np.sign(x) * np.where(size > 20.0, size + np.log(2.0), small)
+
+
+class _Printer(NumPyPrinter):  # type: ignore[misc]  # SymPy's printers are untyped
+    """SymPy's own NumPy printer, powers of two and the primitive above added."""
+
+    def _print_asinh_exp(self, expr: sp.Expr) -> str:
+        return f"asinh_exp({', '.join(self._print(a) for a in expr.args)})"
+
+
+def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Callable[..., list[Any]]:
+    """A function of the arguments' values that returns the values of all expressions.
+
+    Common subexpressions are computed once; every argument may be a scalar or an array.
+    """
+    order = sorted(arguments, key=lambda symbol: symbol.name)
+    names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(order)}
+    renamed = [sp.sympify(e).xreplace(names) for e in expressions]
+    function = sp.lambdify(
+        [names[symbol] for symbol in arguments],
+        renamed,
+        modules=[{"asinh_exp": numpy_asinh_exp}, "numpy"],
+        printer=_Printer,
+        cse=True,
+    )
+    return function  # type: ignore[no-any-return]

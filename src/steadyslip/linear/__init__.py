@@ -1,0 +1,24 @@
+"""Small perturbations of steady sliding: two routes to stability, edges, formulas, transfer functions."""
+
+from __future__ import annotations
+
+from steadyslip.linear import paper
+from steadyslip.linear.boundary import Boundary, Margin, boundary, margins
+from steadyslip.linear.formula import formula
+from steadyslip.linear.state_space import state_space, to_control
+from steadyslip.linear.stiffness import critical_stiffness, eigenvalues, growth_rate, stable_stiffness
+
+__all__ = [
+    "Boundary",
+    "Margin",
+    "boundary",
+    "critical_stiffness",
+    "eigenvalues",
+    "formula",
+    "growth_rate",
+    "margins",
+    "paper",
+    "stable_stiffness",
+    "state_space",
+    "to_control",
+]

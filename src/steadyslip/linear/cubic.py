@@ -1,0 +1,86 @@
+"""The paper's cubic and its critical stiffness in closed form (theory 3; eqs 17-20 corrected).
+
+    a3 s³ + a2 s² + a1 s + a0 = 0
+    a3 = m + f1 B0                 a2 = m r + f + f1 B1 + r μ B0
+    a1 = k + f1 K + r S + r μ B1   a0 = r (k + μ K),   K = k B2 + B3
+
+Plain arithmetic: every function takes numbers, arrays or SymPy expressions. Arguments are those of
+`steadyslip.linear.response.Response`; dampings c and η are part of f and S.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def coefficients(
+    *, f: Any, S: Any, r: Any, f1: Any, mu: Any, B0: Any, B1: Any, B2: Any, B3: Any, m: Any, k: Any
+) -> tuple[Any, Any, Any, Any]:
+    """a0, a1, a2, a3 of the characteristic polynomial, lowest power first."""
+    K = k * B2 + B3
+    return (
+        r * (k + mu * K),
+        k + f1 * K + r * S + r * mu * B1,
+        m * r + f + f1 * B1 + r * mu * B0,
+        m + f1 * B0,
+    )
+
+
+def hopf_line(
+    *, f: Any, S: Any, r: Any, f1: Any, mu: Any, B0: Any, B1: Any, B2: Any, B3: Any, m: Any
+) -> tuple[Any, Any]:
+    """N and D of the condition a2 a1 > a3 a0, which reads D k > N.
+
+    D > 0: stable above N/D; D < 0: stable only below. The printed eq. 20 has f1(λ1 − λ) for r f (λ1 − λ)
+    in N, and lacks B1 f1 in D; its inequality for D < 0 is not mentioned in the paper.
+    """
+    a3 = m + f1 * B0
+    a2 = m * r + f + f1 * B1 + r * mu * B0
+    denominator = (f + f1 * B1) * (1 + f1 * B2) + r * (mu - f1) * (B0 - m * B2)
+    numerator = r * mu * B3 * a3 - a2 * (f1 * B3 + r * S + r * mu * B1)
+    return numerator, denominator
+
+
+def squared_frequency(
+    *, f: Any, S: Any, r: Any, f1: Any, mu: Any, B0: Any, B1: Any, B2: Any, B3: Any, m: Any, k: Any
+) -> Any:
+    """β² at the critical stiffness, eq. 18: a0/a2 (equal to a1/a3 with inertia)."""
+    a0, _, a2, _ = coefficients(f=f, S=S, r=r, f1=f1, mu=mu, B0=B0, B1=B1, B2=B2, B3=B3, m=m, k=k)
+    return a0 / a2
+
+
+def stable_interval(
+    numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2: Any, a3: Any
+) -> tuple[Any, Any]:
+    """The one interval of k > 0 in which all Hurwitz conditions hold.
+
+    Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. Without
+    inertia (a3 = 0) they are the same, D k > N being a1 > 0.
+
+    Returns
+    -------
+    low, high : float or ndarray
+        NaN where no k is stable; high may be inf.
+    """
+    low, high, valid = _half_line(0.0, np.inf, denominator, numerator, (a3 >= 0) & (a2 > 0))
+    low, high, valid = _half_line(low, high, 1 + mu_b2, -mu_b3, valid)
+    valid = valid & (low < high)
+    return unless(valid, low), unless(valid, high)
+
+
+def unless(valid: Any, value: Any) -> Any:
+    """`value` where `valid`, NaN elsewhere."""
+    return value if np.all(valid) else np.where(valid, value, np.nan)
+
+
+def _half_line(low: Any, high: Any, slope: Any, right: Any, valid: Any) -> tuple[Any, Any, Any]:
+    """Intersect (low, high) with slope·k > right; the common case of one sign throughout first."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if np.all(slope > 0):
+            return (low if np.ndim(right) == 0 and right == 0 else np.maximum(low, right / slope)), high, valid
+        edge = np.divide(right, slope)
+    low = np.where(slope > 0, np.maximum(low, edge), low)
+    high = np.where(slope < 0, np.minimum(high, edge), high)
+    return low, high, valid & ((slope != 0) | (np.asarray(right) < 0))

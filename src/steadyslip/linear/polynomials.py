@@ -1,0 +1,270 @@
+"""Arrays of real polynomials: roots, Hurwitz test, and the k for which p(s) + k q(s) is stable.
+
+Coefficients run along the last axis, lowest power first; the other axes are rigs. Highest coefficients
+may be zero (a rig without mass), rig by rig.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_NEARLY_REAL = 1e-6  # relative imaginary part below which a root in β² is tried as a boundary
+_SAME = 1e-9  # relative distance below which two boundaries in k are one
+
+
+def degrees(c: Array) -> NDArray[np.int64]:
+    """Degree of each polynomial, −1 for zero and for non-finite coefficients."""
+    present = (c != 0) & np.all(np.isfinite(c), axis=-1, keepdims=True)
+    top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
+    return np.where(np.any(present, axis=-1), top, -1)
+
+
+def evaluate(c: Any, s: Any) -> Any:
+    """Value at `s` of polynomials; `c` (..., n+1) against `s` (...)."""
+    value = np.zeros_like(s) + c[..., -1]
+    for i in range(c.shape[-1] - 2, -1, -1):
+        value = value * s + c[..., i]
+    return value
+
+
+def roots(c: Array) -> ComplexArray:
+    """All roots, (..., n) complex, sorted by falling real part; NaN where the degree is lower.
+
+    Eigenvalues of the balanced companion matrix, then Newton steps on the polynomial itself where they
+    improve it, so that slow roots keep their digits beside very fast ones.
+    """
+    n = c.shape[-1] - 1
+    flat = np.ascontiguousarray(c.reshape(-1, n + 1))
+    found: ComplexArray = np.full((len(flat), n), np.nan + 0j, dtype=complex)
+    degree = degrees(flat)
+    for d in np.unique(degree):
+        if d < 1:
+            continue
+        rows = np.flatnonzero(degree == d)
+        found[rows, :d] = _roots_of_degree(flat[rows, : d + 1])
+    order = np.argsort(-found.real, axis=-1, kind="stable")
+    return np.take_along_axis(found, order, axis=-1).reshape(*c.shape[:-1], n)
+
+
+def _roots_of_degree(c: Array) -> ComplexArray:
+    d = c.shape[-1] - 1
+    if d == 1:
+        return (-c[:, :1] / c[:, 1:]).astype(complex)
+    if d == 2:
+        return _quadratic(c)
+    companion = np.zeros((len(c), d, d))
+    companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
+    companion[:, :, -1] = -c[:, :-1] / c[:, -1:]
+    found = np.linalg.eigvals(companion).astype(complex)
+    slope = c[:, None, 1:] * np.arange(1, d + 1)
+    value = evaluate(c[:, None, :], found)
+    for _ in range(3):
+        with np.errstate(all="ignore"):
+            step = found - value / evaluate(slope, found)
+            better_value = evaluate(c[:, None, :], step)
+            better = np.abs(better_value) < np.abs(value)
+        found = np.where(better, step, found)
+        value = np.where(better, better_value, value)
+    return found
+
+
+def _quadratic(c: Array) -> ComplexArray:
+    """Roots of c0 + c1 s + c2 s² without cancellation."""
+    c0, c1, c2 = c[:, 0], c[:, 1], c[:, 2]
+    discriminant = np.sqrt((c1 * c1 - 4 * c0 * c2).astype(complex))
+    large = -0.5 * (c1 + np.where(c1 < 0, -1.0, 1.0) * discriminant)
+    with np.errstate(all="ignore"):
+        first = large / c2
+        second = np.where(large != 0, c0 / large, 0)
+    is_complex = discriminant.imag != 0
+    second = np.where(is_complex, np.conj(first), second)
+    return np.stack([first, second], axis=-1)
+
+
+def is_hurwitz(c: Array) -> NDArray[np.bool_]:
+    """Whether the highest coefficient is positive and all roots have negative real parts (Routh)."""
+    n = c.shape[-1] - 1
+    flat = c.reshape(-1, n + 1)
+    result = np.zeros(len(flat), dtype=bool)
+    degree = degrees(flat)
+    for d in np.unique(degree):
+        if d < max(n - 1, 0):  # the equations have lost more than their inertia: ill-posed
+            continue
+        rows = np.flatnonzero(degree == d)
+        result[rows] = np.all(routh_column(flat[rows, : d + 1]) > 0, axis=-1)
+    return result.reshape(c.shape[:-1])
+
+
+def routh_column(c: Array) -> Array:
+    """First column of the Routh array of polynomials of full degree; all positive means stable.
+
+    The entries depend on s to powers of one unit, so they have mixed units; only signs matter.
+    """
+    d = c.shape[-1] - 1
+    scale = np.abs(c).max(axis=-1, keepdims=True)
+    high = c / scale
+    width = d // 2 + 1
+    upper = np.zeros((*c.shape[:-1], width))
+    lower = np.zeros_like(upper)
+    upper[..., : len(range(d, -1, -2))] = high[..., d::-2]
+    if d >= 1:
+        lower[..., : len(range(d - 1, -1, -2))] = high[..., d - 1 :: -2]
+    column = [upper[..., 0]]
+    for _ in range(d):
+        column.append(lower[..., 0])
+        with np.errstate(all="ignore"):
+            ratio = upper[..., :1] / lower[..., :1]
+            following = np.zeros_like(upper)
+            following[..., :-1] = upper[..., 1:] - ratio * lower[..., 1:]
+        upper, lower = lower, following
+    return np.nan_to_num(np.stack(column, axis=-1) * scale, nan=-1.0)
+
+
+@dataclass(frozen=True)
+class StableSet:
+    """Where p + k q is stable, for arrays of rigs.
+
+    Attributes
+    ----------
+    intervals : ndarray (..., m, 2)
+        Stable intervals of k > 0 in rising order, NaN where a rig has fewer; upper end may be inf.
+    edges : ndarray (..., e)
+        Positive k at which stability may change, rising, NaN padded.
+    frequencies : ndarray (..., e)
+        Angular frequency (1/s) at each edge: 0 divergence, inf ill-posed.
+    changes : ndarray (..., e) of bool
+        Whether stability changes at the edge.
+    """
+
+    intervals: Array
+    edges: Array
+    frequencies: Array
+    changes: NDArray[np.bool_]
+
+
+def stable_set(p: Array, q: Array) -> StableSet:
+    """The set of k > 0 for which p(s) + k q(s) has all roots in the left half plane.
+
+    Boundaries are k = −p(iβ)/q(iβ) at real roots β >= 0 of Im[p(iβ) conj q(iβ)] = 0, and the k where the
+    highest coefficient vanishes; the intervals between them are tested (theory 3).
+    """
+    p, q = np.broadcast_arrays(p, q)
+    shape, n = p.shape[:-1], p.shape[-1] - 1
+    p, q = p.reshape(-1, n + 1), q.reshape(-1, n + 1)
+    k, beta = _candidates(p, q)
+    order = np.argsort(np.where(np.isnan(k), np.inf, k), axis=-1)
+    k, beta = np.take_along_axis(k, order, -1), np.take_along_axis(beta, order, -1)
+    with np.errstate(invalid="ignore"):
+        twice = np.zeros(k.shape, dtype=bool)
+        twice[:, 1:] = k[:, 1:] <= k[:, :-1] * (1 + _SAME)
+    k = np.where(twice, np.nan, k)
+    order = np.argsort(np.where(np.isnan(k), np.inf, k), axis=-1)
+    k, beta = np.take_along_axis(k, order, -1), np.take_along_axis(beta, order, -1)
+
+    probes = _between(k, p, q)
+    stable = is_hurwitz(p[:, None, :] + probes[..., None] * q[:, None, :])
+    changes = (stable[:, 1:] != stable[:, :-1]) & np.isfinite(k)
+    intervals = _intervals(np.where(np.isnan(k), np.inf, k), stable)
+    return StableSet(
+        intervals.reshape(*shape, *intervals.shape[1:]),
+        k.reshape(*shape, -1),
+        np.where(np.isnan(k), np.nan, beta).reshape(*shape, -1),
+        changes.reshape(*shape, -1),
+    )
+
+
+def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
+    """Positive k at which a root may cross, and its β; NaN where there is none."""
+    n = p.shape[-1] - 1
+    with np.errstate(all="ignore"):
+        static = -p[:, 0] / q[:, 0]
+        top = -p[:, n] / q[:, n]
+        no_inertia = (p[:, n] == 0) & (q[:, n] == 0)
+        top = np.where(no_inertia, -p[:, n - 1] / q[:, n - 1], top)
+    w = crossing_squares(p, q)
+    pe, po = _even_odd(p)
+    qe, qo = _even_odd(q)
+    with np.errstate(all="ignore"):
+        e1, o1, e2, o2 = (evaluate(part[:, None, :], w) for part in (pe, po, qe, qo))
+        oscillatory = -(e1 * e2 + w * o1 * o2) / (e2 * e2 + w * o2 * o2)
+    k = np.concatenate([static[:, None], top[:, None], oscillatory], axis=-1)
+    zero = np.zeros_like(static)[:, None]
+    beta = np.concatenate([zero, zero + np.inf, np.sqrt(w)], axis=-1)
+    with np.errstate(invalid="ignore"):
+        k = np.where((k > 0) & np.isfinite(k), k, np.nan)
+    return k, beta
+
+
+def _even_odd(c: Array) -> tuple[Array, Array]:
+    """E and O with c(iβ) = E(β²) + iβ O(β²), as polynomials in β²."""
+    even, odd = c[..., 0::2].copy(), c[..., 1::2].copy()
+    even[..., 1::2] *= -1
+    odd[..., 1::2] *= -1
+    return even, odd if odd.shape[-1] else np.zeros((*c.shape[:-1], 1))
+
+
+def _product(a: Array, b: Array) -> Array:
+    out = np.zeros((*a.shape[:-1], a.shape[-1] + b.shape[-1] - 1))
+    for i in range(a.shape[-1]):
+        out[..., i : i + b.shape[-1]] += a[..., i : i + 1] * b
+    return out
+
+
+def crossing_squares(p: Array, q: Array) -> Array:
+    """Positive β² where p(iβ)/q(iβ) is real, NaN padded: the roots of Im[p conj q]/β."""
+    pe, po = _even_odd(p)
+    qe, qo = _even_odd(q)
+    first, second = _product(po, qe), _product(pe, qo)
+    width = max(first.shape[-1], second.shape[-1])
+    difference = np.zeros((*p.shape[:-1], width))
+    difference[..., : first.shape[-1]] += first
+    size = np.abs(difference)
+    difference[..., : second.shape[-1]] -= second
+    size[..., : second.shape[-1]] += np.abs(second)
+    # what is left of an exact cancellation is not a coefficient
+    difference[np.abs(difference) < 8 * np.finfo(float).eps * size] = 0.0
+    keep = np.any(difference != 0, axis=0)
+    if width < 2 or not np.any(keep[1:]):
+        return np.full((len(p), 1), np.nan)
+    w = roots(difference[:, : np.flatnonzero(keep)[-1] + 1])
+    with np.errstate(invalid="ignore"):
+        usable = (w.real > 0) & (np.abs(w.imag) <= _NEARLY_REAL * np.abs(w))
+    return np.where(usable, w.real, np.nan)
+
+
+def _between(k: Array, p: Array, q: Array) -> Array:
+    """One k inside each interval of (0, inf) cut at the candidates."""
+    with np.errstate(all="ignore"):
+        ratio = np.abs(p / q)
+        natural = np.nanmax(np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan), axis=-1, initial=0.0)
+    natural = np.where(natural > 0, natural, 1.0)[:, None]
+    low = np.concatenate([np.zeros_like(natural), k], axis=-1)
+    high = np.concatenate([k, np.full_like(natural, np.nan)], axis=-1)
+    last = np.where(low > 0, 2 * low, natural)
+    inner = np.where(low > 0, np.sqrt(low) * np.sqrt(high), high / 2)
+    return np.where(np.isnan(low), 1.0, np.where(np.isnan(high), last, inner))
+
+
+def _intervals(k: Array, stable: NDArray[np.bool_]) -> Array:
+    """Join neighbouring stable cells into intervals, NaN padded."""
+    rows, cells = stable.shape
+    low = np.concatenate([np.zeros((rows, 1)), k], axis=-1)
+    high = np.concatenate([k, np.full((rows, 1), np.inf)], axis=-1)
+    real_cell = np.isfinite(low)
+    stable = stable & real_cell
+    before = np.concatenate([np.zeros((rows, 1), bool), stable[:, :-1]], axis=-1)
+    after = np.concatenate([stable[:, 1:], np.zeros((rows, 1), bool)], axis=-1)
+    starts, ends = stable & ~before, stable & ~after
+    most = max(int(starts.sum(axis=-1).max(initial=0)), 1)
+    out = np.full((rows, most, 2), np.nan)
+    for side, (mask, values) in enumerate(((starts, low), (ends, high))):
+        row, cell = np.nonzero(mask)
+        out[row, np.cumsum(mask, axis=-1)[row, cell] - 1, side] = values[row, cell]
+    return out

@@ -1,0 +1,137 @@
+"""Small-signal response of friction and contact: the ingredients of the paper's closed form.
+
+For a law with one memory variable, τ̂ = [f − ĥ(s)] v̂ + [f1 + ĥ1(s)] σ̂ with one rate of decay r (eqs
+5-9, 13-16). Instead of the paper's λ and λ1 (infinite for Prakash–Clifton) this uses
+S = dτss/dv = −λf and μ = dτss/dσ = λ1 f1, which never are. S and μ come from the steady state that the law
+declares, f, f1 and r from its strength and rate: two separate statements of the law, so the agreement of
+this route with the Model's Jacobian checks the law itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import sympy as sp
+
+from steadyslip.errors import NotAvailable
+from steadyslip.model import Model
+
+
+@dataclass(frozen=True)
+class Response:
+    """Ingredients of the cubic in symbols (per unit area).
+
+    Attributes
+    ----------
+    f, S : sympy.Expr
+        ∂τ/∂v and dτss/dv at constant σ, dampings c and η included (Pa s/m).
+    r : sympy.Expr
+        Rate of decay of the memory (1/s).
+    f1, mu : sympy.Expr
+        ∂τ/∂σ at fixed v and memory variable, and dτss/dσ.
+    B0, B1, B2, B3 : sympy.Expr
+        σ̂ = (B0 s² + B1 s + k B2 + B3) x̂, eq. 12.
+    m, k : sympy.Expr
+        Mass, and total stiffness between block and load point.
+    """
+
+    f: sp.Expr
+    S: sp.Expr
+    r: sp.Expr
+    f1: sp.Expr
+    mu: sp.Expr
+    B0: sp.Expr
+    B1: sp.Expr
+    B2: sp.Expr
+    B3: sp.Expr
+    m: sp.Expr
+    k: sp.Expr
+
+    def as_dict(self) -> dict[str, sp.Expr]:
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+
+def has_closed_form(model: Model) -> bool:
+    """Whether the model is one that the cubic describes: one memory variable, no integral control."""
+    return len(memory_symbols(model)) == 1 and "integral" not in model.symbols
+
+
+def memory_symbols(model: Model) -> list[sp.Symbol]:
+    own = [model.symbols["x"], model.symbols["v"], model.symbols.get("integral")]
+    return [item.symbol for item in model.variables if item.symbol not in own]
+
+
+@lru_cache(maxsize=128)
+def response(model: Model) -> Response:
+    """The response of a model with one memory variable.
+
+    Raises
+    ------
+    NotAvailable
+        If the model has no memory, several memory variables, or integral control.
+    """
+    if not has_closed_form(model):
+        raise NotAvailable(
+            "the closed form needs exactly one memory variable and no integral control; this model has "
+            f"{len(memory_symbols(model))} memory variables; use the characteristic polynomial instead"
+        )
+    (memory,) = memory_symbols(model)
+    symbol = model.symbols
+    v, sigma, tau = symbol["v"], symbol["sigma"], symbol["tau"]
+    rate = next(r for item, r in zip(model.variables, model.rates, strict=True) if item.symbol is memory)
+
+    def at_steady(expression: sp.Expr) -> sp.Expr:
+        return expression.xreplace(model.steady).doit()
+
+    # the law states strength(v, σ, memory, τ) − τ = 0; τ itself occurs in strength for Nagata only
+    own = -at_steady(sp.diff(model.balance, tau))
+    f = at_steady(sp.diff(model.balance, v)) / own
+    f1 = at_steady(sp.diff(model.balance, sigma)) / own
+    by_memory = at_steady(sp.diff(model.balance, memory)) / own
+    r = -(at_steady(sp.diff(rate, memory)) + at_steady(sp.diff(rate, tau)) * by_memory)
+    v0 = model.parameters["drive.velocity"]
+    tau_ss = model.steady[tau]
+    slope, mu = sp.diff(tau_ss, v0), sp.diff(tau_ss, model.sigma_ss)
+    m, c, eta, k = _mechanics(model)
+    b0, b1, b2, b3 = contact_coefficients(model)
+    return Response(f + c + eta, slope + c + eta, r, f1, mu, b0, b1, b2, b3, m, k)
+
+
+def _mechanics(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
+    """m, c, η and k (with the gains of a controller) from the definitions of T and τ."""
+    symbol = model.symbols
+    spring = model.definitions[symbol["spring"]]
+    friction = model.definitions[symbol["tau"]]
+    return (
+        -sp.diff(friction, symbol["acceleration"]),
+        -sp.diff(spring, symbol["v"]),
+        -sp.diff(friction, symbol["v"]),
+        -sp.diff(spring, symbol["x"]),
+    )
+
+
+@lru_cache(maxsize=128)
+def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
+    """B0, B1, B2, B3 of eq. 12 that a contact law comes down to, at steady sliding.
+
+    A contact that depends on friction does so through the balance of forces τ = T − ηv − m v̇, which is
+    where its B0 = −γm and part of its B1 come from (theory 3, table of mechanisms).
+    """
+    symbol = model.symbols
+    law = model.definitions[symbol["sigma"]]
+    m, c, eta, k = _mechanics(model)
+
+    def partial(name: str) -> sp.Expr:
+        return sp.diff(law, symbol[name]).xreplace(model.steady).doit()
+
+    by_spring, by_friction = partial("spring"), partial("tau")
+    through_spring = by_spring + by_friction
+    by_slip = partial("x")
+    spring_constant = model.parameters["slider.stiffness"]
+    by_stiffness = sp.diff(by_slip, spring_constant)
+    b0 = partial("acceleration") - m * by_friction
+    b1 = partial("v") - c * through_spring - eta * by_friction
+    b2 = by_stiffness - through_spring
+    b3 = sp.expand(by_slip - by_stiffness * k)
+    return b0, b1, b2, b3

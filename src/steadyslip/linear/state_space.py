@@ -1,0 +1,119 @@
+"""The linearised rig as a state-space system, for SciPy and python-control."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.errors import NotAvailable, UnknownNameError
+from steadyslip.expressions import array_function
+from steadyslip.linear.linearise import linearise
+from steadyslip.model import Model
+from steadyslip.slider import Slider
+from steadyslip.steady import explain_absence, steady_stress_roots
+from steadyslip.values import model_values
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
+
+INPUTS = ("load_velocity", "disturbance", "normal_disturbance")
+
+
+def jacobian(rig: Slider) -> Any:
+    """Jacobian (1/s and mixed units) of the Model's own variables at steady sliding.
+
+    Order as in ``build_model(rig).variables``; the algebraic unknown is eliminated. Its eigenvalues are the
+    route to stability that is independent of the closed form.
+    """
+    return state_matrices(rig, ())[0]
+
+
+def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, Any]:
+    """A, B, C, D for the given outputs (names of ``Model.observables``); inputs are `INPUTS`.
+
+    Raises
+    ------
+    NoSteadySliding
+        If there is nothing to linearise about.
+    UnknownNameError
+        If an output is unknown.
+    NotAvailable
+        If the problem is ill-posed: the balance cannot be solved for its unknown.
+    """
+    values = model_values(rig)
+    model = values.model
+    for name in outputs:
+        if name not in model.observables:
+            raise UnknownNameError("output", name, model.observables)
+    stresses = steady_stress_roots(values)
+    if not stresses:
+        raise explain_absence(rig, values)
+    names = tuple(outputs)
+    blocks = _matrix_function(model, names)(*values.arguments, stresses[0])
+    n, inputs, p = len(model.variables), len(INPUTS), len(names)
+    width = n + inputs + 1
+    table = np.array([float(b) for b in blocks]).reshape(n + p + 1, width)
+    balance = table[-1]
+    if balance[-1] == 0:
+        raise NotAvailable("ill-posed: the friction law does not determine the motion (its direct effect is zero)")
+    solved = -balance[:-1] / balance[-1]  # the unknown in terms of variables and inputs
+    full = table[:-1, :-1] + table[:-1, -1:] * solved
+    return full[:n, :n], full[:n, n:], full[n:, :n], full[n:, n:]
+
+
+@lru_cache(maxsize=64)
+def _matrix_function(model: Model, outputs: tuple[str, ...]) -> Any:
+    """Rows: rates, outputs, balance. Columns: variables, inputs, unknown."""
+    linear = linearise(model)
+    columns = [item.symbol for item in model.variables] + [model.inputs[name] for name in INPUTS]
+    columns.append(model.unknown)
+    rows = []
+    for item in model.variables:
+        if item.symbol is model.symbols["v"]:
+            rows.append({model.unknown: sp.Integer(1)})
+        else:
+            rows.append(linear.rates[item.symbol])
+    rows += [linear.outputs[name] for name in outputs]
+    rows.append(linear.balance)
+    entries = [row.get(column, sp.Integer(0)) for row in rows for column in columns]
+    return array_function([*model.parameters.values(), model.sigma_ss], entries)
+
+
+def state_space(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress", "normal_stress")) -> StateSpace:
+    """The linearised rig as `scipy.signal.StateSpace`.
+
+    Parameters
+    ----------
+    rig : Slider
+    outputs : sequence of str
+        Names of ``Model.observables``; perturbations from steady sliding, SI units.
+
+    Returns
+    -------
+    scipy.signal.StateSpace
+        Inputs, in order: perturbation of the load-point velocity (m/s), disturbance stress on the block q
+        (Pa), disturbance of the normal stress (Pa; the B4 of eq. 12). States as in ``Model.variables``.
+    """
+    from scipy.signal import StateSpace
+
+    return StateSpace(*state_matrices(rig, outputs))
+
+
+def to_control(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress", "normal_stress")) -> Any:
+    """The same as `state_space` for the ``control`` package, with named signals.
+
+    Raises
+    ------
+    NotAvailable
+        If ``control`` is not installed.
+    """
+    try:
+        import control
+    except ImportError as error:
+        raise NotAvailable("the package 'control' is not installed; install it or use state_space") from error
+    names = [item.name for item in model_values(rig).model.variables]
+    return control.ss(*state_matrices(rig, outputs), states=names, inputs=list(INPUTS), outputs=list(outputs))

@@ -1,0 +1,277 @@
+"""Critical stiffness, stable stiffness, eigenvalues: for one rig or for arrays of any parameters.
+
+Rigs with one memory variable go through the cubic in closed form, all others through the Model's
+characteristic polynomial p(s) + k q(s); the two routes agree to rounding (tests).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.expressions import array_function
+from steadyslip.linear import cubic
+from steadyslip.linear.linearise import characteristic_coefficients, stiffness_split
+from steadyslip.linear.polynomials import StableSet, roots, stable_set
+from steadyslip.linear.response import has_closed_form, response
+from steadyslip.model import Model
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_equation, steady_stress
+from steadyslip.values import Values, Vary, model_values
+
+_CHUNK = 16384  # rigs at a time, so that intermediate arrays stay in the processor's cache
+
+
+def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
+    """Critical stiffness: the edge of the stable set nearest to the rig's own stiffness.
+
+    Parameters
+    ----------
+    rig : Slider
+    vary : mapping of str to array_like or xarray.DataArray, optional
+        Parameters to vary, by dotted name, in SI units; they broadcast.
+
+    Returns
+    -------
+    float, ndarray or xarray.DataArray
+        Pa/m along the sliding direction; NaN where stability has no edge at a positive stiffness, or
+        where steady sliding does not exist.
+
+    Raises
+    ------
+    ParameterError
+        If a name or value is not allowed.
+
+    Notes
+    -----
+    Eq. 20 of Dupont & Bapna with its errata corrected, or the general route (theory 3). One number is
+    never a verdict: see `stable_stiffness`.
+    """
+    values = model_values(rig, vary)
+    return values.wrap(in_chunks(values, _nearest_edge), "critical_stiffness", "Pa/m")
+
+
+def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
+    """All stiffnesses k > 0 at which steady sliding is stable, as intervals.
+
+    Parameters
+    ----------
+    rig, vary
+        As for `critical_stiffness`.
+
+    Returns
+    -------
+    ndarray or xarray.DataArray, shape (..., m, 2)
+        Open intervals (low, high) in Pa/m, in rising order; high is inf where there is no upper limit.
+        Rigs with fewer than m intervals are padded with NaN; all NaN means that no stiffness is stable.
+    """
+    values = model_values(rig, vary)
+    low, high = _in_chunks_of_intervals(values)
+    intervals = np.stack([low, high], axis=-1)
+    return values.wrap(intervals, "stable_stiffness", "Pa/m", ("interval", "end"))
+
+
+def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
+    """Eigenvalues of small perturbations of steady sliding.
+
+    Parameters
+    ----------
+    rig, vary
+        As for `critical_stiffness`.
+
+    Returns
+    -------
+    ndarray or xarray.DataArray, shape (..., n), complex
+        1/s, sorted by falling real part; NaN where steady sliding does not exist, and for the root that a
+        rig lacks when its mass is zero.
+    """
+    values = model_values(rig, vary)
+
+    def kernel(part: Values) -> Any:
+        return roots(characteristic(part))
+
+    return values.wrap(in_chunks(values, kernel), "eigenvalues", "1/s", ("mode",))
+
+
+def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
+    """Largest real part of the eigenvalues (1/s): positive grows, negative decays.
+
+    inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding.
+    """
+    values = model_values(rig, vary)
+
+    def kernel(part: Values) -> Any:
+        c = characteristic(part)
+        with np.errstate(invalid="ignore"):
+            rate = np.max(np.where(np.isnan(found := roots(c).real), -np.inf, found), axis=-1)
+        return np.where(ill_posed(c), np.inf, np.where(np.all(np.isfinite(c), axis=-1), rate, np.nan))
+
+    return values.wrap(in_chunks(values, kernel), "growth_rate", "1/s")
+
+
+# --- coefficients as arrays -------------------------------------------------------------------------
+
+
+def characteristic(values: Values) -> Any:
+    """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
+    sigma = steady_stress(values)
+    return _stacked(_coefficient_function(values.model)(*values.arguments, sigma), values.shape, sigma)
+
+
+def stiffness_polynomials(values: Values) -> tuple[Any, Any]:
+    """p and q of p(s) + k q(s), each (..., n+1), lowest first; k is the spring's own stiffness."""
+    sigma = steady_stress(values)
+    both = _split_function(values.model)(*values.arguments, sigma)
+    half = len(both) // 2
+    return _stacked(both[:half], values.shape, sigma), _stacked(both[half:], values.shape, sigma)
+
+
+def general_set(values: Values) -> StableSet:
+    """The stable set by the Model's characteristic polynomial, for any number of states."""
+    return stable_set(*stiffness_polynomials(values))
+
+
+def ill_posed(c: Any) -> Any:
+    """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3)."""
+    return (c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0))
+
+
+def _stacked(parts: list[Any], shape: tuple[int, ...], sigma: Any) -> Any:
+    out = np.empty((*shape, len(parts)))
+    for i, part in enumerate(parts):
+        out[..., i] = part
+    if np.any(np.isnan(sigma)):
+        out[np.broadcast_to(np.isnan(sigma), shape)] = np.nan
+    return out
+
+
+@lru_cache(maxsize=128)
+def _coefficient_function(model: Model) -> Callable[..., list[Any]]:
+    return array_function([*model.parameters.values(), model.sigma_ss], characteristic_coefficients(model))
+
+
+@lru_cache(maxsize=128)
+def _split_function(model: Model) -> Callable[..., list[Any]]:
+    p, q = stiffness_split(model)
+    return array_function([*model.parameters.values(), model.sigma_ss], [*p, *q])
+
+
+# --- the interval of the closed form ----------------------------------------------------------------
+
+
+def closed_form_interval(values: Values) -> tuple[Any, Any]:
+    """Ends of the one stable interval of a rig with one memory variable (cubic in closed form)."""
+    exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(values.model)(values)
+    low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
+    if np.ndim(gain) or gain != 0:
+        high = high - gain
+        low = np.where(high > 0, np.maximum(low - gain, 0.0), np.nan)
+        high = np.where(high > 0, high, np.nan)
+    return cubic.unless(exists, low), cubic.unless(exists, high)
+
+
+@lru_cache(maxsize=128)
+def _interval_function(model: Model) -> Callable[[Values], list[Any]]:
+    """Everything that `closed_form_interval` needs, compiled into one function."""
+    part = response(model)
+    known = part.as_dict()
+    gain = sp.expand(known.pop("k") - model.parameters["slider.stiffness"])
+    numerator, denominator = _hopf_line(known)
+    _, _, a2, a3 = cubic.coefficients(**known, k=sp.Integer(0))
+    wanted = [numerator, denominator, part.mu * part.B2, part.mu * part.B3, a2, a3, gain]
+    equation = steady_equation(model)
+    arguments = list(model.parameters.values())
+    if not equation.affine:
+        general = array_function([*arguments, model.sigma_ss], wanted)
+
+        def by_search(values: Values) -> list[Any]:
+            sigma = steady_stress(values)
+            return [np.isfinite(sigma), *general(*values.arguments, sigma)]
+
+        return by_search
+    sigma, slope = equation.sigma, equation.slope
+    direct = array_function(arguments, [sigma, slope, *(w.xreplace({model.sigma_ss: sigma}) for w in wanted)])
+
+    def in_one_go(values: Values) -> list[Any]:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            stress, coupling, *rest = direct(*values.arguments)
+        return [(coupling < 1) & (stress > 0), *rest]
+
+    return in_one_go
+
+
+def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
+    """N and D of D k > N, divided by a2 where that divides both: stability needs a2 > 0 anyway."""
+    names = {key: sp.Integer(0) if value == 0 else sp.Symbol(key) for key, value in known.items()}
+    numerator, denominator = cubic.hopf_line(**names)
+    a2 = cubic.coefficients(**names, k=sp.Integer(0))[2]
+    short = [sp.cancel(part / a2) for part in (numerator, denominator)]
+    if all(part.is_polynomial() for part in short):
+        numerator, denominator = short
+    values = {symbol: known[key] for key, symbol in names.items() if isinstance(symbol, sp.Symbol)}
+    return numerator.xreplace(values), denominator.xreplace(values)
+
+
+# --- intervals to answers, chunk by chunk -----------------------------------------------------------
+
+
+def _interval_ends(values: Values) -> tuple[Any, Any]:
+    """Lower and upper ends of the stable intervals, (..., m)."""
+    if has_closed_form(values.model):
+        low, high = closed_form_interval(values)
+        return np.asarray(low)[..., None], np.asarray(high)[..., None]
+    intervals = general_set(values).intervals
+    return intervals[..., 0], intervals[..., 1]
+
+
+def _nearest_edge(values: Values) -> Any:
+    """The finite positive end of a stable interval nearest to the rig's own stiffness."""
+    own = values.named()["slider.stiffness"]
+    low, high = _interval_ends(values)
+    if low.shape[-1] == 1:
+        low, high = low[..., 0], high[..., 0]
+        if not np.any(high < np.inf):  # the common case, worth its own line for arrays of rigs
+            return cubic.unless(low > 0, low)
+        is_low = (low > 0) & ~((high < np.inf) & (np.abs(high - own) < np.abs(low - own)))
+        return np.where(is_low, low, np.where(high < np.inf, high, np.nan))
+    ends = np.concatenate([low, high], axis=-1)
+    ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)
+    distance = np.where(np.isnan(ends), np.inf, np.abs(ends - np.asarray(own)[..., None]))
+    nearest = np.argmin(distance, axis=-1)[..., None]
+    return np.take_along_axis(ends, nearest, axis=-1)[..., 0]
+
+
+def in_chunks(values: Values, kernel: Callable[[Values], Any]) -> Any:
+    """Apply a kernel to the varied rigs some thousand at a time."""
+    whole: Any = None
+    done = 0
+    for part in values.pieces(_CHUNK):
+        result = np.asarray(kernel(part))
+        extra = result.shape[len(part.shape) :]
+        if whole is None:
+            whole = np.empty((values.size, *extra), dtype=result.dtype)
+        whole[done : done + part.size] = np.broadcast_to(result, (*part.shape, *extra)).reshape(-1, *extra)
+        done += part.size
+    return whole.reshape(values.shape + whole.shape[1:])
+
+
+def _in_chunks_of_intervals(values: Values) -> tuple[Any, Any]:
+    """Interval ends of all rigs; chunks may differ in the number of intervals."""
+    pieces = [
+        (np.broadcast_to(low, (*part.shape, low.shape[-1])), np.broadcast_to(high, (*part.shape, low.shape[-1])))
+        for part in values.pieces(_CHUNK)
+        for low, high in [_interval_ends(part)]
+    ]
+    most = max(low.shape[-1] for low, _ in pieces)
+    ends = []
+    for side in (0, 1):
+        padded = [
+            np.concatenate([piece[side], np.full((*piece[side].shape[:-1], most - piece[side].shape[-1]), np.nan)], -1)
+            for piece in pieces
+        ]
+        ends.append(padded[0] if len(padded) == 1 else np.concatenate(padded).reshape(*values.shape, most))
+    return ends[0], ends[1]

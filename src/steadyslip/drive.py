@@ -12,7 +12,7 @@ from typing import Any
 from steadyslip.records import Record, nonnegative, parameter, positive
 
 
-class Drive(Record, family="drive", positional=True):
+class Drive(Record, family="drive", kw_only=False):
     """Base of drives: steady velocity and the gains of a controller, zero unless a subclass has them."""
 
     velocity: float = parameter("m/s", positive, "velocity of the load point in steady sliding")
@@ -30,11 +30,11 @@ class Drive(Record, family="drive", positional=True):
         return None
 
 
-class Steady(Drive, name="steady", positional=True):
+class Steady(Drive, name="steady", kw_only=False):
     """A load point pulled at constant velocity."""
 
 
-class PD(Drive, name="pd", positional=True):
+class PD(Drive, name="pd", kw_only=False):
     """A position controller with proportional and derivative gain, following the ramp v0 t."""
 
     kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True)
@@ -47,7 +47,7 @@ class PD(Drive, name="pd", positional=True):
         return self.kd
 
 
-class PID(PD, name="pid", positional=True):
+class PID(PD, name="pid", kw_only=False):
     """A position controller with proportional, integral and derivative gain, following the ramp v0 t."""
 
     ki: float = parameter("Pa/m/s", nonnegative, "integral gain", default=0.0, structural=True)

@@ -10,7 +10,7 @@ import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 
 
-class asinh_exp(sp.Function):  # noqa: N801  # named like the SymPy functions it stands beside
+class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like the SymPy functions it stands beside
     """asinh(x exp(y)), evaluated without overflow for large y (regularised rate-and-state friction)."""
 
     nargs = 2
@@ -21,10 +21,10 @@ class asinh_exp(sp.Function):  # noqa: N801  # named like the SymPy functions it
         return 1 / root if argindex == 1 else x / root
 
     def _eval_is_positive(self) -> bool | None:
-        return self.args[0].is_positive
+        return bool(self.args[0].is_positive) or None
 
     def _eval_is_real(self) -> bool | None:
-        return self.args[0].is_real and self.args[1].is_real
+        return bool(self.args[0].is_real and self.args[1].is_real) or None
 
     def _latex(self, printer: Any) -> str:
         x, y = (printer._print(argument) for argument in self.args)

@@ -90,7 +90,7 @@ class Model:
     @property
     def inertial(self) -> bool:
         """Whether velocity is a variable of its own (mass, or normal stress that feels acceleration)."""
-        return self.unknown.name == "a_x"
+        return str(self.unknown) == "a_x"
 
     def equations(self) -> list[sp.Eq]:
         """The model as SymPy equations, ready for LaTeX."""
@@ -106,9 +106,7 @@ class Model:
         lines = [f"Model, {kind}; algebraic unknown {self.unknown}", "variables"]
         lines += [f"  {v.symbol!s:<10} {v.unit:<8} {v.doc}" for v in self.variables]
         lines.append("parameters")
-        lines += [
-            f"  {symbol!s:<14} {self.units[name]:<8} {name}" for name, symbol in self.parameters.items()
-        ]
+        lines += [f"  {symbol!s:<14} {self.units[name]:<8} {name}" for name, symbol in self.parameters.items()]
         lines.append("equations")
         for equation in self.equations():
             left = equation.lhs
@@ -192,9 +190,7 @@ def _parameter_symbols(rig: Slider, present: frozenset[str]) -> dict[str, Any]:
     return symbols
 
 
-def _assemble(
-    rig: Slider, k: sp.Symbol, given: dict[str, sp.Symbol], units: dict[str, str]
-) -> Model:
+def _assemble(rig: Slider, k: sp.Symbol, given: dict[str, sp.Symbol], units: dict[str, str]) -> Model:
     """Join friction, contact, body and drive; `rig` holds symbols."""
     x, v, acceleration = sp.symbols("x v a_x", real=True)
     integral = sp.Symbol("I_x", real=True)

@@ -160,8 +160,7 @@ def parse(text: str, expected: str) -> float:
         raise QuantityError(f"{error}; write for example {example(expected)}") from error
     if found != wanted:
         raise QuantityError(
-            f"{text!r} has the wrong dimension; expected {described(expected)}, "
-            f"for example {example(expected)}"
+            f"{text!r} has the wrong dimension; expected {described(expected)}, for example {example(expected)}"
         )
     return number * factor
 
@@ -193,23 +192,6 @@ def described(expected: str) -> str:
     """The unit in words for messages."""
     return "a number without unit" if expected == "1" else f"a quantity in {expected}"
 
-
-def per_area_to_total(expected: str) -> str:
-    """The unit that belongs to `expected` when a value is given for the whole contact area.
-
-    Quantities that contain mass (stress, stiffness, damping, mass itself) are per unit area inside;
-    multiplied by the area they become forces, N/m, N s/m, kg. Others are left as they are.
-    """
-    return _TOTAL.get(expected, expected)
-
-
-_TOTAL = {
-    "Pa": "N",
-    "Pa/m": "N/m",
-    "Pa s/m": "N s/m",
-    "Pa/m/s": "N/m/s",
-    "kg/m^2": "kg",
-}
 
 _SHOWN_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 

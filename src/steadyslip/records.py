@@ -132,8 +132,8 @@ class Record:
 
     Subclasses become frozen keyword-only dataclasses by themselves. ``name="..."`` registers a law
     under the word used in rig files; ``family="..."`` starts a new family of interchangeable laws;
-    ``section="..."`` puts a word before the record's own numbers; ``positional=True`` lets the
-    constructor take them by position.
+    ``section="..."`` puts a word before the record's own numbers; ``kw_only=False`` lets the
+    constructor take numbers by position.
     """
 
     name: ClassVar[str] = ""
@@ -142,10 +142,10 @@ class Record:
     registry: ClassVar[dict[str, type[Record]]] = {}
 
     def __init_subclass__(
-        cls, *, name: str = "", family: str = "", section: str = "", positional: bool = False, **kwargs: Any
+        cls, *, name: str = "", family: str = "", section: str = "", kw_only: bool = True, **kwargs: Any
     ) -> None:
         super().__init_subclass__(**kwargs)
-        dataclass(frozen=True, kw_only=not positional, repr=False)(cls)
+        dataclass(frozen=True, kw_only=kw_only, repr=False)(cls)
         if section:
             cls.section = section + "."
         if family:
@@ -187,12 +187,30 @@ class Record:
 
 def role_of(item: Field[Any]) -> Parameter | Option | Part:
     """The declaration behind a dataclass field."""
-    role = item.metadata.get(_ROLE)
+    role: Parameter | Option | Part | None = item.metadata.get(_ROLE)
     if role is None:
-        raise TypeError(
-            f"field {item.name!r} has no unit or domain; declare it with parameter(), option() or part()"
-        )
+        raise TypeError(f"field {item.name!r} has no unit or domain; declare it with parameter(), option() or part()")
     return role
+
+
+def contradictions(law: type[Record], valid: Mapping[str, Any], given: set[str]) -> list[Problem]:
+    """Problems between the fields of a record that cannot be built, because other fields are bad.
+
+    Numbers that were given but are bad, or missing, stand as NaN, which contradicts nothing.
+    """
+    partial = object.__new__(law)
+    for item in fields(law):  # type: ignore[arg-type]
+        role = role_of(item)
+        if item.name in valid:
+            value = valid[item.name]
+        elif item.name in given or is_required(item):
+            if not isinstance(role, Parameter):
+                return []
+            value = math.nan
+        else:
+            value = item.default
+        object.__setattr__(partial, item.name, value)
+    return list(partial.inconsistencies())
 
 
 def field_name(record: Record | type[Record], item: Field[Any], prefix: str) -> str:
@@ -201,6 +219,7 @@ def field_name(record: Record | type[Record], item: Field[Any], prefix: str) -> 
 
 
 def is_required(item: Field[Any]) -> bool:
+    """Whether a field has no default."""
     return item.default is MISSING
 
 
@@ -240,20 +259,21 @@ def checked_number(role: Parameter, value: Any) -> float:
         except QuantityError as error:
             raise _fault(str(error)) from error
     elif isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise _fault(f"got {value!r}; allowed: {_allowed(role)}")
+        raise _fault(f"got {value!r}; allowed: {allowed(role)}")
     elif np.ndim(value) != 0:
         raise _fault("got an array; a rig holds single values, pass arrays by dotted name instead")
     else:
         try:
             number = float(value)
         except (TypeError, ValueError, OverflowError) as error:
-            raise _fault(f"got {value!r}; allowed: {_allowed(role)}") from error
+            raise _fault(f"got {value!r}; allowed: {allowed(role)}") from error
     if not role.domain.contains(number):
-        raise _fault(f"got {value!r}; allowed: {_allowed(role)}")
+        raise _fault(f"got {value!r}; allowed: {allowed(role)}")
     return number
 
 
-def _allowed(role: Parameter) -> str:
+def allowed(role: Parameter) -> str:
+    """What a parameter may be, in words for messages."""
     unit = "" if role.unit == "1" else f" in {role.unit}, or text such as {example(role.unit)}"
     return role.domain.text + unit
 
@@ -319,7 +339,7 @@ def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
             own[item.name] = replaced(value, changes, prefix if role.inline else f"{name}.")
         elif name in changes:
             own[item.name] = changes[name]
-    return replace(record, **own)
+    return replace(record, **own)  # type: ignore[type-var]
 
 
 def twin(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
@@ -355,4 +375,3 @@ def shape_of(record: Record, prefix: str = "") -> tuple[Any, ...]:
         else:
             shape.append(None if value is None else shape_of(value))
     return tuple(shape)
-

@@ -35,9 +35,7 @@ class Slider(Record, section="slider"):
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
-    stiffness: float | None = parameter(
-        "Pa/m", nonnegative, "stiffness k along the sliding direction", default=None
-    )
+    stiffness: float | None = parameter("Pa/m", nonnegative, "stiffness k along the sliding direction", default=None)
     axial_stiffness: float | None = parameter(
         "Pa/m", nonnegative, "stiffness along the axis of spring, rod or press, instead", default=None
     )
@@ -50,18 +48,14 @@ class Slider(Record, section="slider"):
         default=0.0,
         structural=True,
     )
-    area: float | None = parameter(
-        "m^2", positive, "contact area, to report forces as well", default=None, gauge=True
-    )
+    area: float | None = parameter("m^2", positive, "contact area, to report forces as well", default=None, gauge=True)
     drive: Drive = part(Drive, "drive")
 
     def inconsistencies(self) -> Iterator[Problem]:
         if self.stiffness is not None and self.axial_stiffness is not None:
             yield Problem("axial_stiffness", "given beside stiffness; give one of the two")
         if self.stiffness is None and self.axial_stiffness is None and not self.drive.proportional():
-            yield Problem(
-                "stiffness", "missing; give stiffness such as '9 GPa/m' (or a drive with gain kp > 0)"
-            )
+            yield Problem("stiffness", "missing; give stiffness such as '9 GPa/m' (or a drive with gain kp > 0)")
         if self.axial_stiffness is not None and not self.contact.has_axis():
             yield Problem(
                 "axial_stiffness",

@@ -57,7 +57,7 @@ class SteadySliding:
         return "\n".join(rows)
 
 
-def steady(rig: Slider) -> SteadySliding:
+def steady_state(rig: Slider) -> SteadySliding:
     """The steady sliding of a rig.
 
     Returns
@@ -130,15 +130,11 @@ def steady_equation(model: Model) -> SteadyEquation:
     """How a model determines its steady normal stress."""
     sigma = model.sigma_ss
     slope = sp.diff(model.steady_coupling, sigma)
+    # where σss is given, the contact hands back that parameter and sigma_ss does not occur
+    load = model.steady_stress if model.steady_load is None else model.steady_load
     arguments = list(model.parameters.values())
     given = model.steady_load is None
-    affine = sigma not in slope.free_symbols and (given or sigma not in model.steady_load.free_symbols)
-    if given:
-        # the contact hands back the parameter itself; sigma_ss does not occur
-        load = model.steady_stress
-        affine = affine and sigma not in load.free_symbols
-    else:
-        load = model.steady_load
+    affine = sigma not in slope.free_symbols and sigma not in load.free_symbols
     residual = array_function([*arguments, sigma], [model.steady_stress - sigma])
     if not affine:
         return SteadyEquation(False, given, residual)
@@ -151,7 +147,7 @@ def steady_equation(model: Model) -> SteadyEquation:
 def steady_stress(values: Values) -> Any:
     """σss (Pa) as an array over the varied parameters, NaN where steady sliding does not exist.
 
-    Where there are several solutions, the lowest.
+    Where there are several solutions, the one of ``values.branch``.
     """
     equation = steady_equation(values.model)
     if equation.parts is None:
@@ -177,7 +173,7 @@ def _by_search(values: Values) -> Any:
     for index in np.ndindex(result.shape):
         arguments = [a[index] for a in arrays]
         found = _search(lambda sigma, a=arguments: equation.residual(*a, sigma)[0])  # type: ignore[misc]
-        result[index] = found[0] if found else np.nan
+        result[index] = found[values.branch] if len(found) > values.branch else np.nan
     return result[()]
 
 
@@ -212,8 +208,8 @@ def explain_absence(rig: Slider, values: Values) -> NoSteadySliding:
         margin = 1 - slope
         hint = rig.contact.lock_up(mu)
         return NoSteadySliding(
-            "no steady sliding: lock-up. Friction would grow faster than the pull: "
-            f"1 − dσ/dτ μss = {margin:.4g}, must be > 0 (eq. 27)" + (f"; {hint}" if hint else ""),
+            "no steady sliding: lock-up. The pull raises friction by more than itself: "
+            f"1 − μss dσ/dτ = {margin:.4g}, must be > 0" + (f"; {hint}" if hint else ""),
             "lock-up",
             margin,
         )

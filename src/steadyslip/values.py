@@ -34,12 +34,15 @@ class Values:
     wrap : callable
         Turns a result array with leading axes `shape` into what the user passed in (ndarray or
         xarray.DataArray): ``wrap(array, name, unit, extra_dims)``.
+    branch : int
+        Which steady sliding is meant where there are several, by rising normal stress.
     """
 
     model: Model
     arguments: tuple[Any, ...]
     shape: tuple[int, ...]
     wrap: Callable[..., Any]
+    branch: int = 0
 
     @property
     def size(self) -> int:
@@ -50,19 +53,17 @@ class Values:
         if self.size <= most:
             yield self
             return
-        flat = [
-            np.broadcast_to(a, self.shape).reshape(-1) if np.ndim(a) else a for a in self.arguments
-        ]
+        flat = [np.broadcast_to(a, self.shape).reshape(-1) if np.ndim(a) else a for a in self.arguments]
         for start in range(0, self.size, most):
             part = tuple(a[start : start + most] if np.ndim(a) else a for a in flat)
-            yield Values(self.model, part, (min(most, self.size - start),), self.wrap)
+            yield Values(self.model, part, (min(most, self.size - start),), self.wrap, self.branch)
 
     def named(self) -> dict[str, Any]:
         """Values by dotted name."""
         return dict(zip(self.model.parameters, self.arguments, strict=True))
 
 
-def model_values(rig: Slider, vary: Vary | None = None, present: Iterable[str] = ()) -> Values:
+def model_values(rig: Slider, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0) -> Values:
     """The model of a rig and its parameters' values.
 
     Parameters
@@ -73,6 +74,8 @@ def model_values(rig: Slider, vary: Vary | None = None, present: Iterable[str] =
         arrays do, DataArrays by dimension name.
     present : iterable of str, optional
         Parameters that are zero but kept in the equations, as for `build_model`.
+    branch : int, optional
+        Which steady sliding is meant where there are several, by rising normal stress.
 
     Raises
     ------
@@ -81,14 +84,12 @@ def model_values(rig: Slider, vary: Vary | None = None, present: Iterable[str] =
         are listed.
     """
     varied, wrap, shape = _varied(rig, vary or {})
-    structural = [
-        name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0
-    ]
+    structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
     model = build_model(rig, present=[*structural, *present])
     values = {name: address.value for name, address in rig.parameters().items()} | varied
     if "slider.stiffness" not in varied:
         values["slider.stiffness"] = _sliding_stiffness(rig, values)
-    return Values(model, tuple(values[name] for name in model.parameters), shape, wrap)
+    return Values(model, tuple(values[name] for name in model.parameters), shape, wrap, branch)
 
 
 def _sliding_stiffness(rig: Slider, values: Mapping[str, Any]) -> Any:

@@ -105,9 +105,7 @@ class ContactLaw(Record, family="contact law"):
 class PreloadedContact(ContactLaw):
     """Base of contacts that take either the preload σ0 or the steady normal stress σss."""
 
-    preload: float | None = parameter(
-        "Pa", positive, "normal stress σ0 without coupling to the motion", default=None
-    )
+    preload: float | None = parameter("Pa", positive, "normal stress σ0 without coupling to the motion", default=None)
     steady_normal_stress: float | None = parameter(
         "Pa", positive, "normal stress σss in steady sliding, instead of preload", default=None
     )

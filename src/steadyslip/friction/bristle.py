@@ -25,9 +25,7 @@ class CoulombStribeck(FrictionLaw, name="coulomb-stribeck"):
         """g(v), the falling part of the friction coefficient."""
         return self.mu_coulomb + (self.mu_static - self.mu_coulomb) * sp.exp(-((v / self.v_stribeck) ** 2))
 
-    def strength(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         return sigma * (self._curve(v) * sp.sign(v) + self.viscous * v)
 
 
@@ -38,9 +36,7 @@ class LuGre(CoulombStribeck, name="lugre"):
     """
 
     bristle_stiffness: float = parameter("1/m", positive, "bristle stiffness σ0, per unit normal stress")
-    bristle_damping: float = parameter(
-        "s/m", nonnegative, "bristle damping σ1, per unit normal stress", default=0.0
-    )
+    bristle_damping: float = parameter("s/m", nonnegative, "bristle damping σ1, per unit normal stress", default=0.0)
 
     def memory(self) -> tuple[str, ...]:
         return ("z",)
@@ -48,9 +44,7 @@ class LuGre(CoulombStribeck, name="lugre"):
     def memory_units(self) -> tuple[str, ...]:
         return ("m",)
 
-    def strength(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         (rate,) = self.rates(v, sigma, memory, tau)
         return sigma * (self.bristle_stiffness * memory[0] + self.bristle_damping * rate + self.viscous * v)
 

@@ -30,9 +30,7 @@ class FrictionLaw(Record, family="friction law"):
         """SI units of the memory variables; dimensionless unless overridden."""
         return tuple("1" for _ in self.memory())
 
-    def strength(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         """Friction stress τ (Pa).
 
         `tau` is the stress itself, for the rare law (Nagata) whose state depends on it; others ignore it.
@@ -58,6 +56,5 @@ class FrictionLaw(Record, family="friction law"):
     ) -> dict[str, tuple[Expression, str]]:
         """What the field calls the states, from the memory variables: name to (expression, SI unit)."""
         return {
-            name: (value, unit)
-            for name, value, unit in zip(self.memory(), memory, self.memory_units(), strict=True)
+            name: (value, unit) for name, value, unit in zip(self.memory(), memory, self.memory_units(), strict=True)
         }

@@ -39,5 +39,3 @@ class PrakashClifton(NormalMemory, name="prakash-clifton"):
     slip_distance: float | None = parameter(
         "m", positive, "slip distance d_σ of the lag; d_c unless given", default=None
     )
-
-

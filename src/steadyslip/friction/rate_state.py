@@ -61,9 +61,7 @@ class RateState(FrictionLaw, name="rate-state"):
         if self.states:
             yield Problem("evolution", "nagata is defined for one state; use slip, aging or prz")
         if isinstance(self.normal_memory, PrakashClifton):
-            yield Problem(
-                "normal_memory", "prakash-clifton is not defined with nagata; use none or linker-dieterich"
-            )
+            yield Problem("normal_memory", "prakash-clifton is not defined with nagata; use none or linker-dieterich")
         if self.b == 0:
             yield Problem("b", "got 0; nagata divides by b, use aging instead")
 
@@ -96,7 +94,8 @@ class RateState(FrictionLaw, name="rate-state"):
         if self.states[0].alpha is not None:
             return tuple((s.b, s.d_c, s.alpha) for s in self.states)
         total = sum(s.b for s in self.states)
-        return tuple((s.b, s.d_c, alpha * s.b / total if alpha != 0 else 0) for s in self.states)
+        shared: Expression = 0 if alpha is None else alpha
+        return tuple((s.b, s.d_c, shared * s.b / total if shared != 0 else 0) for s in self.states)
 
     def _is_scaled(self) -> bool:
         """Whether memory variables are Ψ = bΘ + ... (also right for b = 0) rather than Θ itself."""
@@ -114,9 +113,7 @@ class RateState(FrictionLaw, name="rate-state"):
             offsets.append(offset)
         return tuple(offsets)
 
-    def _b_theta(
-        self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> tuple[Expression, ...]:
+    def _b_theta(self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> tuple[Expression, ...]:
         """b_iΘ_i of every state."""
         states = self._all_states()
         if not self._is_scaled():
@@ -141,9 +138,7 @@ class RateState(FrictionLaw, name="rate-state"):
     def memory_units(self) -> tuple[str, ...]:
         return tuple("Pa" if name == "sigma_e" else "1" for name in self.memory())
 
-    def strength(
-        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
-    ) -> Expression:
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         coefficient = self._coefficient(v, sum(self._b_theta(sigma, memory, tau)))
         if isinstance(self.normal_memory, PrakashClifton):
             g = self.normal_memory.direct_share

@@ -80,6 +80,8 @@ class Margin:
         The rig's own.
     edge : Boundary or None
         The nearest; None if stability does not change in the range searched.
+    edges : tuple of Boundary
+        All in the range searched.
     absolute : float
         Signed distance edge − value; NaN without edge.
     relative : float
@@ -92,12 +94,13 @@ class Margin:
     unit: str
     value: float
     edge: Boundary | None
+    edges: tuple[Boundary, ...]
     absolute: float
     relative: float
     searched: tuple[float, float]
 
 
-def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None) -> tuple[Boundary, ...]:
+def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, branch: int = 0) -> tuple[Boundary, ...]:
     """Every value of a parameter at which stability of steady sliding changes.
 
     Parameters
@@ -108,6 +111,8 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None) -> tu
     between : (low, high), optional
         Range to search, SI units or text such as ``"10 deg"``. By default the whole domain of angles and
         shares, six decades to each side of other values, and both signs where they are allowed.
+    branch : int
+        Which steady sliding, by rising normal stress, where a rig has several.
 
     Returns
     -------
@@ -122,10 +127,10 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None) -> tu
     full = rig.resolve(name)
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, between)
-    return _Search(rig, full, present_zeros(rig)).boundaries(limits)
+    return _Search(rig, full, present_zeros(rig), branch).boundaries(limits)
 
 
-def margins(rig: Slider) -> tuple[Margin, ...]:
+def margins(rig: Slider, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first."""
     present = present_zeros(rig)
     found = []
@@ -134,14 +139,16 @@ def margins(rig: Slider) -> tuple[Margin, ...]:
             continue
         if address.value == 0 and address.role.structural and name not in present:
             continue
-        search = _Search(rig, name, present)
+        search = _Search(rig, name, present, branch)
         edges = search.boundaries(None)
         value = float(address.value)
         edge = min(edges, key=lambda e, v=value: abs(e.value - v), default=None)  # type: ignore[misc]
         gap = edge.value - value if edge else float("nan")
         relative = gap / abs(value) if value else float("nan")
         grid = search.grid(None)
-        found.append(Margin(name, address.role.unit, value, edge, gap, relative, (grid[0], grid[-1])))
+        found.append(
+            Margin(name, address.role.unit, value, edge, edges, gap, relative, (float(grid[0]), float(grid[-1])))
+        )
     return tuple(sorted(found, key=_urgency))
 
 
@@ -161,9 +168,7 @@ def present_zeros(rig: Slider) -> tuple[str, ...]:
     """Structural parameters that are zero and worth keeping in the equations (all but an integral gain,
     whose presence adds a state)."""
     return tuple(
-        name
-        for name, a in rig.parameters().items()
-        if a.role.structural and a.value == 0 and name != "drive.ki"
+        name for name, a in rig.parameters().items() if a.role.structural and a.value == 0 and name != "drive.ki"
     )
 
 
@@ -186,13 +191,13 @@ def _checked_range(name: str, role: Parameter, between: Sequence[Any]) -> tuple[
 class _Search:
     """Scanning one parameter of one rig."""
 
-    def __init__(self, rig: Slider, name: str, present: Iterable[str]) -> None:
-        self.rig, self.name, self.present = rig, name, tuple(present)
+    def __init__(self, rig: Slider, name: str, present: Iterable[str], branch: int) -> None:
+        self.rig, self.name, self.present, self.branch = rig, name, tuple(present), branch
         address = rig.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
 
     def values(self, x: Any) -> Values:
-        return model_values(self.rig, {self.name: x}, self.present)
+        return model_values(self.rig, {self.name: x}, self.present, self.branch)
 
     # -- the range
 
@@ -227,7 +232,7 @@ class _Search:
 
     def natural_size(self) -> float:
         """A size for a parameter that is zero, from σss, v0 and the slip distance v0/r."""
-        values = model_values(self.rig, None, self.present)
+        values = model_values(self.rig, None, self.present, self.branch)
         sigma, v0 = float(steady_stress(values)), values.named()["drive.velocity"]
         length = v0 / (_decay_rate(values, sigma) or 1.0)
         _, d = unit(self.role.unit)
@@ -323,7 +328,7 @@ class _Search:
 
     def _of_stiffness(self, low: float, high: float) -> tuple[Boundary, ...]:
         """The exact edges of the stable set."""
-        edges = general_set(model_values(self.rig, None, self.present))
+        edges = general_set(model_values(self.rig, None, self.present, self.branch))
         keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
         return tuple(
             self._stiffness_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep

@@ -51,9 +51,7 @@ def squared_frequency(
     return a0 / a2
 
 
-def stable_interval(
-    numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2: Any, a3: Any
-) -> tuple[Any, Any]:
+def stable_interval(numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2: Any, a3: Any) -> tuple[Any, Any]:
     """The one interval of k > 0 in which all Hurwitz conditions hold.
 
     Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. Without

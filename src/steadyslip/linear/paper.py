@@ -69,9 +69,7 @@ def critical_stiffness(
     *below* this stiffness where D < 0. It is a boundary only together with the other Hurwitz conditions;
     see `steadyslip.stable_stiffness` for the whole set. Needs f1 != 0 for λ1 to be finite.
     """
-    numerator, denominator = cubic.hopf_line(
-        f=f, S=-lam * f, r=r, f1=f1, mu=lam1 * f1, B0=B0, B1=B1, B2=B2, B3=B3, m=m
-    )
+    numerator, denominator = cubic.hopf_line(f=f, S=-lam * f, r=r, f1=f1, mu=lam1 * f1, B0=B0, B1=B1, B2=B2, B3=B3, m=m)
     return numerator / denominator
 
 
@@ -118,9 +116,7 @@ def lock_up_angle(mu_ss: Any) -> Any:
     return -np.arctan2(1.0, mu_ss)
 
 
-def inclined_dimensionless_stiffness(
-    *, a: Any, b: Any, mu_ss: Any, alpha: Any, angle: Any, m_star: Any = 0.0
-) -> Any:
+def inclined_dimensionless_stiffness(*, a: Any, b: Any, mu_ss: Any, alpha: Any, angle: Any, m_star: Any = 0.0) -> Any:
     """Eq. 28: κ_cr = k_cr L/σss against dimensionless mass. Right as printed.
 
     Infinite at m*_cr2 (eq. 31), where a positive angle loses its last stabilising stiffness; beyond it the

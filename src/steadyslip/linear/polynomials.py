@@ -23,7 +23,7 @@ def degrees(c: Array) -> NDArray[np.int64]:
     """Degree of each polynomial, −1 for zero and for non-finite coefficients."""
     present = (c != 0) & np.all(np.isfinite(c), axis=-1, keepdims=True)
     top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
-    return np.where(np.any(present, axis=-1), top, -1)
+    return np.asarray(np.where(np.any(present, axis=-1), top, -1))
 
 
 def evaluate(c: Any, s: Any) -> Any:
@@ -124,7 +124,7 @@ def routh_column(c: Array) -> Array:
             following = np.zeros_like(upper)
             following[..., :-1] = upper[..., 1:] - ratio * lower[..., 1:]
         upper, lower = lower, following
-    return np.nan_to_num(np.stack(column, axis=-1) * scale, nan=-1.0)
+    return np.asarray(np.nan_to_num(np.stack(column, axis=-1) * scale, nan=-1.0))
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,7 @@ def _between(k: Array, p: Array, q: Array) -> Array:
 
 def _intervals(k: Array, stable: NDArray[np.bool_]) -> Array:
     """Join neighbouring stable cells into intervals, NaN padded."""
-    rows, cells = stable.shape
+    rows = len(stable)
     low = np.concatenate([np.zeros((rows, 1)), k], axis=-1)
     high = np.concatenate([k, np.full((rows, 1), np.inf)], axis=-1)
     real_cell = np.isfinite(low)

@@ -58,6 +58,7 @@ def has_closed_form(model: Model) -> bool:
 
 
 def memory_symbols(model: Model) -> list[sp.Symbol]:
+    """The memory variables of friction among the model's variables."""
     own = [model.symbols["x"], model.symbols["v"], model.symbols.get("integral")]
     return [item.symbol for item in model.variables if item.symbol not in own]
 

@@ -1,0 +1,96 @@
+# The public names: read by type checkers, and by __init__.py, which loads them on first use.
+
+from . import figures as figures, testing as testing, units as units
+from .analysis import (
+    Analysis as Analysis,
+    analyze as analyze,
+)
+from .config import (
+    json_schema as json_schema,
+    read_rig as read_rig,
+    rig_from_text as rig_from_text,
+    rig_to_text as rig_to_text,
+    write_rig as write_rig,
+)
+from .contact import (
+    Constant as Constant,
+    ContactLaw as ContactLaw,
+    DilatingLayer as DilatingLayer,
+    InclinedSpring as InclinedSpring,
+    LeadScrew as LeadScrew,
+    Lift as Lift,
+    Linear as Linear,
+    Motion as Motion,
+    PreloadedContact as PreloadedContact,
+    Prescribed as Prescribed,
+    SelfEnergising as SelfEnergising,
+    SliderCrank as SliderCrank,
+    SlopedGuide as SlopedGuide,
+    Triaxial as Triaxial,
+)
+from .drive import (
+    PD as PD,
+    PID as PID,
+    Drive as Drive,
+    Steady as Steady,
+)
+from .errors import (
+    NoSteadySliding as NoSteadySliding,
+    NotAvailable as NotAvailable,
+    ParameterError as ParameterError,
+    QuantityError as QuantityError,
+    RigFileError as RigFileError,
+    SteadyslipError as SteadyslipError,
+    UnknownNameError as UnknownNameError,
+)
+from .friction import (
+    PRZ as PRZ,
+    Aging as Aging,
+    CoulombStribeck as CoulombStribeck,
+    Evolution as Evolution,
+    FrictionLaw as FrictionLaw,
+    LinkerDieterich as LinkerDieterich,
+    LuGre as LuGre,
+    Nagata as Nagata,
+    NoMemory as NoMemory,
+    NormalMemory as NormalMemory,
+    PrakashClifton as PrakashClifton,
+    RateState as RateState,
+    Slip as Slip,
+    State as State,
+)
+from .linear import (
+    Boundary as Boundary,
+    Margin as Margin,
+    boundary as boundary,
+    critical_stiffness as critical_stiffness,
+    eigenvalues as eigenvalues,
+    formula as formula,
+    growth_rate as growth_rate,
+    margins as margins,
+    paper as paper,
+    stable_stiffness as stable_stiffness,
+    state_space as state_space,
+    to_control as to_control,
+)
+from .model import (
+    Model as Model,
+    build_model as build_model,
+)
+from .records import (
+    option as option,
+    parameter as parameter,
+    part as part,
+    parts as parts,
+)
+from .slider import (
+    Slider as Slider,
+)
+from .steady import (
+    SteadySliding as SteadySliding,
+    steady_state as steady_state,
+    steady_states as steady_states,
+)
+
+__version__: str
+__all__: list[str]

@@ -1,0 +1,5 @@
+"""``python -m steadyslip``: the command line."""
+
+from steadyslip.cli import main
+
+main()

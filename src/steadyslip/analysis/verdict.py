@@ -1,0 +1,204 @@
+"""An Analysis in words that a person can act on, or read aloud to a colleague."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING
+
+from steadyslip.quantities import shown
+from steadyslip.records import resolve
+
+if TYPE_CHECKING:
+    from steadyslip.analysis.analyze import Analysis
+    from steadyslip.linear.boundary import Margin
+
+_BEYOND = {
+    "oscillatory": "stick-slip oscillation sets in",
+    "divergence": "sliding runs away without oscillating",
+    "ill-posed": "the equations become ill-posed",
+    "lock-up": "it locks up",
+    "lift-off": "it lifts off",
+    "no solution": "steady sliding ceases to exist",
+}
+
+
+def verdict(analysis: Analysis) -> str:
+    """The whole verdict as text, at most some 100 columns wide."""
+    lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
+    lines += _facts(analysis)
+    lines += _margin_table(analysis)
+    if analysis.stable:
+        lines += ["", "Stable means: small disturbances die out. A large enough kick may still start stick-slip."]
+    for text in analysis.warnings:
+        lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
+    return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
+
+
+def headline(analysis: Analysis) -> str:
+    """The first line: stable, unstable, or no steady sliding."""
+    speed = shown(analysis.rig.drive.velocity, "m/s")
+    if analysis.stable is None:
+        return f"NO STEADY SLIDING at {speed}"
+    return f"{'STABLE' if analysis.stable else 'UNSTABLE'}: steady sliding at {speed}"
+
+
+def reason(analysis: Analysis) -> str:
+    """Why, in one sentence."""
+    own = analysis.rig.parameters()["slider.stiffness"].value
+    critical, side = analysis.critical_stiffness, analysis.critical_side
+    if analysis.growth_rate == math.inf:
+        return (
+            "the equations are ill-posed: normal stress takes away more than the mass (or the direct effect of "
+            "friction) provides, so any small lag grows at once"
+        )
+    if critical is None:
+        if analysis.stable_stiffness:
+            return "sliding is stable at every stiffness: nothing in friction or contact feeds a disturbance"
+        if analysis.rig.friction.memory():
+            return "no stiffness makes sliding stable" + _why_none(analysis)
+        return "friction falls with velocity and has no memory: no stiffness makes sliding stable"
+    if own is None:
+        own = _own_stiffness(analysis)
+    ratio = own / critical
+    position = "above" if own > critical else "below"
+    text = (
+        f"the stiffness {_stiffness(analysis, own)} is {ratio:.3g} times the critical stiffness "
+        f"{_stiffness(analysis, critical)}, {side} which sliding is stable"
+    )
+    if analysis.stable is (position == side):
+        return text
+    return text + " only in the intervals given below"
+
+
+def _own_stiffness(analysis: Analysis) -> float:
+    from steadyslip.values import model_values
+
+    return float(model_values(analysis.rig).named()["slider.stiffness"])
+
+
+def _why_none(analysis: Analysis) -> str:
+    """For rigs with one memory variable, which Hurwitz condition rules out every stiffness."""
+    if any(value <= 0 for value in analysis.characteristic_polynomial[:1]):
+        return ": a disturbance runs away without oscillating (static stability, a0 > 0, fails)"
+    if analysis.rig.mass > 0:
+        return ": with this mass the memory of normal stress drives the oscillation (eq. 31)"
+    return ""
+
+
+def _stiffness(analysis: Analysis, value: float) -> str:
+    area = analysis.rig.area
+    return shown(value, "Pa/m") if area is None else shown(value * area, "N/m")
+
+
+def _stress(analysis: Analysis, value: float) -> str:
+    area = analysis.rig.area
+    return shown(value, "Pa") if area is None else f"{shown(value * area, 'N')} ({shown(value, 'Pa')})"
+
+
+def _facts(analysis: Analysis) -> list[str]:
+    steady = analysis.steady
+    if steady is None:
+        return []
+    force = "force" if analysis.rig.area is not None else "stress"
+    rows = [
+        (
+            "steady sliding",
+            f"normal {force} {_stress(analysis, steady.normal_stress)}, "
+            f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}",
+        ),
+        ("a disturbance", _disturbance(analysis)),
+        ("stable for", _stable_set(analysis)),
+    ]
+    beta = analysis.critical_angular_frequency
+    if beta:
+        rows.append(("at the edge", f"oscillation with period {shown(2 * math.pi / beta, 's')}"))
+    if analysis.critical_axial_stiffness is not None:
+        rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
+    return [f"{name:<15} {text}" for name, text in rows]
+
+
+def _disturbance(analysis: Analysis) -> str:
+    if analysis.growth_rate == math.inf:
+        return "grows at once, faster the shorter it is"
+    if analysis.time_to_double is not None:
+        text = f"doubles in {shown(analysis.time_to_double, 's')}"
+    elif analysis.time_to_halve is not None:
+        text = f"halves in {shown(analysis.time_to_halve, 's')}"
+    else:
+        text = "neither grows nor dies"
+    leading = analysis.eigenvalues[0]
+    if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
+        text += f", oscillating with period {shown(analysis.period, 's')}"
+        return f"{text} (damping ratio {analysis.damping_ratio:.3g})"
+    return f"{text} without oscillating"
+
+
+def _stable_set(analysis: Analysis) -> str:
+    parts = []
+    for low, high in analysis.stable_stiffness:
+        if low == 0 and high == math.inf:
+            parts.append("every stiffness")
+        elif high == math.inf:
+            parts.append(f"stiffness above {_stiffness(analysis, low)}")
+        elif low == 0:
+            parts.append(f"stiffness below {_stiffness(analysis, high)}")
+        else:
+            parts.append(f"stiffness from {_stiffness(analysis, low)} to {_stiffness(analysis, high)}")
+    return ", or ".join(parts) or "no stiffness"
+
+
+def _margin_table(analysis: Analysis) -> list[str]:
+    """The nearest edge of each parameter, the others unchanged."""
+    with_edge = [margin for margin in analysis.margins if margin.edge is not None]
+    without = [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
+    if not analysis.margins:
+        return []
+    lines = ["", "Nearest edge in each parameter, the others unchanged, and what happens beyond it"]
+    rows = [_margin_row(analysis, margin) for margin in with_edge]
+    widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
+    lines += [
+        "  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows
+    ]
+    if without:
+        lines += textwrap.wrap(
+            f"no edge within range: {', '.join(without)}", 98, initial_indent="  ", subsequent_indent="    "
+        )
+    return lines
+
+
+def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str]:
+    edge = margin.edge
+    assert edge is not None
+    if margin.unit == "rad":
+        change = f"{math.degrees(margin.absolute):+.4g} deg"
+    elif margin.value:
+        change = (
+            f"{100 * margin.relative:+.4g} %" if abs(margin.relative) < 10 else f"x {edge.value / margin.value:.4g}"
+        )
+    else:
+        change = "from zero"
+    towards = "above" if margin.absolute > 0 else "below"
+    if edge.stable == towards:
+        words = "becomes stable"
+    elif analysis.stable is None:
+        words = "slides steadily, but unstable"
+    else:
+        words = _BEYOND.get(edge.kind, edge.kind)
+    return (
+        _short(analysis, margin.parameter),
+        shown(margin.value, margin.unit),
+        f"-> {shown(edge.value, margin.unit)}",
+        change,
+        words,
+    )
+
+
+def _short(analysis: Analysis, name: str) -> str:
+    """The dotted name without its middle: friction.alpha for friction.normal_memory.alpha."""
+    first, _, last = name.partition(".")[0], ".", name.rpartition(".")[2]
+    known = analysis.rig.parameters()
+    try:
+        return f"{first}.{last}" if resolve(last, known) == name else name
+    except LookupError:
+        return name

@@ -1,0 +1,105 @@
+"""The command line: thin, every command calls one public function."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Stability of frictional sliding: will it slide steadily, what would make it, how far is the edge.",
+)
+
+RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),
+]
+
+
+@app.callback(invoke_without_command=True)
+def _start(version: Annotated[bool, typer.Option("--version", help="print the version and stop")] = False) -> None:
+    if version:
+        from steadyslip import __version__
+
+        typer.echo(f"steadyslip {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def analyze(
+    rig: RigFile,
+    changes: Changes = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+    require_stable: Annotated[
+        bool, typer.Option("--require-stable", help="exit with status 1 unless sliding is stable")
+    ] = False,
+    formula: Annotated[bool, typer.Option("--formula", help="also print the critical stiffness as a formula")] = False,
+    branch: Annotated[int, typer.Option(help="which steady sliding, where there are several")] = 0,
+) -> None:
+    """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
+    from steadyslip.analysis import analyze as run
+    from steadyslip.config import read_rig
+
+    result = run(read_rig(rig, changes or ()), branch=branch)
+    if as_json:
+        data = result.to_dict()
+        if formula:
+            data["formula"] = str(result.formula().rhs)
+        import json
+
+        typer.echo(json.dumps(data, indent=2, allow_nan=False))
+    else:
+        head, _, rest = str(result).partition("\n")
+        colour = {True: typer.colors.GREEN, False: typer.colors.RED, None: typer.colors.YELLOW}[result.stable]
+        typer.secho(head, bold=True, fg=colour)
+        typer.echo(rest)
+        if formula:
+            equation = result.formula()
+            typer.echo(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
+    if require_stable and not result.stable:
+        raise typer.Exit(1)
+
+
+@app.command()
+def reproduce(
+    folder: Annotated[Path, typer.Argument(help="where to write; created if missing")] = Path("paper-figures"),
+) -> None:
+    """Draw the paper's Fig. 7 and put its numbers next to ours."""
+    from steadyslip.reproduce import paper_table
+    from steadyslip.reproduce import reproduce as run
+
+    written = run(folder)
+    typer.echo(paper_table())
+    for path in written:
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of rig files."""
+    import json
+
+    from steadyslip.config import json_schema
+
+    typer.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+
+
+def main() -> None:
+    """Entry point: bad input ends with one clear message and status 2, never a traceback."""
+    from steadyslip.errors import SteadyslipError
+
+    try:
+        app()
+    except SteadyslipError as error:
+        typer.secho(f"error: {error}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

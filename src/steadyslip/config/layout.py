@@ -1,0 +1,77 @@
+"""How records map to the tables and keys of a rig file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import Field, dataclass, fields
+from importlib.metadata import entry_points
+
+from steadyslip.drive import Drive
+from steadyslip.errors import ParameterError, Problem, unknown_name
+from steadyslip.quantities import Dimension, unit
+from steadyslip.records import Option, Parameter, Part, Record, role_of
+from steadyslip.slider import Slider
+
+ENTRY_POINTS = "steadyslip.laws"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table of the file: its name and the family of records that fills it (None: the slider itself)."""
+
+    name: str
+    family: type[Record] | None
+
+
+def sections() -> tuple[Section, ...]:
+    """The tables of a rig file, in order."""
+    found = [Section(item.name, role.family) for item in fields(Slider) if isinstance(role := role_of(item), Part)]
+    found.insert(2, Section(Slider.section.rstrip("."), None))
+    return tuple(found)
+
+
+def selector(family: type[Record]) -> tuple[str, str | None]:
+    """The key that names the law of a table, and the law meant when it is absent."""
+    return ("control", "steady") if family is Drive else ("law", None)
+
+
+def find_law(family: type[Record], name: object) -> type[Record]:
+    """The law of a family with a registered name, or one that an installed package offers under it.
+
+    Raises
+    ------
+    ParameterError
+        If there is none; lists the nearest name and all others.
+    """
+    if isinstance(name, str):
+        if name in family.registry:
+            return family.registry[name]
+        for entry in entry_points(group=ENTRY_POINTS, name=name):
+            law = entry.load()
+            if isinstance(law, type) and issubclass(law, family):
+                return law
+    raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])
+
+
+def own_fields(law: type[Record]) -> Iterator[tuple[Field[object], Parameter | Option | Part]]:
+    """The fields of a record that are keys of its own table."""
+    for item in fields(law):  # type: ignore[arg-type]
+        role = role_of(item)
+        if law is Slider and isinstance(role, Part):
+            continue
+        yield item, role
+
+
+def is_per_area(unit_name: str) -> bool:
+    """Whether a quantity is per unit area inside and a total (N, N/m, kg, ...) in a file with an area."""
+    return unit(unit_name)[1].mass == 1
+
+
+def total_unit(unit_name: str) -> str:
+    """Name of the unit of the total that belongs to a per-area unit."""
+    _, dimension = unit(unit_name)
+    wanted = dimension.times(Dimension(length=2))
+    for candidate in ("N", "N/m", "N s/m", "N/m/s", "kg"):
+        if unit(candidate)[1] == wanted:
+            return candidate
+    return f"{unit_name} m^2"

@@ -1,0 +1,40 @@
+"""On which line of a TOML text each key stands, for error messages."""
+
+from __future__ import annotations
+
+import re
+
+_TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
+
+
+def key_lines(text: str) -> dict[str, int]:
+    """Line (from 1) of every table header and key, by dotted name; members of lists count from 1."""
+    lines: dict[str, int] = {}
+    counts: dict[str, int] = {}
+    prefix = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if table := _TABLE.match(line):
+            prefix = _plain(table[2])
+            if table[1] == "[[":
+                counts[prefix] = counts.get(prefix, 0) + 1
+                lines.setdefault(prefix, number)
+                prefix = f"{prefix}.{counts[prefix]}"
+            lines.setdefault(prefix, number)
+        elif key := _KEY.match(line):
+            name = _plain(key[1])
+            lines.setdefault(f"{prefix}.{name}" if prefix else name, number)
+    return lines
+
+
+def line_of(name: str, lines: dict[str, int]) -> int | None:
+    """The line of a key, or of the nearest table or inline table around it."""
+    while name:
+        if name in lines:
+            return lines[name]
+        name = name.rpartition(".")[0]
+    return None
+
+
+def _plain(dotted: str) -> str:
+    return ".".join(part.strip().strip("\"'") for part in dotted.split("."))

@@ -1,0 +1,88 @@
+"""JSON schema of the rig file, from the records' own declarations, for editors and other programs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from steadyslip.config.layout import own_fields, sections, selector
+from steadyslip.quantities import example
+from steadyslip.records import Option, Parameter, Part, Record, is_required
+from steadyslip.slider import Slider
+
+Schema = dict[str, Any]
+
+
+def json_schema() -> Schema:
+    """The schema (draft 2020-12) of a rig file as a dict; its JSON is what ``steadyslip schema`` prints."""
+    properties: Schema = {}
+    required = []
+    for section in sections():
+        if section.family is None:
+            properties[section.name] = _table(Slider, {}, "the block, its spring and dampers")
+        else:
+            properties[section.name] = _family(section.family)
+            required.append(section.name)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "steadyslip rig",
+        "description": "Numbers are SI, per unit contact area (totals if slider.area is given); text carries a unit.",
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+def _family(family: type[Record]) -> Schema:
+    """One alternative for each registered law."""
+    key, default = selector(family)
+    alternatives = []
+    for name, law in family.registry.items():
+        schema = _table(law, {key: {"const": name}}, _summary(law))
+        if name != default:
+            schema["required"] = [key, *schema.get("required", [])]
+        alternatives.append(schema)
+    return {"description": family.family, "oneOf": alternatives}
+
+
+def _table(law: type[Record], properties: Schema, description: str) -> Schema:
+    properties = dict(properties)
+    required: list[str] = []
+    schema: Schema = {"type": "object", "description": description, "properties": properties}
+    for item, role in own_fields(law):
+        if isinstance(role, Part) and role.inline:
+            properties[item.name] = {"enum": list(role.family.registry), "description": role.doc}
+            for choice in role.family.registry.values():
+                for inner, inner_role in own_fields(choice):
+                    properties[inner.name] = _value(inner_role)
+            continue
+        properties[item.name] = _value(role)
+        if is_required(item):
+            required.append(item.name)
+    if required:
+        schema["required"] = required
+    schema["additionalProperties"] = False
+    return schema
+
+
+def _value(role: Parameter | Option | Part) -> Schema:
+    if isinstance(role, Option):
+        return {"enum": list(role.choices), "description": role.doc}
+    if isinstance(role, Part):
+        if role.many:
+            return {"type": "array", "items": _table(role.family, {}, _summary(role.family)), "description": role.doc}
+        return {"description": role.doc, "anyOf": [{"enum": list(role.family.registry)}, _family(role.family)]}
+    number: Schema = {"type": "number"}
+    domain = role.domain
+    if math.isfinite(domain.low):
+        number["minimum" if domain.low_allowed else "exclusiveMinimum"] = domain.low
+    if math.isfinite(domain.high):
+        number["maximum" if domain.high_allowed else "exclusiveMaximum"] = domain.high
+    unit = "" if role.unit == "1" else f", {role.unit}"
+    text = {"type": "string", "description": f"text such as {example(role.unit)}"}
+    return {"description": role.doc + unit, "anyOf": [number, text]}
+
+
+def _summary(law: type[Record]) -> str:
+    return (law.__doc__ or law.__name__).strip().splitlines()[0]

@@ -1,0 +1,81 @@
+"""A Slider as the text of a rig file."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from steadyslip.config.layout import is_per_area, own_fields, sections, selector, total_unit
+from steadyslip.errors import ParameterError, Problem
+from steadyslip.records import Option, Parameter, Part, Record
+from steadyslip.slider import Slider
+
+
+def write_rig(rig: Slider, path: str | PathLike[str]) -> None:
+    """Write a rig file; see `rig_to_text`.
+
+    Raises
+    ------
+    ParameterError
+        If the rig has a law without registered name.
+    OSError
+        If the file cannot be written.
+    """
+    Path(path).write_text(rig_to_text(rig), encoding="utf-8")
+
+
+def rig_to_text(rig: Slider) -> str:
+    """The rig as TOML, SI numbers with the unit as a comment; with an area, totals (N, N/m, kg).
+
+    Raises
+    ------
+    ParameterError
+        If the rig has a law without registered name, which no file can refer to.
+    """
+    blocks = []
+    for section in sections():
+        record = rig if section.family is None else getattr(rig, section.name)
+        first: list[str] = []
+        if section.family is not None:
+            key, default = selector(section.family)
+            word = _law_name(record, section.name)
+            first = [] if word == default else [f'{key} = "{word}"']
+        blocks.append(_table(f"[{section.name}]", record, first, section.name, rig.area))
+    return "\n".join(blocks)
+
+
+def _law_name(record: Record, where: str) -> str:
+    if not record.name:
+        kind = type(record).__name__
+        raise ParameterError([Problem(where, f'{kind} has no name; declare it as class {kind}(..., name="...")')])
+    return record.name
+
+
+def _table(header: str, record: Record, first: list[str], path: str, area: float | None) -> str:
+    lines = [header, *first]
+    below: list[str] = []
+    for item, role in own_fields(type(record)):
+        value = getattr(record, item.name)
+        if value is None or value == item.default:
+            continue
+        if not isinstance(role, Part):
+            lines.append(f"{item.name} = {_scalar(role, value, area)}")
+        elif role.many:
+            below += [_table(f"[[{path}.{item.name}]]", member, [], path, area) for member in value]
+        elif role.inline:
+            lines.append(f'{item.name} = "{_law_name(value, path)}"')
+            lines += _table("", value, [], path, area).splitlines()[1:]
+        else:
+            name = f"{path}.{item.name}"
+            below.append(_table(f"[{name}]", value, [f'law = "{_law_name(value, name)}"'], name, area))
+    return "\n".join(["\n".join(lines) + "\n", *below])
+
+
+def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
+    if isinstance(role, Option):
+        return str(value).lower() if isinstance(value, bool) else f'"{value}"'
+    unit = role.unit
+    if area is not None and is_per_area(unit):
+        value, unit = value * area, total_unit(unit)
+    return repr(float(value)) + (f"  # {unit}" if unit != "1" else "")

@@ -1,0 +1,12 @@
+"""Figures: each takes a rig and ``ax=None``, returns the Axes, labels with units and never shows.
+
+The only part of the package that imports matplotlib.
+"""
+
+from __future__ import annotations
+
+from steadyslip.figures.chart import stability_chart
+from steadyslip.figures.critical import critical_stiffness_against_mass
+from steadyslip.figures.locus import root_locus
+
+__all__ = ["critical_stiffness_against_mass", "root_locus", "stability_chart"]

@@ -1,0 +1,111 @@
+"""One axis of a chart: which parameter, over which range, linear or logarithmic, in which unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.figures.style import display_unit, labelled
+from steadyslip.linear import boundary
+from steadyslip.records import Parameter
+from steadyslip.slider import Slider
+from steadyslip.values import checked_array
+
+_AROUND = 20.0  # a positive parameter is shown from its value (or edge) divided by this, to it times this
+_REACH = 1e3  # an edge further away than this factor is not worth the squeeze
+_MARGIN = 1 / 18  # of its domain left out at the excluded ends of an angle: 10 deg of 180
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter's range on a chart; all values SI except what is said to be `shown`.
+
+    Attributes
+    ----------
+    name : str
+        Full dotted name.
+    low, high : float
+    log : bool
+    factor : float
+        Size of the unit shown, in SI units.
+    label : str
+        Name and unit.
+    """
+
+    name: str
+    low: float
+    high: float
+    log: bool
+    factor: float
+    label: str
+
+    def at(self, share: Any) -> Any:
+        """Value at a share (0 to 1) of the axis, as drawn."""
+        share = np.asarray(share, float)
+        inner = self.low * (self.high / self.low) ** share if self.log else self.low + (self.high - self.low) * share
+        return np.clip(inner, self.low, self.high)
+
+    def shown(self, value: Any) -> Any:
+        """SI value to the number on the axis."""
+        return value / self.factor
+
+
+def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> Axis:
+    """The axis for a parameter of a rig, over the range given or one that suits the rig.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the name is unknown, the rig does not have the parameter, or the range is not allowed.
+    NotAvailable
+        If the rig offers no scale for the parameter: it is zero and has no edge.
+    """
+    full = rig.resolve(name)
+    address = rig.parameters()[full]
+    value = 0.0 if full == "slider.stiffness" and address.value is None else address.value
+    if value is None:
+        raise ParameterError([Problem(full, "cannot be drawn: the rig does not have it; give it a value first")])
+    low, high = _default_range(rig, full, address.role, value) if limits is None else _given(full, address.role, limits)
+    log = low > 0 and high / low > 100
+    typical = value if low <= value <= high and value else math.sqrt(low * high) if log else max(abs(low), abs(high))
+    factor, unit_name = display_unit(address.role.unit, typical)
+    return Axis(full, low, high, log, factor, labelled(full, unit_name))
+
+
+def _given(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[float, float]:
+    if isinstance(limits, str) or len(limits) != 2:
+        raise ParameterError([Problem(name, f"range {limits!r}; allowed: two values, low and high")])
+    low, high = (float(checked_array(name, role, end)) for end in limits)
+    if not low < high:
+        raise ParameterError([Problem(name, f"range {limits!r}; allowed: low < high")])
+    return low, high
+
+
+def _default_range(rig: Slider, name: str, role: Parameter, value: float) -> tuple[float, float]:
+    """The domain of an angle or share; else around the rig's own value, with its nearest edge in view."""
+    domain = role.domain
+    if np.isfinite(domain.high):
+        margin = _MARGIN * (domain.high - domain.low)
+        return (
+            domain.low if domain.low_allowed else domain.low + margin,
+            domain.high if domain.high_allowed else domain.high - margin,
+        )
+    known = rig if rig.parameters()[name].value is not None else rig.with_values({name: value})
+    edges = [edge.value for edge in boundary(known, name)]
+    nearest = min(edges, key=lambda edge: abs(edge - value), default=value)
+    if value and not 1 / _REACH < abs(nearest / value) < _REACH:
+        nearest = value
+    if nearest == value == 0:
+        raise NotAvailable(f"{name} is zero and has no edge of stability, which leaves no scale; give its range")
+    if domain.low < 0:
+        ends = (value, nearest, 0.0)
+        margin = 0.5 * (max(ends) - min(ends))
+        return min(ends) - margin, max(ends) + margin
+    if value == 0 or nearest == 0:
+        return 0.0, 3 * max(value, nearest)
+    return min(value, nearest) / _AROUND, max(value, nearest) * _AROUND

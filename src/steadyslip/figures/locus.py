@@ -1,0 +1,130 @@
+"""How the eigenvalues move in the complex plane as the stiffness changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+
+from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.figures.style import BLACK, VERMILION, axes_or_new, display_unit, labelled
+from steadyslip.linear import critical_stiffness, eigenvalues, stable_stiffness
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_state
+from steadyslip.values import checked_array, model_values
+
+_HALF_SPAN = 1e2  # two decades to each side
+_VIEW = 3.0  # half the width of the view in sizes of the eigenvalues that decide stability
+
+
+def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Axes:
+    """Eigenvalues of small perturbations as the stiffness along the sliding direction varies.
+
+    Parameters
+    ----------
+    rig : Slider
+    ax : matplotlib.axes.Axes, optional
+    stiffness : array_like, optional
+        Stiffnesses k > 0 (Pa/m); by default four decades around the critical one, or the rig's own.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Real and imaginary parts in 1/s and rad/s; colour is k. Diamonds: edges of the stable set; circles:
+        the rig's own eigenvalues, those outside the view in words. The view is set by the eigenvalues that
+        decide stability; fast ones may lie outside.
+
+    Raises
+    ------
+    NoSteadySliding
+        If the rig has no steady sliding to perturb.
+    NotAvailable
+        If there is neither a critical nor an own stiffness to start from; pass `stiffness`.
+    """
+    steady_state(rig)
+    own = float(model_values(rig).named()["slider.stiffness"])
+    rig = replace(rig, stiffness=own, axial_stiffness=None)
+    k = _stiffnesses(rig, own, stiffness)
+    roots = eigenvalues(rig, {"slider.stiffness": k})
+    mine = eigenvalues(rig)
+    mine = mine[np.isfinite(mine)]
+    edges, crossings = _crossings(rig, k)
+
+    ax = axes_or_new(ax)
+    ax.axvline(0.0, color=BLACK, linewidth=1, zorder=1, label="_imaginary axis")
+    ax.axhline(0.0, color=BLACK, linewidth=0.5, alpha=0.4, zorder=1, label="_real axis")
+    factor, unit_name = display_unit("Pa/m", edges[0] if edges else own or float(np.median(k)))
+    colour = np.broadcast_to(k[:, None] / factor, roots.shape)
+    present = np.isfinite(roots)
+    points = ax.scatter(
+        roots.real[present], roots.imag[present], c=colour[present], s=10, cmap="cividis", norm=LogNorm(), label="_k"
+    )
+    figure = ax.get_figure()
+    if figure is not None:
+        figure.colorbar(points, ax=ax, label=labelled("slider.stiffness", unit_name))
+    for edge, at in zip(edges, crossings, strict=True):
+        style: dict[str, Any] = {
+            "marker": "D",
+            "color": "white",
+            "markeredgecolor": BLACK,
+            "markersize": 8,
+            "linestyle": "none",
+        }
+        name = f"critical stiffness {edge / factor:.4g} {unit_name}"
+        ax.plot(at.real, at.imag, label=name, zorder=3, **style)
+    _set_view(ax, mine, crossings)
+    ax.plot(
+        mine.real, mine.imag, "o", color=VERMILION, markeredgecolor=BLACK, markersize=7, zorder=4, label=_own(ax, mine)
+    )
+    ax.set_xlabel("growth rate Re s (1/s)")
+    ax.set_ylabel("angular frequency Im s (rad/s)")
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.01), frameon=False, borderaxespad=0.2)
+    return ax
+
+
+def _stiffnesses(rig: Slider, own: float, given: Any) -> Any:
+    if given is not None:
+        k = np.unique(checked_array("slider.stiffness", rig.parameters()["slider.stiffness"].role, given))
+        if k[0] <= 0:
+            raise ParameterError([Problem("stiffness", f"got {k[0]!r}; allowed: numbers > 0 in Pa/m")])
+        return k
+    centre = float(critical_stiffness(rig))
+    if not centre > 0:
+        centre = own
+    if not centre > 0:
+        raise NotAvailable("the rig has no critical stiffness and its own is zero; pass stiffness, an array in Pa/m")
+    return np.geomspace(centre / _HALF_SPAN, centre * _HALF_SPAN, 801)
+
+
+def _crossings(rig: Slider, k: Any) -> tuple[list[float], list[Any]]:
+    """Ends of the stable intervals in the range, and the eigenvalues on the imaginary axis there."""
+    ends = stable_stiffness(rig).ravel()
+    edges, crossings = [], []
+    for edge in np.unique(ends[(ends >= k[0]) & (ends <= k[-1])]):
+        found = eigenvalues(rig, {"slider.stiffness": edge})
+        found = found[np.isfinite(found)]
+        nearest = found[np.argmin(np.abs(found.real))]
+        if abs(nearest.real) > 1e-6 * np.abs(found).max():  # ill-posed: the root crosses at infinity
+            continue
+        edges.append(float(edge))
+        crossings.append(np.unique([nearest, nearest.conjugate()]))
+    return edges, crossings
+
+
+def _set_view(ax: Axes, mine: Any, crossings: list[Any]) -> None:
+    """Limits around the origin, the crossings and the rig's slowest-decaying eigenvalues."""
+    sizes = [abs(mine[0]), *(abs(at[0]) for at in crossings)]
+    size = _VIEW * (max(sizes) or float(np.abs(mine).max()) or 1.0)
+    ax.set_xlim(-size, size)
+    ax.set_ylim(-size, size)
+
+
+def _own(ax: Axes, mine: Any) -> str:
+    """Legend text of the rig's own eigenvalues, naming those out of view."""
+    outside = mine[(np.abs(mine.real) > ax.get_xlim()[1]) | (np.abs(mine.imag) > ax.get_ylim()[1])]
+    if not outside.size:
+        return "this rig"
+    return "this rig, and out of view s = " + ", ".join(f"{s.real:.3g}{s.imag:+.3g}i" for s in outside) + " 1/s"

@@ -1,0 +1,99 @@
+"""The numbers behind the paper's Fig. 7, by the general route (not the paper's closed form)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from steadyslip.contact import InclinedSpring
+from steadyslip.errors import NotAvailable
+from steadyslip.linear import critical_stiffness
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_stress
+from steadyslip.values import model_values
+
+_LARGEST = 1e6  # m* beyond any rig: a limit above is no limit
+_NEGLIGIBLE = 1e-12  # m* of a quasistatic rig
+_COMMON = 1e-6  # relative spread up to which curves cross in one point
+
+
+def dimensionless_critical_stiffness(rig: Slider, angles: Any, m_star: Any) -> Any:
+    """κ_cr = k_cr d_c/σss at spring angles (rad) and dimensionless masses m* = m v0²/(σss d_c), which broadcast.
+
+    NaN where no stiffness is an edge, and for angles past lock-up. σss depends on the angle where the rig
+    gives its preload, so the same m* is another mass at every angle.
+
+    Raises
+    ------
+    NotAvailable
+        If the contact is not an inclined spring, or friction has no slip distance.
+    """
+    angles, m_star = np.broadcast_arrays(np.asarray(angles, float), np.asarray(m_star, float))
+    d_c, v0 = slip_distance(rig), rig.drive.velocity
+    sigma = np.broadcast_to(steady_stress(model_values(rig, {"contact.angle": angles})), angles.shape)
+    mass = m_star * np.where(np.isnan(sigma), 1.0, sigma) * d_c / v0**2
+    return critical_stiffness(rig, {"contact.angle": angles, "slider.mass": mass}) * d_c / sigma
+
+
+def slip_distance(rig: Slider) -> float:
+    """d_c (m) of an inclined-spring rig, of the first state where friction has several."""
+    if not isinstance(rig.contact, InclinedSpring):
+        raise NotAvailable(
+            f"the contact is {rig.contact.name!r}, which has no spring angle to vary; allowed: inclined-spring"
+        )
+    known = rig.parameters()
+    for name in ("friction.d_c", "friction.states.1.d_c"):
+        address = known.get(name)
+        if address is not None and address.value is not None:
+            return address.value
+    raise NotAvailable(f"the friction law {rig.friction.name!r} has no slip distance d_c; allowed: rate-state")
+
+
+def mass_of_equal_stiffness(rig: Slider, angles: Iterable[float]) -> float:
+    """m*_cr1: the mass at which κ_cr is the same at all these angles (rad); NaN if there is none.
+
+    Angles past lock-up do not count. Found as a crossing of the general curves; the paper's eq. 30 is a check.
+    """
+    from scipy.optimize import brentq
+
+    angles = np.unique(np.asarray(list(angles), float))
+    open_angles = angles[np.isfinite(dimensionless_critical_stiffness(rig, angles, 0.0))]
+    if len(open_angles) < 2:
+        return math.nan
+
+    def spread(m_star: Any) -> Any:
+        ends = dimensionless_critical_stiffness(rig, open_angles[[0, -1]], np.asarray(m_star)[..., None])
+        return ends[..., 0] - ends[..., 1]
+
+    grid = np.geomspace(_NEGLIGIBLE, _LARGEST, 721)
+    value = spread(grid)
+    with np.errstate(invalid="ignore"):
+        at = np.flatnonzero(value[:-1] * value[1:] < 0)
+    for i in at:
+        crossing = float(brentq(lambda m: float(spread(m)), grid[i], grid[i + 1], xtol=1e-300, rtol=1e-15))
+        kappa = dimensionless_critical_stiffness(rig, open_angles, crossing)
+        if np.ptp(kappa) <= _COMMON * np.abs(kappa).max():
+            return crossing
+    return math.nan
+
+
+def mass_of_no_stiffness(rig: Slider, angle: float) -> float:
+    """m*_cr2: the mass from which on no stiffness is stable at this angle (rad); NaN if there is none.
+
+    The mass at which the critical stiffness ceases to exist, narrowed to rounding; eq. 31 is a check.
+    """
+
+    def exists(m_star: Any) -> Any:
+        return np.isfinite(dimensionless_critical_stiffness(rig, angle, m_star))
+
+    low, high = _NEGLIGIBLE, _LARGEST
+    if not exists(low) or exists(high):
+        return math.nan
+    for _ in range(16):  # each divides the bracket's logarithm by 32
+        samples = np.geomspace(low, high, 33)
+        first = int(np.argmin(exists(samples)))
+        low, high = samples[first - 1], samples[first]
+    return float(0.5 * (low + high))

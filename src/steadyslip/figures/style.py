@@ -1,0 +1,69 @@
+"""What the figures share: colours, units of axes, new Axes, files that are the same on every run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from steadyslip.quantities import shown, unit
+
+# Okabe & Ito (2008): told apart with every common kind of colour vision
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#F0E442",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+)
+CURVES = (BLUE, SKY, BLACK, ORANGE, VERMILION, GREEN, PURPLE)
+LINES = ("-", "--", "-.", ":")
+GREY = "#BBBBBB"
+
+
+def axes_or_new(ax: Axes | None) -> Axes:
+    """The Axes given, or those of a new pyplot figure."""
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot as plt
+
+    return plt.subplots(figsize=(6.4, 4.8), layout="constrained")[1]
+
+
+def unmanaged_axes(width: float = 6.4, height: float = 4.8) -> Axes:
+    """Axes of a figure that pyplot does not know and need not close; size in inches."""
+    axes: Axes = Figure(figsize=(width, height), layout="constrained").subplots()
+    return axes
+
+
+def write(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -> list[Path]:
+    """Save the figure of `ax` as ``stem.png``, ...; equal figures give equal SVG bytes."""
+    paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise ValueError("the Axes have been removed from their figure")
+    with rc_context({"svg.hashsalt": "steadyslip", "svg.fonttype": "path"}):
+        for path, kind in zip(paths, kinds, strict=True):
+            figure.savefig(path, dpi=200, facecolor="white", metadata={"Date": None} if kind == "svg" else None)
+    return paths
+
+
+def display_unit(si_unit: str, typical: float) -> tuple[float, str]:
+    """Size in SI units, and name, of the unit in which people read a value of this size.
+
+    >>> display_unit("Pa/m", 9e9), display_unit("rad", 0.1)[1]
+    ((1000000000.0, 'GPa/m'), 'deg')
+    """
+    name = shown(typical, si_unit).partition(" ")[2]
+    factor = unit(name)[0] if name else 1.0
+    return factor, name.replace("^2", "²").replace("^3", "³").replace("um", "µm")
+
+
+def labelled(name: str, unit_name: str) -> str:
+    """Axis label: name and unit, the unit left out where there is none."""
+    return f"{name} ({unit_name})" if unit_name else name

@@ -1,0 +1,119 @@
+"""The public contract suite: tells the author of a law whether the law is right.
+
+::
+
+    from steadyslip.testing import check_friction_law
+    check_friction_law(MyLaw(a=0.01, ...))
+
+Each promise is one function, listed in `FRICTION_CHECKS` and `CONTACT_CHECKS`, so that a test can be
+parametrised over them. A broken promise raises `ContractViolation`, an AssertionError that says what came,
+what must be, and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from steadyslip.contact import ContactLaw
+from steadyslip.friction import FrictionLaw
+from steadyslip.testing.contact import (
+    Surroundings,
+    check_axis,
+    check_contact_names,
+    check_contact_numbers,
+    check_contact_round_trip,
+    check_linearisation,
+    check_steady_stress,
+)
+from steadyslip.testing.friction import (
+    check_derivatives,
+    check_names,
+    check_numbers,
+    check_signs,
+    check_steady_state,
+    check_symbols,
+)
+from steadyslip.testing.jumps import check_jumps
+from steadyslip.testing.precise import ContractViolation
+from steadyslip.testing.routes import check_friction_round_trip, check_two_routes
+from steadyslip.testing.statement import Conditions
+
+FRICTION_CHECKS: tuple[Callable[[FrictionLaw, Conditions], None], ...] = (
+    check_names,
+    check_symbols,
+    check_steady_state,
+    check_signs,
+    check_derivatives,
+    check_numbers,
+    check_jumps,
+    check_two_routes,
+    check_friction_round_trip,
+)
+CONTACT_CHECKS: tuple[Callable[[ContactLaw, Surroundings], None], ...] = (
+    check_contact_names,
+    check_contact_numbers,
+    check_steady_stress,
+    check_linearisation,
+    check_axis,
+    check_contact_round_trip,
+)
+
+
+def check_friction_law(
+    law: FrictionLaw,
+    *,
+    velocity: float = 1e-6,
+    normal_stress: float = 5e6,
+    velocity_decades: float = 3.0,
+    stress_decades: float = 1.0,
+    instant_weakening: bool = False,
+) -> None:
+    """Check everything that a friction law promises.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+    velocity, normal_stress : float
+        Steady sliding in the middle of the range checked (m/s, Pa).
+    velocity_decades, stress_decades : float
+        How far to each side, in powers of ten; less for a law that holds in a narrower range.
+    instant_weakening : bool
+        Allow friction that falls at once when the velocity rises (LuGre, Coulomb–Stribeck).
+
+    Raises
+    ------
+    ContractViolation
+        Naming the first promise that is broken.
+    """
+    conditions = Conditions(velocity, normal_stress, velocity_decades, stress_decades, instant_weakening)
+    for check in FRICTION_CHECKS:
+        check(law, conditions)
+
+
+def check_contact_law(contact: ContactLaw, surroundings: Surroundings | None = None) -> None:
+    """Check everything that a contact law promises.
+
+    Parameters
+    ----------
+    contact : ContactLaw
+    surroundings : Surroundings, optional
+        Friction law, drive velocity, stiffness, mass and dampings of the rig around it.
+
+    Raises
+    ------
+    ContractViolation
+        Naming the first promise that is broken.
+    """
+    place = surroundings or Surroundings()
+    for check in CONTACT_CHECKS:
+        check(contact, place)
+
+
+__all__ = [
+    "CONTACT_CHECKS",
+    "FRICTION_CHECKS",
+    "Conditions",
+    "ContractViolation",
+    "Surroundings",
+    *sorted(name for name in globals() if name.startswith("check_")),
+]

@@ -1,0 +1,218 @@
+"""The contract of contact laws: one function for each promise that a law makes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import mpmath
+import sympy as sp
+
+from steadyslip.contact import ContactLaw, Motion
+from steadyslip.drive import Steady
+from steadyslip.errors import NoSteadySliding
+from steadyslip.friction import FrictionLaw, RateState
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_states
+from steadyslip.testing.precise import (
+    DIGITS,
+    TOLERANCE,
+    ContractViolation,
+    disagreement,
+    in_symbols,
+    precise_function,
+    require,
+    require_known_symbols,
+    shown,
+    stated,
+)
+from steadyslip.testing.routes import round_trip
+from steadyslip.values import model_values
+
+
+def _rock() -> FrictionLaw:
+    return RateState(a=0.0145, b=0.0160, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, states=(), regularised=False)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The rig in which a contact law is checked; every term is there so that none goes unnoticed."""
+
+    friction: FrictionLaw = field(default_factory=_rock)
+    velocity: float = 1e-6
+    stiffness: float = 9e9
+    mass: float = 1e9
+    damping: float = 2e9
+    radiation_damping: float = 3e9
+
+    def rig(self, contact: ContactLaw) -> Slider:
+        return Slider(
+            friction=self.friction,
+            contact=contact,
+            stiffness=self.stiffness,
+            mass=self.mass,
+            damping=self.damping,
+            radiation_damping=self.radiation_damping,
+            drive=Steady(self.velocity),
+        )
+
+    def steady_stress(self, contact: ContactLaw) -> float:
+        """σss of the rig; the highest where there are several is as good as any."""
+        try:
+            return steady_states(self.rig(contact))[-1].normal_stress
+        except NoSteadySliding as error:
+            raise ContractViolation(
+                f"{contact!r}: {error}; check it with numbers that have a steady state, or give `surroundings`"
+            ) from error
+
+    def steady_motion(self, sigma: float) -> Motion:
+        """Steady sliding at normal stress `sigma`, as numbers."""
+        tau = float(self.friction.steady_strength(self.velocity, sigma))
+        spring = tau + self.radiation_damping * self.velocity
+        v = self.velocity
+        return Motion(0.0, v, 0.0, spring, spring, tau, tau, self.stiffness, v)
+
+
+PRESS = Surroundings()
+
+
+class _Statement:
+    """A contact law's normal stress in symbols."""
+
+    def __init__(self, contact: ContactLaw) -> None:
+        self.contact = contact
+        self.copy, self.numbers = in_symbols(contact)
+        x, acceleration, spring, steady_spring, tau, steady_tau = sp.symbols("x a T T_ss tau tau_ss", real=True)
+        v, v0 = sp.symbols("v v_0", positive=True)
+        k = sp.Symbol("k", nonnegative=True)
+        self.motion = Motion(x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0)
+        self.inputs = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0)
+        self.stress = stated(contact, "normal_stress", self.copy.normal_stress, self.motion)
+        require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
+
+    def at(self, motion: Motion) -> Any:
+        """σ at a motion given as numbers, to fifty digits."""
+        function = precise_function(self.contact, [*self.inputs, *self.numbers], [self.stress])
+        return function(*_values(motion), *self.numbers.values())[0]
+
+
+def _values(motion: Motion) -> list[Any]:
+    return [getattr(motion, name) for name in Motion.__dataclass_fields__]
+
+
+def check_contact_names(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
+    """The law is registered, and gives either a load or a steady normal stress, which is positive."""
+    name = type(contact).name
+    require(
+        name and ContactLaw.registry.get(name) is type(contact),
+        contact,
+        f"is not registered; write class {type(contact).__name__}(ContactLaw, name='...') for rig files to name it",
+    )
+    load, steady = contact.load(), contact.steady_stress()
+    require(
+        (load is None) != (steady is None),
+        contact,
+        "load() and steady_stress(): give exactly one, None for the other",
+    )
+    given = float(load if load is not None else steady)  # type: ignore[arg-type]  # one of them is given
+    require(given > 0, contact, f"the load is {given!r} Pa, must be > 0 (compression is positive)")
+
+
+def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
+    """Called with plain floats, the normal stress is that of the symbols, away from steady sliding too."""
+    said = _Statement(contact)
+    sigma = surroundings.steady_stress(contact)
+    for factor in (1.0, 1.01, 0.99):
+        motion = _moved(surroundings, sigma, (factor - 1) * 1e-7, surroundings.velocity * factor, (factor - 1) * 1e-6)
+        by_hand, exact = float(contact.normal_stress(motion)), said.at(motion)
+        require(
+            abs(by_hand - exact) <= TOLERANCE * abs(exact),
+            contact,
+            f"normal_stress() called with floats is {by_hand!r} Pa, in symbols {shown(exact)} Pa; a law's method must "
+            "be one expression for numbers and symbols",
+        )
+
+
+def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
+    """Steady sliding is positive and consistent: what the law makes of it is the normal stress it started from."""
+    said = _Statement(contact)
+    sigma = surroundings.steady_stress(contact)
+    require(sigma > 0, contact, f"the steady normal stress is {sigma!r} Pa, must be > 0")
+    given = contact.steady_stress()
+    require(
+        given is None or abs(sigma - float(given)) <= TOLERANCE * sigma,
+        contact,
+        f"the steady normal stress is {sigma!r} Pa, but steady_stress() says {given!r} Pa",
+    )
+    found = said.at(surroundings.steady_motion(sigma))
+    require(
+        abs(found - sigma) <= TOLERANCE * sigma,
+        contact,
+        f"normal_stress() of steady sliding at {sigma!r} Pa is {shown(found)} Pa; they must agree",
+    )
+
+
+def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
+    """B0...B3 (eq. 12) agree with central differences of the normal stress, at two stiffnesses."""
+    from steadyslip.expressions import array_function
+    from steadyslip.linear.response import contact_coefficients
+
+    said = _Statement(contact)
+    for place in (surroundings, replace(surroundings, stiffness=2 * surroundings.stiffness)):
+        sigma = place.steady_stress(contact)
+        values = model_values(place.rig(contact))
+        function = array_function(
+            [*values.model.parameters.values(), values.model.sigma_ss], contact_coefficients(values.model)
+        )
+        b0, b1, b2, b3 = (float(b) for b in function(*values.arguments, sigma))
+        k_part = abs(place.stiffness * b2) + abs(b3)
+        expected = {
+            "slip": (place.stiffness * b2 + b3, k_part),
+            "velocity": (b1, abs(b1)),
+            "acceleration": (b0, abs(b0)),
+        }
+        for index, (what, (coefficient, terms)) in enumerate(expected.items()):
+
+            def along(x: Any, index: int = index, place: Surroundings = place, sigma: float = sigma) -> Any:
+                moved = [0, place.velocity, 0]
+                moved[index] = x
+                return said.at(_moved(place, sigma, *moved))
+
+            scale = (1e-7, place.velocity, place.velocity)[index]
+            found, excess = disagreement(along, coefficient, (0, place.velocity, 0)[index], scale)
+            with mpmath.workdps(DIGITS):
+                # the coefficient itself was evaluated in ordinary floats
+                allowed = TOLERANCE * (terms + sigma * 1e-6 / scale)
+            require(
+                excess <= allowed,
+                contact,
+                f"∂σ/∂({what}) is {coefficient:.9g} by differentiation and {shown(found)} by central differences, at "
+                f"k = {place.stiffness:g} Pa/m; check kinks and functions of your own",
+            )
+
+
+def _moved(place: Surroundings, sigma: float, x: Any, v: Any, acceleration: Any) -> Motion:
+    """Steady sliding displaced by x, at velocity v and with an acceleration; forces follow from the balance."""
+    rest = place.steady_motion(sigma)
+    with mpmath.workdps(DIGITS):
+        spring = rest.spring - mpmath.mpf(place.stiffness) * x - place.damping * (v - mpmath.mpf(place.velocity))
+        tau = spring - mpmath.mpf(place.radiation_damping) * v - mpmath.mpf(place.mass) * acceleration
+        return replace(rest, slip=x, velocity=v, acceleration=acceleration, spring=spring, friction=tau)
+
+
+def check_axis(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
+    """Where the contact has an axis, the stiffness along the slide is a fixed share, at most 1, of the axial one."""
+    if not contact.has_axis():
+        return
+    share, tenfold = (float(contact.sliding_stiffness(k)) for k in (1.0, 10.0))
+    require(
+        0 < share <= 1 and abs(tenfold - 10 * share) <= 1e-12 * tenfold,
+        contact,
+        f"sliding_stiffness(1) is {share!r} and sliding_stiffness(10) is {tenfold!r}; a projection is "
+        "proportional, with a factor above 0 and at most 1",
+    )
+
+
+def check_contact_round_trip(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
+    """A rig with this contact survives being written to a rig file and read back."""
+    round_trip(contact, surroundings.rig(contact))

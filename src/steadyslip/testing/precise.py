@@ -1,0 +1,126 @@
+"""Laws in symbols, evaluated to fifty digits: what every check of the contract stands on.
+
+At fifty digits rounding is out of the way: a correct law misses its steady state by 1e-40 of the terms that
+cancel, a wrong one by a visible part of them, and a tolerance between the two needs no tuning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mpmath
+import sympy as sp
+
+from steadyslip.errors import SteadyslipError
+from steadyslip.records import Record, parameters, twin
+
+DIGITS = 50
+#: Allowed error relative to the terms that cancel: far above rounding at fifty digits and above constants
+#: that a law's author typed as ordinary floats, far below any real mistake.
+TOLERANCE = mpmath.mpf("1e-9")
+
+
+class ContractViolation(SteadyslipError, AssertionError):
+    """A law breaks its contract; the message says which part, with numbers, and what to do."""
+
+
+def require(condition: Any, law: Record, message: str) -> None:
+    """Raise `ContractViolation` about `law` unless the condition holds (NaN does not)."""
+    if not bool(condition):
+        raise ContractViolation(f"{law!r}: {message}")
+
+
+def in_symbols(law: Record) -> tuple[Any, dict[sp.Symbol, float]]:
+    """A twin of the law that holds symbols, and the number of each symbol; structural zeros stay zero."""
+    values: dict[str, Any] = {}
+    numbers: dict[sp.Symbol, float] = {}
+    for name, address in parameters(law).items():
+        if address.value is None:
+            continue
+        if address.role.structural and address.value == 0:
+            values[name] = sp.Integer(0)
+            continue
+        low = address.role.domain.low
+        positive = low == 0 and not address.role.domain.low_allowed
+        symbol = sp.Dummy(name.replace(".", "_"), real=True, positive=positive or None, nonnegative=low == 0 or None)
+        values[name], numbers[symbol] = symbol, address.value
+    return twin(law, values), numbers
+
+
+def stated(law: Record, what: str, method: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a law's method with symbols and turn what comes back into SymPy, or say why that fails."""
+    try:
+        result = method(*arguments)
+    except (TypeError, ValueError, AttributeError, sp.SympifyError) as error:
+        raise ContractViolation(
+            f"{law!r}: {what} does not accept SymPy symbols ({error}); write it with arithmetic and functions of "
+            "sympy (sympy.log, not math.log or numpy.log), and branches as sympy.Piecewise"
+        ) from error
+    if isinstance(result, (tuple, list)):
+        return tuple(sp.sympify(item) for item in result)
+    return sp.sympify(result)
+
+
+def require_known_symbols(law: Record, what: str, expression: sp.Expr, allowed: Sequence[sp.Symbol]) -> None:
+    """Expressions may depend on what the method was given and on nothing else, rates of change included."""
+    foreign = sorted(str(s) for s in expression.free_symbols - set(allowed))
+    foreign += sorted(str(d) for d in expression.atoms(sp.Derivative, sp.core.function.AppliedUndef))
+    require(
+        not foreign,
+        law,
+        f"{what} contains {', '.join(foreign)}; allowed: the arguments of the method and the law's own parameters. "
+        "A rate of change such as that of the normal stress is not among them: choose memory variables that stay "
+        "continuous when velocity and normal stress jump, such as Θ + (α/b) ln σ",
+    )
+
+
+def precise_function(
+    law: Record, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]
+) -> Callable[..., list[mpmath.mpf]]:
+    """A function of numbers that returns the expressions' values to fifty digits."""
+    names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(arguments)}
+    renamed = [sp.sympify(e).xreplace(names) for e in expressions]
+    own = {"asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y))}
+    compiled = sp.lambdify(list(names.values()), renamed, modules=[own, "mpmath"])
+
+    def function(*numbers: Any) -> list[mpmath.mpf]:
+        with mpmath.workdps(DIGITS):
+            try:
+                return [mpmath.mpmathify(value) for value in compiled(*(mpmath.mpf(n) for n in numbers))]
+            except (NameError, TypeError) as error:
+                raise ContractViolation(
+                    f"{law!r}: an equation cannot be evaluated ({error}); allowed: elementary functions of sympy and "
+                    "steadyslip.expressions.asinh_exp"
+                ) from error
+            except ZeroDivisionError as error:
+                raise ContractViolation(f"{law!r}: an equation divides by zero at {numbers}") from error
+
+    return function
+
+
+def disagreement(function: Callable[[Any], Any], derivative: Any, at: Any, scale: Any) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """A derivative against central differences: the central difference, and by how much the two differ too much.
+
+    The error of a central difference with step h is c h² + O(h⁴); from steps h and h/2 the error of the
+    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed.
+    """
+    with mpmath.workdps(DIGITS):
+        step = mpmath.mpf("1e-8") * scale
+        values = {d: function(at + d * step) for d in (-1.0, -0.5, 0.5, 1.0)}
+        wide = (values[1.0] - values[-1.0]) / (2 * step)
+        narrow = (values[0.5] - values[-0.5]) / step
+        size = max(abs(value) for value in values.values()) + abs(derivative * at)
+        rounding = 10**6 * mpmath.eps * size / step  # a million: the terms inside may be larger than the value
+        excess = abs(narrow - derivative) - abs(wide - narrow) - rounding
+        return narrow, excess
+
+
+def eigenvalues(matrix: Any) -> list[Any]:
+    """Eigenvalues of an mpmath matrix; `mpmath.eig` returns another type for one by one."""
+    return [matrix[0]] if matrix.rows == 1 else list(mpmath.eig(matrix, left=False, right=False))
+
+
+def shown(value: Any) -> str:
+    """A number for a message."""
+    return str(mpmath.nstr(mpmath.mpmathify(value), 6))

@@ -1,0 +1,82 @@
+"""The contract between a friction law and the rest: two routes to stability, rig files."""
+
+from __future__ import annotations
+
+import mpmath
+
+from steadyslip.friction import FrictionLaw
+from steadyslip.records import Record
+from steadyslip.slider import Slider
+from steadyslip.testing.precise import DIGITS, TOLERANCE, precise_function, require, shown
+from steadyslip.testing.statement import MIDDLE, Conditions, statement
+
+
+def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
+    """For one memory variable: the cubic in closed form is the characteristic polynomial of the Jacobian.
+
+    The former takes dτ/dv and dτ/dσ in steady sliding from `steady_strength`, the latter everything from
+    `strength` and `rates`. They agree up to a common positive factor, with mass, dampings and B0...B3.
+    """
+    from steadyslip.contact import Linear
+    from steadyslip.drive import Steady
+    from steadyslip.linear import cubic
+    from steadyslip.linear.linearise import characteristic_coefficients
+    from steadyslip.linear.response import response
+    from steadyslip.values import model_values
+
+    if len(law.memory()) != 1:
+        return
+    said = statement(law)
+    v, sigma = conditions.velocity, conditions.normal_stress
+    point = said.steady(v, sigma)
+    rate = abs(float(said.relaxation()(*point)[0]))
+    size = float(point[-1]) / v  # a damping, of the size of friction over velocity
+    linear = Linear(steady_normal_stress=sigma, b0=0.3 * size / rate, b1=0.2 * size, b2=0.4, b3=0.1 * size * rate)
+    rig = Slider(
+        friction=law,
+        contact=linear,
+        stiffness=size * rate,
+        mass=size / rate,
+        damping=0.5 * size,
+        radiation_damping=0.7 * size,
+        drive=Steady(v),
+    )
+    values = model_values(rig)
+    model = values.model
+    closed = cubic.coefficients(**response(model).as_dict())
+    general = characteristic_coefficients(model)
+    function = precise_function(law, [*model.parameters.values(), model.sigma_ss], [*closed, *general])
+    with mpmath.workdps(DIGITS):
+        numbers = function(*values.arguments, sigma)
+        first, second = numbers[:4], numbers[4:]
+        factor = second[-1] / first[-1]
+        require(factor > 0, law, f"closed form and Jacobian differ in sign: factor {shown(factor)}, must be > 0")
+        for power, (a, b) in enumerate(zip(first, second, strict=True)):
+            require(
+                abs(factor * a - b) <= TOLERANCE * abs(b),
+                law,
+                f"coefficient of s^{power} is {shown(factor * a)} by the closed form, {shown(b)} by the Jacobian; "
+                "steady_strength() and strength() with rates() state different laws",
+            )
+
+
+def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
+    """A rig with this law survives being written to a rig file and read back."""
+    from steadyslip.contact import Constant
+    from steadyslip.drive import Steady
+
+    press = Constant(preload=conditions.normal_stress)
+    round_trip(law, Slider(friction=law, contact=press, stiffness=1e9, drive=Steady(conditions.velocity)))
+
+
+def round_trip(law: Record, rig: Slider) -> None:
+    """Write `rig` as text, read it back, and compare."""
+    from steadyslip.config import rig_from_text, rig_to_text
+    from steadyslip.errors import SteadyslipError
+
+    text = rig_to_text(rig)
+    try:
+        back = rig_from_text(text)
+    except SteadyslipError as error:
+        require(False, law, f"a rig file with it cannot be read back: {error}\n{text}")
+    require(back == rig, law, f"a rig file changes it: wrote\n{text}\nand read back {back!r}")

@@ -1,0 +1,136 @@
+"""The verdict says what the numbers say."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+
+PAPER = ss.read_rig(Path(__file__).parents[1] / "examples" / "inclined-spring.toml")
+PLAIN = ss.Slider(
+    friction=ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6),
+    contact=ss.Constant(preload=1e7),
+    stiffness=4e9,
+    drive=ss.Steady(1e-6),
+)
+
+
+def lines(rig, **options):
+    return str(ss.analyze(rig, **options)).splitlines()
+
+
+def test_numbers_are_those_of_the_library():
+    a = ss.analyze(PLAIN)
+    assert a.stable is False
+    assert a.critical_stiffness == pytest.approx(ss.critical_stiffness(PLAIN), rel=1e-14)
+    assert a.critical_stiffness == pytest.approx(1e7 * 0.005 / 1e-5, rel=1e-13)  # σ(b−a)/d_c, theory 4
+    assert a.critical_angular_frequency == pytest.approx(0.1 * math.sqrt(0.5), rel=1e-13)
+    np.testing.assert_allclose(a.eigenvalues, ss.eigenvalues(PLAIN), rtol=1e-14)
+    assert a.growth_rate == pytest.approx(ss.growth_rate(PLAIN), rel=1e-14)
+    assert a.time_to_double == pytest.approx(math.log(2) / a.growth_rate, rel=1e-14)
+    assert a.time_to_halve is None
+    leading = a.eigenvalues[0]
+    assert a.period == pytest.approx(2 * math.pi / abs(leading.imag), rel=1e-14)
+    assert a.damping_ratio == pytest.approx(-leading.real / abs(leading), rel=1e-14)
+    assert (a.critical_side, a.critical_axial_stiffness) == ("above", None)
+    value = np.polynomial.polynomial.polyval(np.array(a.eigenvalues), a.characteristic_polynomial)
+    assert np.all(np.abs(value) < 1e-12 * abs(a.characteristic_polynomial[0]))
+
+
+@pytest.mark.parametrize(
+    ("rig", "head", "words"),
+    [
+        (PLAIN, "UNSTABLE: steady sliding at 1 um/s", "0.8 times the critical stiffness 5 GPa/m, above which"),
+        (PLAIN.with_values({"stiffness": 6e9}), "STABLE", "1.2 times the critical stiffness"),
+        (PLAIN.with_values({"friction.b": 0.005}), "STABLE", "stable at every stiffness"),
+        (PAPER.with_values({"angle": "-60 deg"}), "NO STEADY SLIDING", "above −arccot μss = -55.01 deg"),
+        (PAPER.with_values({"angle": "30 deg", "mass": 2e11}), "UNSTABLE", "no stiffness makes sliding stable"),
+    ],
+)
+def test_words(rig, head, words):
+    text = " ".join(line.strip() for line in lines(rig))
+    assert text.startswith(head)
+    assert words in text
+
+
+def test_a_stable_verdict_is_never_called_safe():
+    assert "A large enough kick" in str(ss.analyze(PLAIN.with_values({"stiffness": 6e9})))
+    assert "safe" not in str(ss.analyze(PLAIN.with_values({"stiffness": 6e9}))).lower()
+
+
+def test_margins_say_what_happens_beyond():
+    table = {line.split()[0]: line for line in lines(PLAIN.with_values({"stiffness": 6e9})) if "->" in line}
+    assert table["slider.stiffness"].endswith("stick-slip oscillation sets in")
+    assert "-16.67 %" in table["slider.stiffness"]
+    table = {line.split()[0]: line for line in lines(PLAIN) if "->" in line}
+    assert table["slider.stiffness"].endswith("becomes stable")
+    assert "+25 %" in table["slider.stiffness"]
+
+
+def test_lugre_is_stable_below_the_edge_with_mass():
+    """Theory 4: f < 0, S > 0: stable iff k < r S (m r + f)/(−f)."""
+    lugre = ss.LuGre(
+        mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
+    )
+    rig = ss.Slider(friction=lugre, contact=ss.Constant(preload=1e5), stiffness=1e3, mass=5e5, drive=ss.Steady(1e-3))
+    a = ss.analyze(rig)
+    assert a.critical_side == "below"
+    assert a.stable is (rig.stiffness < a.critical_stiffness)
+    assert a.stable_stiffness[0][0] == 0
+    assert "below which sliding is stable" in a.reason
+
+
+def test_memoryless_law_is_warned_about():
+    law = ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3)
+    rig = ss.Slider(friction=law, contact=ss.Constant(preload=1e6), stiffness=1e9, drive=ss.Steady(1e-4))
+    a = ss.analyze(rig)
+    assert a.stable is False
+    assert a.growth_rate == math.inf
+    assert "ill-posed" in a.reason
+    assert any("no memory" in w for w in a.warnings)
+    heavy = ss.analyze(rig.with_values({"mass": 10.0}))
+    assert (heavy.stable, heavy.stable_stiffness, heavy.critical_stiffness) == (False, (), None)
+
+
+def test_on_the_edge_is_said():
+    rig = PLAIN.with_values({"stiffness": ss.critical_stiffness(PLAIN)})
+    assert any("edge of stability" in w for w in ss.analyze(rig).warnings)
+    assert ss.analyze(PLAIN).warnings == ()
+
+
+def test_axial_stiffness_is_given_back():
+    press = ss.Slider(
+        friction=PLAIN.friction,
+        contact=ss.Triaxial(angle="30 deg", confining_pressure="50 MPa"),
+        axial_stiffness=1e11,
+        drive=ss.Steady(1e-6),
+    )
+    a = ss.analyze(press)
+    factor = math.sin(math.pi / 6) * math.cos(math.pi / 6) ** 2
+    assert a.critical_axial_stiffness == pytest.approx(a.critical_stiffness / factor, rel=1e-14)
+    assert ss.boundary(press, "axial_stiffness")[0].value == pytest.approx(a.critical_axial_stiffness, rel=1e-12)
+    assert "along the axis" in str(a)
+
+
+def test_json_and_forces():
+    rig = ss.rig_from_text(ss.rig_to_text(PLAIN).replace("[slider]", "[slider]\narea = 0.01"))
+    a = ss.analyze(rig)
+    data = json.loads(a.to_json())
+    assert data["forces"]["critical_stiffness"] == pytest.approx(a.critical_stiffness * 0.01)
+    assert data["forces"]["normal_force"] == pytest.approx(1e7)  # the file's 1e7 is now newtons
+    assert "N/m" in str(a)
+    assert data["boundaries"] == json.loads(json.dumps(data["boundaries"]))
+    stable = ss.analyze(PLAIN.with_values({"friction.b": 0.005})).to_dict()
+    assert stable["stable_stiffness"] == [[0.0, None]]
+
+
+def test_formula_and_plain_result():
+    a = ss.analyze(PLAIN)
+    numbers = {"sigma_ss": 1e7, "a": 0.01, "b": 0.015, "d_c": 1e-5}
+    right = a.formula().rhs
+    assert float(right.subs({s: numbers[s.name] for s in right.free_symbols})) == pytest.approx(5e9)
+    with pytest.raises(AttributeError):
+        a.stable = True

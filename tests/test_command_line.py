@@ -1,0 +1,99 @@
+"""The command line: answers, exit statuses, messages, and what it may load."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import steadyslip as ss
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "steadyslip", *map(str, arguments)], capture_output=True, text=True, encoding="utf-8"
+    )
+
+
+def test_verdict_on_the_example():
+    done = run("analyze", EXAMPLE)
+    assert done.returncode == 0
+    assert done.stdout.startswith("UNSTABLE: steady sliding at 1 um/s")
+    assert "critical stiffness 29.07 GPa/m" in done.stdout
+    assert done.stderr == ""
+
+
+def test_json_has_what_other_programs_need():
+    data = json.loads(run("analyze", EXAMPLE, "--json").stdout)
+    assert data["stable"] is False
+    assert data["steady"].pop("states") == {"Theta": 0.0, "theta": 1.0}
+    stress = {"normal_stress": 5e6 / 0.3, "shear_stress": 3.5e6 / 0.3, "spring_stress": 3.5e6 / 0.3}
+    assert data["steady"] == pytest.approx({"velocity": 1e-6, "friction": 0.7, **stress}, rel=1e-14)
+    # kappa_cr of the paper's parameters at -45 degrees, theory 4
+    assert data["critical_stiffness"] == pytest.approx(0.00174418604651163 * 5e6 / 0.3 / 1e-6, rel=1e-13)
+    assert data["critical_angular_frequency"] == pytest.approx(0.189964754254, rel=1e-11)
+    assert data["stable_stiffness"] == [[data["critical_stiffness"], None]]
+    assert len(data["eigenvalues"]) == 2
+    assert {row["parameter"] for row in data["boundaries"]} >= {"contact.angle", "friction.a", "slider.stiffness"}
+    assert data["warnings"] == []
+
+
+def test_locked_rig_is_answered_not_failed():
+    done = run("analyze", EXAMPLE, "--set", "contact.angle=-60 deg", "--json")
+    data = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert data["stable"] is None
+    assert "lock-up" in data["reason"]
+    assert data["critical_stiffness"] is None
+
+
+@pytest.mark.parametrize(
+    ("change", "status"), [("stiffness=40 GPa/m", 0), ("stiffness=9 GPa/m", 1), ("contact.angle=-60 deg", 1)]
+)
+def test_require_stable(change, status):
+    assert run("analyze", EXAMPLE, "--require-stable", "--set", change).returncode == status
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["analyze", "missing.toml"], "no such file"),
+        (["analyze", EXAMPLE, "--set", "contact.angel=3"], "did you mean 'angle'?"),
+        (["analyze", EXAMPLE, "--set", "a=-1", "--set", "d_c=0"], "2 problems"),
+        (["analyze", EXAMPLE, "--branch", "3"], "branch 3 does not exist"),
+        (["analyze", EXAMPLE, "--set", "v_ref=1e-300", "--set", "preload=1e308"], "range of floating point"),
+        (["analyze"], "Missing argument"),
+        (["analyse", EXAMPLE], "No such command"),
+    ],
+)
+def test_bad_input_is_one_message_and_status_2(arguments, words):
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_formula_schema_version():
+    assert "k_cr = " in run("analyze", EXAMPLE, "--formula").stdout
+    assert json.loads(run("schema").stdout) == ss.json_schema()
+    assert run("--version").stdout.strip() == f"steadyslip {ss.__version__}"
+
+
+def test_help_and_analyze_stay_light():
+    """Start-up time comes from imports: neither may load plotting, compiling or table libraries."""
+    code = (
+        "import sys; from steadyslip.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'numba','matplotlib','xarray','pandas','pint','scipy.optimize','scipy.signal'} & set(sys.modules)))"
+    )
+    for arguments in (["--help"], ["analyze", str(EXAMPLE)]):
+        done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == "[]", done.stdout
+    code = code.replace("'scipy.signal'", "'scipy.signal','sympy','numpy'")
+    done = subprocess.run([sys.executable, "-c", code, "--help"], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]", done.stdout

@@ -62,21 +62,28 @@ def stable_interval(numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2
     low, high : float or ndarray
         NaN where no k is stable; high may be inf.
     """
-    low, high, valid = _half_line(0.0, np.inf, denominator, numerator, (a3 >= 0) & (a2 > 0))
+    valid = positive(a2) & (a3 >= 0)
+    low, high, valid = _half_line(0.0, np.inf, denominator, numerator, valid)
     low, high, valid = _half_line(low, high, 1 + mu_b2, -mu_b3, valid)
-    valid = valid & (low < high)
+    if np.ndim(high) or high != np.inf:
+        valid = valid & (low < high)
     return unless(valid, low), unless(valid, high)
+
+
+def positive(value: Any) -> Any:
+    """Where `value` > 0; plain True if everywhere, found in one pass, so that masks cost only where needed."""
+    return bool(value > 0) if np.ndim(value) == 0 else True if np.min(value) > 0 else value > 0
 
 
 def unless(valid: Any, value: Any) -> Any:
     """`value` where `valid`, NaN elsewhere."""
-    return value if np.all(valid) else np.where(valid, value, np.nan)
+    return value if valid is True or np.all(valid) else np.where(valid, value, np.nan)
 
 
 def _half_line(low: Any, high: Any, slope: Any, right: Any, valid: Any) -> tuple[Any, Any, Any]:
     """Intersect (low, high) with slope·k > right; the common case of one sign throughout first."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        if np.all(slope > 0):
+        if positive(slope) is True:
             return (low if np.ndim(right) == 0 and right == 0 else np.maximum(low, right / slope)), high, valid
         edge = np.divide(right, slope)
     low = np.where(slope > 0, np.maximum(low, edge), low)

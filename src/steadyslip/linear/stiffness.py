@@ -23,7 +23,7 @@ from steadyslip.slider import Slider
 from steadyslip.steady import steady_equation, steady_stress
 from steadyslip.values import Values, Vary, model_values
 
-_CHUNK = 16384  # rigs at a time, so that intermediate arrays stay in the processor's cache
+_CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
 
 
 def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
@@ -194,12 +194,14 @@ def _interval_function(model: Model) -> Callable[[Values], list[Any]]:
 
         return by_search
     sigma, slope = equation.sigma, equation.slope
+    if wanted[2] != 0 and sp.expand(wanted[2] + slope) == 0 and wanted[3] == 0:
+        wanted[2] = sp.Integer(0)  # a0 > 0 is then the condition that steady sliding exists, tested anyway
     direct = array_function(arguments, [sigma, slope, *(w.xreplace({model.sigma_ss: sigma}) for w in wanted)])
 
     def in_one_go(values: Values) -> list[Any]:
         with np.errstate(divide="ignore", invalid="ignore"):
             stress, coupling, *rest = direct(*values.arguments)
-        return [(coupling < 1) & (stress > 0), *rest]
+        return [cubic.positive(1 - coupling) & cubic.positive(stress), *rest]
 
     return in_one_go
 
@@ -235,7 +237,7 @@ def _nearest_edge(values: Values) -> Any:
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # the common case, worth its own line for arrays of rigs
-            return cubic.unless(low > 0, low)
+            return cubic.unless(cubic.positive(low), low)
         is_low = (low > 0) & ~((high < np.inf) & (np.abs(high - own) < np.abs(low - own)))
         return np.where(is_low, low, np.where(high < np.inf, high, np.nan))
     ends = np.concatenate([low, high], axis=-1)

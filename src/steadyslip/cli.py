@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
@@ -71,8 +72,7 @@ def reproduce(
     folder: Annotated[Path, typer.Argument(help="where to write; created if missing")] = Path("paper-figures"),
 ) -> None:
     """Draw the paper's Fig. 7 and put its numbers next to ours."""
-    from steadyslip.reproduce import paper_table
-    from steadyslip.reproduce import reproduce as run
+    from steadyslip.reproduce import paper_table, reproduce as run
 
     written = run(folder)
     typer.echo(paper_table())
@@ -94,6 +94,9 @@ def main() -> None:
     """Entry point: bad input ends with one clear message and status 2, never a traceback."""
     from steadyslip.errors import SteadyslipError
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
+            stream.reconfigure(errors="replace")
     try:
         app()
     except SteadyslipError as error:

@@ -50,7 +50,7 @@ class PD(Drive, name="pd", kw_only=False):
 class PID(PD, name="pid", kw_only=False):
     """A position controller with proportional, integral and derivative gain, following the ramp v0 t."""
 
-    ki: float = parameter("Pa/m/s", nonnegative, "integral gain", default=0.0, structural=True)
+    ki: float = parameter("Pa/m/s", nonnegative, "integral gain", default=0.0, structural=True, adds_state=True)
 
     def integral(self) -> Any:
         return None if self.ki == 0 else self.ki

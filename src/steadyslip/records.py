@@ -63,6 +63,8 @@ class Parameter:
         Meaning, a phrase.
     structural : bool
         Zero means that the term is absent from the equations (mass, B0, ...), not merely small.
+    adds_state : bool
+        Structural, and its presence adds a variable to the model, so that zero is no limit of small values.
     gauge : bool
         Changes no observable result (a reference that only shifts a state), so has no edge.
     """
@@ -72,6 +74,7 @@ class Parameter:
     doc: str
     structural: bool = False
     gauge: bool = False
+    adds_state: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,9 +107,10 @@ def parameter(
     default: Any = MISSING,
     structural: bool = False,
     gauge: bool = False,
+    adds_state: bool = False,
 ) -> Any:
     """Declare a numeric parameter; ``default=None`` makes it optional."""
-    role = Parameter(unit, domain, doc, structural, gauge)
+    role = Parameter(unit, domain, doc, structural, gauge, adds_state)
     return field(default=default, metadata={_ROLE: role})
 
 

@@ -157,6 +157,10 @@ def _varied(rig: Slider, vary: Vary) -> tuple[dict[str, Any], Callable[..., Any]
             plain[full] = checked_array(full, known[full].role, raw)
             if hasattr(value, "dims"):
                 labelled[full] = value
+            if known[full].role.adds_state and np.any(np.asarray(plain[full]) == 0):
+                raise ParameterError(
+                    [Problem(full, "got 0; without this term the rig has fewer states, ask for it apart")]
+                )
             if known[full].value is None and full != "slider.stiffness":
                 raise ParameterError([Problem(full, "cannot be varied: the rig does not have it")])
             if full == "slider.stiffness" and rig.axial_stiffness is not None:

@@ -54,6 +54,8 @@ def reason(analysis: Analysis) -> str:
         )
     if critical is None:
         if analysis.stable_stiffness:
+            if analysis.rig.drive.proportional():
+                return "with this controller sliding is stable whatever the stiffness beside it"
             return "sliding is stable at every stiffness: nothing in friction or contact feeds a disturbance"
         if analysis.rig.friction.memory():
             return "no stiffness makes sliding stable" + _why_none(analysis)
@@ -62,8 +64,9 @@ def reason(analysis: Analysis) -> str:
         own = _own_stiffness(analysis)
     ratio = own / critical
     position = "above" if own > critical else "below"
+    beside = " (beside the controller's gain)" if analysis.rig.drive.proportional() else ""
     text = (
-        f"the stiffness {_stiffness(analysis, own)} is {ratio:.3g} times the critical stiffness "
+        f"the stiffness {_stiffness(analysis, own)}{beside} is {ratio:.3g} times the critical stiffness "
         f"{_stiffness(analysis, critical)}, {side} which sliding is stable"
     )
     if analysis.stable is (position == side):
@@ -120,7 +123,7 @@ def _facts(analysis: Analysis) -> list[str]:
 
 def _disturbance(analysis: Analysis) -> str:
     if analysis.growth_rate == math.inf:
-        return "grows at once, faster the shorter it is"
+        return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
     if analysis.time_to_double is not None:
         text = f"doubles in {shown(analysis.time_to_double, 's')}"
     elif analysis.time_to_halve is not None:
@@ -172,12 +175,12 @@ def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str,
     assert edge is not None
     if margin.unit == "rad":
         change = f"{math.degrees(margin.absolute):+.4g} deg"
-    elif margin.value:
-        change = (
-            f"{100 * margin.relative:+.4g} %" if abs(margin.relative) < 10 else f"x {edge.value / margin.value:.4g}"
-        )
-    else:
+    elif not margin.value:
         change = "from zero"
+    elif 0 < (ratio := edge.value / margin.value) < 0.1 or ratio > 10:
+        change = f"x {ratio:.4g}"
+    else:
+        change = f"{100 * margin.relative:+.4g} %"
     towards = "above" if margin.absolute > 0 else "below"
     if edge.stable == towards:
         words = "becomes stable"

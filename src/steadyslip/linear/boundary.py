@@ -168,7 +168,7 @@ def present_zeros(rig: Slider) -> tuple[str, ...]:
     """Structural parameters that are zero and worth keeping in the equations (all but an integral gain,
     whose presence adds a state)."""
     return tuple(
-        name for name, a in rig.parameters().items() if a.role.structural and a.value == 0 and name != "drive.ki"
+        name for name, a in rig.parameters().items() if a.role.structural and a.value == 0 and not a.role.adds_state
     )
 
 
@@ -217,7 +217,7 @@ class _Search:
             samples = size * np.geomspace(10.0**-_DECADES, 10.0**_DECADES, count)
             if domain.low < 0:
                 samples = np.concatenate([-samples[::-1], [0.0], samples])
-            elif domain.low_allowed:
+            elif domain.low_allowed and not self.role.adds_state:
                 samples = np.concatenate([[0.0], samples])
         return np.unique(np.append(samples, self.value))
 

@@ -72,7 +72,9 @@ def stable_interval(numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2
 
 def positive(value: Any) -> Any:
     """Where `value` > 0; plain True if everywhere, found in one pass, so that masks cost only where needed."""
-    return bool(value > 0) if np.ndim(value) == 0 else True if np.min(value) > 0 else value > 0
+    if np.ndim(value) == 0:
+        return bool(value > 0)
+    return True if np.min(value) > 0 else value > 0
 
 
 def unless(valid: Any, value: Any) -> Any:

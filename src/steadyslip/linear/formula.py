@@ -15,11 +15,19 @@ MU_SS = sp.Symbol("mu_ss", real=True)
 
 
 def formula(rig: Slider) -> sp.Eq:
-    """Critical stiffness of a rig with one memory variable, as a SymPy equation k_cr = N/D.
+    """Critical stiffness of a rig with one memory variable, as a SymPy equation.
 
-    The formula holds for every rig of the same structure. It is in terms of the rig's parameters, the
-    steady normal stress ``sigma_ss`` and, where the friction coefficient is steady sliding's,
-    ``mu_ss``. Stable above it while D > 0, below it while D < 0 (theory 3).
+    Parameters
+    ----------
+    rig : Slider
+        Only its structure matters: the formula holds for every rig with the same terms.
+
+    Returns
+    -------
+    sympy.Eq
+        ``k_cr = N/D`` (Pa/m along the sliding direction); with a position controller ``k_cr + kp = N/D``. In
+        terms of the rig's parameters, the steady normal stress ``sigma_ss`` and the steady friction coefficient
+        ``mu_ss``. Stable above k_cr while D > 0, below while D < 0 (theory 3; eq. 20 corrected).
 
     Raises
     ------
@@ -33,22 +41,34 @@ def formula(rig: Slider) -> sp.Eq:
 @lru_cache(maxsize=32)
 def _formula(model: Model) -> sp.Eq:
     known = response(model).as_dict()
-    gain = known.pop("k") - model.parameters["slider.stiffness"]
-    numerator, denominator = cubic.hopf_line(**known)
+    gain = sp.expand(known.pop("k") - model.parameters["slider.stiffness"])
     mu = sp.simplify(model.steady[model.symbols["tau"]] / model.sigma_ss)
-    fraction = sp.together(_with_mu(numerator, mu) / _with_mu(denominator, mu) - gain)
-    return sp.Eq(sp.Symbol("k_cr"), _tidy(sp.cancel(fraction)), evaluate=False)
+    numerator, denominator = (_with_mu(part, mu) for part in cubic.hopf_line(**known))
+    return sp.Eq(sp.Symbol("k_cr") + gain, _shortest(numerator, denominator), evaluate=False)
 
 
 def _with_mu(expression: sp.Expr, mu: sp.Expr) -> sp.Expr:
     """Write mu_ss for the steady friction coefficient wherever its reference value occurs in it."""
-    free = sorted((s for s in mu.free_symbols if s.name == "mu_ref"), key=str)
-    if not free or mu.diff(free[0]) != 1:
+    reference = next((symbol for symbol in mu.free_symbols if symbol.name == "mu_ref"), None)
+    if reference is None or mu.diff(reference) != 1:
         return expression
-    return sp.expand(expression.xreplace({free[0]: MU_SS - (mu - free[0])}))
+    return sp.expand(expression.xreplace({reference: MU_SS - (mu - reference)}))
 
 
-def _tidy(expression: sp.Expr) -> sp.Expr:
-    """Factor numerator and denominator."""
-    numerator, denominator = sp.fraction(sp.together(expression))
-    return sp.factor(numerator) / sp.collect(sp.factor(denominator), sp.Symbol("tan(psi)"))
+def _shortest(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
+    """The quotient with common factors cancelled, factored where that is shorter, positive signs first."""
+    top, bottom = sp.fraction(sp.cancel(sp.together(numerator / denominator)))
+    top, bottom = (min((sp.factor(part), part), key=sp.count_ops) for part in (top, bottom))
+    if bottom.subs(dict.fromkeys(bottom.atoms(sp.tan), 0)).could_extract_minus_sign():
+        top, bottom = -top, -bottom
+    return _without_minus(sp.factor_terms(top)) / _without_minus(sp.factor_terms(bottom))
+
+
+def _without_minus(product: sp.Expr) -> sp.Expr:
+    """A leading minus sign moved into a sum: b − a for −(a − b)."""
+    sign, factors = product.as_coeff_mul()
+    sums = [factor for factor in factors if factor.is_Add]
+    if sign >= 0 or not sums:
+        return product
+    rest = [factor for factor in factors if factor is not sums[0]]
+    return sp.Mul(-sign, *rest, sp.expand(-sums[0]))

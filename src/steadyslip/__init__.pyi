@@ -62,6 +62,7 @@ from .friction import (
 from .linear import (
     Boundary as Boundary,
     Margin as Margin,
+    Response as Response,
     boundary as boundary,
     critical_stiffness as critical_stiffness,
     eigenvalues as eigenvalues,
@@ -69,6 +70,7 @@ from .linear import (
     growth_rate as growth_rate,
     margins as margins,
     paper as paper,
+    small_signal as small_signal,
     stable_stiffness as stable_stiffness,
     state_space as state_space,
     to_control as to_control,

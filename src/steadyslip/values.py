@@ -182,7 +182,7 @@ def _varied(rig: Slider, vary: Vary) -> tuple[dict[str, Any], Callable[..., Any]
 
 
 def _bare(array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) -> Any:
-    return array if np.ndim(array) else array[()] if isinstance(array, np.ndarray) else array
+    return array if np.ndim(array) else np.asarray(array).item()
 
 
 def _labelled(

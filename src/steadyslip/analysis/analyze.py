@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from steadyslip.values import Values, axial_projection, model_values
 if TYPE_CHECKING:
     import sympy as sp
 
+_OUT_OF_RANGE = "the numbers of this rig leave the range of floating point; check the sizes of its parameters"
 _ON_THE_EDGE = 1e-9  # growth per radian below which a verdict is within rounding of the boundary
 
 
@@ -163,21 +164,20 @@ def analyze(rig: Slider, *, branch: int = 0) -> Analysis:
         )
     from steadyslip.analysis.verdict import reason
 
-    object.__setattr__(found, "reason", reason(found))
-    return found
+    return replace(found, reason=reason(found))
 
 
 def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:
     """Everything that follows from the characteristic polynomial."""
     c = characteristic(values)
     if not np.all(np.isfinite(c)):
-        raise NotAvailable(
-            "the numbers of this rig leave the range of floating point; check the sizes of its parameters"
-        )
+        raise NotAvailable(_OUT_OF_RANGE)
     bad = bool(ill_posed(c))
     while len(c) > 2 and c[-1] == 0:
         c = c[:-1]
     eigenvalues = roots(c)
+    if not np.all(np.isfinite(eigenvalues)):
+        raise NotAvailable(_OUT_OF_RANGE)
     numbers: dict[str, Any] = {
         "stable": bool(is_hurwitz(c)) and not bad,
         "eigenvalues": tuple(complex(s) for s in eigenvalues),

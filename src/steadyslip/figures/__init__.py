@@ -6,7 +6,7 @@ The only part of the package that imports matplotlib.
 from __future__ import annotations
 
 from steadyslip.figures.chart import stability_chart
-from steadyslip.figures.critical import critical_stiffness_against_mass
+from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.locus import root_locus
 
-__all__ = ["critical_stiffness_against_mass", "root_locus", "stability_chart"]
+__all__ = ["ANGLES", "critical_stiffness_against_mass", "root_locus", "stability_chart"]

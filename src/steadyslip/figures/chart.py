@@ -125,7 +125,16 @@ def _mark_own(ax: Axes, rig: Slider, x: Axis, y: Axis) -> None:
     own = [rig.value(x.name), rig.value(y.name)]
     if all(v is not None and a.low <= v <= a.high for v, a in zip(own, (x, y), strict=True)):
         at = [x.shown(own[0])], [y.shown(own[1])]
-        ax.plot(*at, "o", color=VERMILION, markeredgecolor=BLACK, markersize=9, label="this rig", linestyle="none")
+        ax.plot(
+            *at,
+            "o",
+            color=VERMILION,
+            markeredgecolor=BLACK,
+            markersize=9,
+            label="this rig",
+            linestyle="none",
+            clip_on=False,
+        )
 
 
 def _finish(ax: Axes, x: Axis, y: Axis) -> None:

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from steadyslip.errors import ParameterError, Problem
 from steadyslip.figures import mass
 from steadyslip.figures.style import BLACK, CURVES, LINES, axes_or_new, labelled
 from steadyslip.linear import boundary
 from steadyslip.slider import Slider
-from steadyslip.steady import steady_stress
 from steadyslip.units import deg
-from steadyslip.values import model_values
 
 ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))
 
@@ -47,13 +46,15 @@ def critical_stiffness_against_mass(
     NotAvailable
         If the contact is not an inclined spring, or friction has no slip distance.
     ParameterError
-        If an angle is outside ±90 degrees or a mass is negative.
+        If an angle is outside ±90 degrees or a mass is not positive.
     """
     mass.slip_distance(rig)  # refuses rigs that have no such figure before anything is drawn
     angles = ANGLES if angles is None else [float(angle) for angle in angles]
-    m_star = np.geomspace(1e-4, 0.2, 600) if m_star is None else np.asarray(m_star, float)
+    m_star = np.geomspace(1e-4, 0.2, 600) if m_star is None else np.unique(np.asarray(m_star, float))
+    if m_star.size < 2 or not np.all(m_star > 0):
+        raise ParameterError([Problem("m_star", f"got {m_star!r}; allowed: two or more different numbers > 0")])
     kappa = mass.dimensionless_critical_stiffness(rig, np.array(angles)[:, None], m_star[None, :])
-    locked = np.isnan(steady_stress(model_values(rig, {"contact.angle": np.array(angles)})))
+    locked = mass.is_locked(rig, np.array(angles))
 
     ax = axes_or_new(ax)
     for i, (angle, curve) in enumerate(zip(angles, kappa, strict=True)):

@@ -75,7 +75,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         }
         name = f"critical stiffness {edge / factor:.4g} {unit_name}"
         ax.plot(at.real, at.imag, label=name, zorder=3, **style)
-    _set_view(ax, mine, crossings)
+    _set_view(ax, roots, mine, crossings)
     ax.plot(
         mine.real, mine.imag, "o", color=VERMILION, markeredgecolor=BLACK, markersize=7, zorder=4, label=_own(ax, mine)
     )
@@ -114,17 +114,23 @@ def _crossings(rig: Slider, k: Any) -> tuple[list[float], list[Any]]:
     return edges, crossings
 
 
-def _set_view(ax: Axes, mine: Any, crossings: list[Any]) -> None:
+def _set_view(ax: Axes, roots: Any, mine: Any, crossings: list[Any]) -> None:
     """Limits around the origin, the crossings and the rig's slowest-decaying eigenvalues."""
     sizes = [abs(mine[0]), *(abs(at[0]) for at in crossings)]
     size = _VIEW * (max(sizes) or float(np.abs(mine).max()) or 1.0)
-    ax.set_xlim(-size, size)
+    seen = roots.real[np.abs(roots) < size]
+    ax.set_xlim(-size, min(size, max(1.2 * seen.max(initial=0.0), 0.25 * size)))
     ax.set_ylim(-size, size)
 
 
 def _own(ax: Axes, mine: Any) -> str:
     """Legend text of the rig's own eigenvalues, naming those out of view."""
-    outside = mine[(np.abs(mine.real) > ax.get_xlim()[1]) | (np.abs(mine.imag) > ax.get_ylim()[1])]
+    (left, right), top = ax.get_xlim(), ax.get_ylim()[1]
+    outside = mine[(mine.real < left) | (mine.real > right) | (np.abs(mine.imag) > top)]
     if not outside.size:
         return "this rig"
-    return "this rig, and out of view s = " + ", ".join(f"{s.real:.3g}{s.imag:+.3g}i" for s in outside) + " 1/s"
+    return "this rig, and out of view s = " + ", ".join(map(_number, outside)) + " 1/s"
+
+
+def _number(s: complex) -> str:
+    return (f"{s.real:.3g}" + (f"{s.imag:+.3g}i" if s.imag else "")).replace("-", "−")

@@ -32,10 +32,24 @@ def dimensionless_critical_stiffness(rig: Slider, angles: Any, m_star: Any) -> A
         If the contact is not an inclined spring, or friction has no slip distance.
     """
     angles, m_star = np.broadcast_arrays(np.asarray(angles, float), np.asarray(m_star, float))
-    d_c, v0 = slip_distance(rig), rig.drive.velocity
-    sigma = np.broadcast_to(steady_stress(model_values(rig, {"contact.angle": angles})), angles.shape)
-    mass = m_star * np.where(np.isnan(sigma), 1.0, sigma) * d_c / v0**2
-    return critical_stiffness(rig, {"contact.angle": angles, "slider.mass": mass}) * d_c / sigma
+    mass = mass_at(rig, angles, m_star)
+    heavy = {"contact.angle": angles, "slider.mass": np.where(np.isnan(mass), 0.0, mass)}
+    return critical_stiffness(rig, heavy) * slip_distance(rig) / _steady_stress(rig, angles)
+
+
+def mass_at(rig: Slider, angles: Any, m_star: Any) -> Any:
+    """m (kg/m²) of dimensionless masses m* at spring angles (rad), which broadcast; NaN past lock-up."""
+    return m_star * _steady_stress(rig, angles) * slip_distance(rig) / rig.drive.velocity**2
+
+
+def is_locked(rig: Slider, angles: Any) -> Any:
+    """Whether a spring at these angles (rad) leaves no steady sliding."""
+    return np.isnan(_steady_stress(rig, angles))
+
+
+def _steady_stress(rig: Slider, angles: Any) -> Any:
+    # broadcast because a rig that gives σss itself has one value for all angles short of lock-up
+    return np.broadcast_to(steady_stress(model_values(rig, {"contact.angle": angles})), np.shape(angles))
 
 
 def slip_distance(rig: Slider) -> float:

@@ -65,5 +65,5 @@ def display_unit(si_unit: str, typical: float) -> tuple[float, str]:
 
 
 def labelled(name: str, unit_name: str) -> str:
-    """Axis label: name and unit, the unit left out where there is none."""
-    return f"{name} ({unit_name})" if unit_name else name
+    """Axis label: name and unit, 1 for plain numbers."""
+    return f"{name} ({unit_name or '1'})"

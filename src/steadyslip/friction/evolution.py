@@ -21,6 +21,12 @@ class Evolution(Record, family="evolution law"):
         """Rate of Θ (1/s) at slip rate `v` >= 0, slip distance `d_c` and reference rate `v_ref`."""
         raise NotImplementedError
 
+    def scaled_rate(
+        self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
+    ) -> Expression:
+        """Rate of bΘ (1/s) from bΘ itself."""
+        return b * self.rate(v, b_theta / b, d_c, v_ref)
+
     def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         """The usual state θ in seconds that belongs to Θ: Θ = ln(v* θ/d_c) unless stated otherwise."""
         return d_c / v_ref * sp.exp(state)
@@ -31,6 +37,11 @@ class Slip(Evolution, name="slip"):
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         return -v / d_c * (sp.log(v / v_ref) + state)
+
+    def scaled_rate(
+        self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
+    ) -> Expression:
+        return -v / d_c * (b * sp.log(v / v_ref) + b_theta)  # without division by b, which may be zero
 
 
 class Aging(Evolution, name="aging"):

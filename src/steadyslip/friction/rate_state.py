@@ -154,7 +154,7 @@ class RateState(FrictionLaw, name="rate-state"):
             self._all_states(), self._b_theta(sigma, memory, tau), memory, strict=False
         ):
             if self._is_scaled():
-                rates.append(b * self.evolution.rate(speed, b_theta / b, d_c, self.v_ref))
+                rates.append(self.evolution.scaled_rate(speed, b_theta, b, d_c, self.v_ref))
             else:
                 rates.append(self.evolution.rate(speed, stored, d_c, self.v_ref))
         if isinstance(self.normal_memory, PrakashClifton):

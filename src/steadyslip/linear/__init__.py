@@ -5,12 +5,14 @@ from __future__ import annotations
 from steadyslip.linear import paper
 from steadyslip.linear.boundary import Boundary, Margin, boundary, margins
 from steadyslip.linear.formula import formula
+from steadyslip.linear.response import Response, small_signal
 from steadyslip.linear.state_space import state_space, to_control
 from steadyslip.linear.stiffness import critical_stiffness, eigenvalues, growth_rate, stable_stiffness
 
 __all__ = [
     "Boundary",
     "Margin",
+    "Response",
     "boundary",
     "critical_stiffness",
     "eigenvalues",
@@ -18,6 +20,7 @@ __all__ = [
     "growth_rate",
     "margins",
     "paper",
+    "small_signal",
     "stable_stiffness",
     "state_space",
     "to_control",

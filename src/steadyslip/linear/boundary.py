@@ -28,7 +28,7 @@ _DECADES = 6
 _LINEAR = 721
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 
-ABSENT, STABLE, UNSTABLE = 0, 1, 2
+ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)  # unknown: beyond the range of floating point
 
 
 @dataclass(frozen=True)
@@ -237,15 +237,18 @@ class _Search:
         length = v0 / (_decay_rate(values, sigma) or 1.0)
         _, d = unit(self.role.unit)
         by_velocity = -2 * d.mass - d.time
+        sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
         size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
         return float(size) if np.isfinite(size) and size > 0 else 1.0
 
     # -- status along the parameter
 
     def status(self, x: Any) -> Any:
-        c = characteristic(self.values(np.asarray(x, dtype=float)))
-        exists = np.all(np.isfinite(c), axis=-1)
-        return np.where(exists, np.where(is_hurwitz(c), STABLE, UNSTABLE), ABSENT)
+        values = self.values(np.asarray(x, dtype=float))
+        exists = np.isfinite(steady_stress(values))
+        c = characteristic(values)
+        verdict = np.where(is_hurwitz(c), STABLE, UNSTABLE)
+        return np.where(exists, np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN), ABSENT)
 
     def growth(self, x: Any) -> Any:
         c = characteristic(self.values(np.asarray(x, dtype=float)))
@@ -259,7 +262,8 @@ class _Search:
                 return self._of_stiffness(grid[0], grid[-1])
             grid = self._with_hidden_windows(grid)
             status = self.status(grid)
-            at = np.flatnonzero(status[1:] != status[:-1])
+            known = (status[1:] != UNKNOWN) & (status[:-1] != UNKNOWN)
+            at = np.flatnonzero((status[1:] != status[:-1]) & known)
             low, high = self._narrowed(grid[at], grid[at + 1], status[at])
             return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
 
@@ -272,7 +276,7 @@ class _Search:
             (middle <= growth[:-2]) & (middle <= growth[2:]),
             (middle >= growth[:-2]) & (middle >= growth[2:]),
         )
-        same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & (status[1:-1] != ABSENT)
+        same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & np.isin(status[1:-1], (STABLE, UNSTABLE))
         at = np.flatnonzero(towards_zero & same & np.isfinite(middle)) + 1
         if not at.size:
             return grid

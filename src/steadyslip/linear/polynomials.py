@@ -61,8 +61,11 @@ def _roots_of_degree(c: Array) -> ComplexArray:
         return _quadratic(c)
     companion = np.zeros((len(c), d, d))
     companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
-    companion[:, :, -1] = -c[:, :-1] / c[:, -1:]
-    found = np.linalg.eigvals(companion).astype(complex)
+    with np.errstate(over="ignore"):
+        companion[:, :, -1] = -c[:, :-1] / c[:, -1:]
+    found = np.full((len(c), d), np.nan + 0j, dtype=complex)
+    usable = np.all(np.isfinite(companion[:, :, -1]), axis=-1)
+    found[usable] = np.linalg.eigvals(companion[usable])
     slope = c[:, None, 1:] * np.arange(1, d + 1)
     value = evaluate(c[:, None, :], found)
     for _ in range(3):

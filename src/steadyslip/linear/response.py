@@ -11,45 +11,74 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import lru_cache
+from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from steadyslip.errors import NotAvailable
+from steadyslip.expressions import array_function
+from steadyslip.linear import cubic
 from steadyslip.model import Model
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_stress
+from steadyslip.values import Vary, model_values
 
 
 @dataclass(frozen=True)
 class Response:
-    """Ingredients of the cubic in symbols (per unit area).
+    """Ingredients of the cubic, per unit area: SymPy expressions from `response`, numbers from `small_signal`.
 
     Attributes
     ----------
-    f, S : sympy.Expr
+    f, S
         ∂τ/∂v and dτss/dv at constant σ, dampings c and η included (Pa s/m).
-    r : sympy.Expr
+    r
         Rate of decay of the memory (1/s).
-    f1, mu : sympy.Expr
+    f1, mu
         ∂τ/∂σ at fixed v and memory variable, and dτss/dσ.
-    B0, B1, B2, B3 : sympy.Expr
+    B0, B1, B2, B3
         σ̂ = (B0 s² + B1 s + k B2 + B3) x̂, eq. 12.
-    m, k : sympy.Expr
+    m, k
         Mass, and total stiffness between block and load point.
     """
 
-    f: sp.Expr
-    S: sp.Expr
-    r: sp.Expr
-    f1: sp.Expr
-    mu: sp.Expr
-    B0: sp.Expr
-    B1: sp.Expr
-    B2: sp.Expr
-    B3: sp.Expr
-    m: sp.Expr
-    k: sp.Expr
+    f: Any
+    S: Any
+    r: Any
+    f1: Any
+    mu: Any
+    B0: Any
+    B1: Any
+    B2: Any
+    B3: Any
+    m: Any
+    k: Any
 
-    def as_dict(self) -> dict[str, sp.Expr]:
+    def as_dict(self) -> dict[str, Any]:
+        """The ingredients by name, as the functions of `steadyslip.linear.cubic` take them."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    def characteristic_polynomial(self) -> tuple[Any, Any, Any, Any]:
+        """a0, a1, a2, a3, lowest power first."""
+        return cubic.coefficients(**self.as_dict())
+
+    def critical_stiffness(self) -> Any:
+        """N/D, the oscillatory edge in the total stiffness (Pa/m); eq. 20 corrected."""
+        known = self.as_dict()
+        known.pop("k")
+        numerator, denominator = cubic.hopf_line(**known)
+        return numerator / denominator
+
+    @property
+    def lam(self) -> Any:
+        """The paper's λ = −S/f (eq. 15)."""
+        return -self.S / self.f
+
+    @property
+    def lam1(self) -> Any:
+        """The paper's λ1 = μ/f1 (eq. 16)."""
+        return self.mu / self.f1
 
 
 def has_closed_form(model: Model) -> bool:
@@ -136,3 +165,46 @@ def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Ex
     b2 = by_stiffness - through_spring
     b3 = sp.expand(by_slip - by_stiffness * k)
     return b0, b1, b2, b3
+
+
+def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
+    """f, S, r, f1, μ and B0...B3 of a rig as numbers.
+
+    Parameters
+    ----------
+    rig : Slider
+        With one memory variable and without integral control.
+    vary : mapping of str to array_like or xarray.DataArray, optional
+        Parameters to vary by dotted name, in SI units.
+
+    Returns
+    -------
+    Response
+        Floats, or arrays (DataArrays) over the varied parameters; NaN without steady sliding.
+
+    Raises
+    ------
+    NotAvailable
+        If the rig has no memory variable, several, or integral control.
+    """
+    values = model_values(rig, vary)
+    names, function = _response_function(values.model)
+    sigma = steady_stress(values)
+    numbers = function(*values.arguments, sigma)
+    missing = 0 * sigma  # NaN where steady sliding does not exist
+    return Response(
+        **{
+            name: values.wrap(np.broadcast_to(x + missing, values.shape)[()], name, _UNITS[name])
+            for name, x in zip(names, numbers, strict=True)
+        }
+    )
+
+
+_UNITS = {"f": "Pa s/m", "S": "Pa s/m", "r": "1/s", "f1": "1", "mu": "1", "B0": "kg/m^2", "B1": "Pa s/m"}
+_UNITS |= {"B2": "1", "B3": "Pa/m", "m": "kg/m^2", "k": "Pa/m"}
+
+
+@lru_cache(maxsize=64)
+def _response_function(model: Model) -> tuple[list[str], Any]:
+    known = response(model).as_dict()
+    return list(known), array_function([*model.parameters.values(), model.sigma_ss], list(known.values()))

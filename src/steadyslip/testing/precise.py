@@ -94,7 +94,7 @@ def precise_function(
                     "steadyslip.expressions.asinh_exp"
                 ) from error
             except ZeroDivisionError as error:
-                raise ContractViolation(f"{law!r}: an equation divides by zero at {numbers}") from error
+                raise ContractViolation(f"{law!r}: an equation divides by zero at {[shown(n) for n in numbers]}") from error
 
     return function
 

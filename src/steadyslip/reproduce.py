@@ -1,0 +1,244 @@
+"""The figures and numbers of Dupont & Bapna (1994), from this package's general route.
+
+Each number of the paper (or of its equations, evaluated to 18 digits) stands beside ours, which comes from
+the Model's critical stiffness, eigenvalues and boundaries and not from the closed forms of
+`steadyslip.paper`. Another figure is one more entry of `FIGURES`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip import figures
+from steadyslip.contact import InclinedSpring
+from steadyslip.drive import Steady
+from steadyslip.errors import SteadyslipError
+from steadyslip.figures import mass, style
+from steadyslip.friction import LinkerDieterich, RateState, Slip
+from steadyslip.linear import boundary, critical_stiffness, eigenvalues
+from steadyslip.slider import Slider
+from steadyslip.units import GPa, MPa, deg, m, s, um
+
+D_C = 1 * um
+V0 = 1 * um / s
+
+
+class OutputError(SteadyslipError, OSError):
+    """Results cannot be written where they were asked for."""
+
+
+def paper_rig(angle: float = -45 * deg) -> Slider:
+    """The paper's inclined spring (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
+
+    The paper gives neither v0 nor a stiffness; both are round numbers that no dimensionless result depends on.
+    """
+    rock = RateState(
+        a=0.0145,
+        b=0.0160,
+        d_c=D_C,
+        mu_ref=0.7,
+        v_ref=V0,
+        states=(),
+        evolution=Slip(),
+        regularised=False,
+        normal_memory=LinkerDieterich(alpha=0.56),
+    )
+    contact = InclinedSpring(preload=5 * MPa, angle=angle)
+    return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=Steady(V0))
+
+
+# --- the numbers ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of the paper beside ours.
+
+    Attributes
+    ----------
+    source : str
+        Equation of the paper.
+    quantity, unit : str
+    expected, found : float
+        The equation's number, and ours by the general route.
+    """
+
+    source: str
+    quantity: str
+    unit: str
+    expected: float
+    found: float
+
+    @property
+    def difference(self) -> float:
+        """Relative difference, |found/expected − 1|."""
+        return abs(self.found / self.expected - 1)
+
+    def cells(self) -> tuple[str, ...]:
+        """What a table shows, in the order of `PaperTable.header`."""
+        return (
+            self.source,
+            self.quantity,
+            self.unit,
+            f"{self.expected:.14g}",
+            f"{self.found:.14g}",
+            f"{self.difference:.1e}",
+        )
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """Rows of `paper_table`; prints itself, and as Markdown or CSV."""
+
+    rows: tuple[Row, ...]
+    header = ("source", "quantity", "unit", "paper", "steadyslip", "relative difference")
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __str__(self) -> str:
+        cells = [self.header, *(row.cells() for row in self.rows)]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]
+        return "\n".join(lines)
+
+    def markdown(self) -> str:
+        """The table in Markdown."""
+        lines = [self.header, ("---",) * len(self.header), *(row.cells() for row in self.rows)]
+        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+    def csv(self) -> str:
+        """The table as comma-separated values, numbers to full precision."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.header)
+        for row in self.rows:
+            writer.writerow([*row.cells()[:3], repr(row.expected), repr(row.found), repr(row.difference)])
+        return text.getvalue()
+
+
+# From eqs 25-28, 30 and 31 at 25 digits, with the paper's parameters; keys are spring angles in degrees.
+_KAPPA = {
+    -45: 0.00174418604651162791,
+    -30: 0.0016319053380718911,
+    0: 0.0015,
+    30: 0.00138782355737838403,
+    45: 0.00131578947368421053,
+}
+_KAPPA_WITH_MASS = {-45: 0.00203375760929717764, 30: 0.00295445091929826757}
+_BETA = {-45: 0.189964754254207028, 0: 0.32163376045133845, 45: 0.39276579888881556}
+_BETA_WITH_MASS = {-45: 0.157807333161539984, 30: 0.411491961525043945}
+_MASS_2 = {15: 0.100258458410265573, 30: 0.0484727441245512871, 45: 0.0295178571428571429}
+_MASS_1 = 0.003625
+_LOCK_UP = -55.0079798014413379  # degrees
+_STIFFNESS = 29069767441.8604651  # Pa/m at −45 degrees
+_M_STAR = 0.01
+
+
+def paper_table() -> PaperTable:
+    """The paper's numbers beside ours, with the relative difference of each."""
+    rows = [Row("eq. 25", _at("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg))))]
+    rows += [Row("eq. 28", _at("κ_cr", angle), "1", value, _kappa(angle)) for angle, value in _KAPPA.items()]
+    rows += [
+        Row("eq. 28", _at("κ_cr", angle, _M_STAR), "1", value, _kappa(angle, _M_STAR))
+        for angle, value in _KAPPA_WITH_MASS.items()
+    ]
+    rows += [Row("eq. 26", _at("β d_c/v0", angle), "1", value, _frequency(angle)) for angle, value in _BETA.items()]
+    rows += [
+        Row("eq. 26 with mass", _at("β d_c/v0", angle, _M_STAR), "1", value, _frequency(angle, _M_STAR))
+        for angle, value in _BETA_WITH_MASS.items()
+    ]
+    lock_up = next(edge.value for edge in boundary(paper_rig(), "contact.angle") if edge.kind == "lock-up")
+    rows.append(Row("eq. 27", "lock-up angle", "deg", _LOCK_UP, lock_up / deg))
+    crossing = mass.mass_of_equal_stiffness(paper_rig(), figures.ANGLES)
+    rows.append(Row("eq. 30", "m*_cr1", "1", _MASS_1, crossing))
+    rows += [
+        Row("eq. 31", _at("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg))
+        for angle, value in _MASS_2.items()
+    ]
+    return PaperTable(tuple(rows))
+
+
+def _at(symbol: str, angle: int, m_star: float | None = None) -> str:
+    inertia = "" if m_star is None else f", m* = {m_star:g}"
+    return f"{symbol} at ψ = {angle}°{inertia}".replace("-", "−")
+
+
+def _kappa(angle: float, m_star: float = 0.0) -> float:
+    return float(mass.dimensionless_critical_stiffness(paper_rig(), angle * deg, m_star))
+
+
+def _frequency(angle: float, m_star: float = 0.0) -> float:
+    """β d_c/v0 from the eigenvalues at the critical stiffness."""
+    heavy = mass.mass_at(paper_rig(), angle * deg, m_star)
+    rig = paper_rig(angle * deg).with_values({"slider.mass": float(heavy)})
+    found = eigenvalues(rig, {"slider.stiffness": critical_stiffness(rig)})
+    return float(np.nanmax(found.imag)) * D_C / V0
+
+
+# --- the figures ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of the paper: name of its files, and how to draw it on given Axes."""
+
+    name: str
+    draw: Callable[[Any], Any]
+
+
+def _figure_7(ax: Any) -> Any:
+    return figures.critical_stiffness_against_mass(paper_rig(), ax=ax)
+
+
+FIGURES = (PaperFigure("fig7", _figure_7),)
+
+
+def reproduce(folder: str | PathLike[str]) -> list[Path]:
+    """Write the paper's figures and the table of its numbers.
+
+    Parameters
+    ----------
+    folder : path
+        Where to write; created if missing. Files of the same names are replaced.
+
+    Returns
+    -------
+    list of Path
+        ``fig7.png``, ``fig7.svg``, ``paper-numbers.md``, ``paper-numbers.csv``.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be created or written to.
+    """
+    folder = Path(folder)
+    table = paper_table()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        written = []
+        for figure in FIGURES:
+            written += style.write(figure.draw(style.unmanaged_axes()), folder / figure.name)
+        for path, text in (
+            (folder / "paper-numbers.md", table.markdown()),
+            (folder / "paper-numbers.csv", table.csv()),
+        ):
+            path.write_text(text, encoding="utf-8", newline="\n")
+            written.append(path)
+    except OSError as error:
+        raise OutputError(
+            f"folder: got {str(folder)!r}, which cannot be written ({error.strerror or error}); "
+            "allowed: a folder, existing or new, where files may be created"
+        ) from error
+    return written

@@ -89,7 +89,8 @@ def test_help_and_analyze_stay_light():
         "import sys; from steadyslip.cli import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"
-        "print(sorted({'numba','matplotlib','xarray','pandas','pint','scipy.optimize','scipy.signal'} & set(sys.modules)))"
+        "heavy = {'numba','matplotlib','xarray','pandas','pint','scipy.optimize','scipy.signal'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
     )
     for arguments in (["--help"], ["analyze", str(EXAMPLE)]):
         done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)

@@ -137,7 +137,7 @@ def numbers_of(rig, expressions):
 def ingredients(law, velocity, sigma):
     """f, S, r, f1, μ by differentiating the law."""
     return numbers_of(
-        rig_with(law, velocity, sigma), lambda m: [getattr(response(m), n) for n in "f S r f1 mu".split()]
+        rig_with(law, velocity, sigma), lambda m: [getattr(response(m), n) for n in ("f", "S", "r", "f1", "mu")]
     )
 
 
@@ -283,7 +283,8 @@ def test_prakash_clifton_distance_is_d_c_unless_given():
     law = ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton())
     same = ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton(slip_distance=ONE["d_c"]))
     angled = ss.InclinedSpring(preload=5e6, angle=0.5)
-    np.testing.assert_array_equal(polynomial(rig_with(law, contact=angled)), polynomial(rig_with(same, contact=angled)))
+    found, expected = (polynomial(rig_with(one, contact=angled)) for one in (law, same))
+    np.testing.assert_allclose(found, expected, rtol=1e-13)
 
 
 # --- closed forms and limits, theory 4 --------------------------------------------------------------
@@ -291,9 +292,11 @@ def test_prakash_clifton_distance_is_d_c_unless_given():
 
 @pytest.mark.parametrize("evolution", EVOLUTIONS)
 def test_critical_stiffness_at_constant_normal_stress(evolution):
-    """σ(b − a)/d_c for every one-state law, Nagata's too."""
+    """σ(b − a)/d_c; k_cr = −rS, so Nagata's slower relaxation divides it by 1 + c_N."""
     law = ss.RateState(**ROCK, **ONE, evolution=evolution)
-    np.testing.assert_allclose(ss.critical_stiffness(rig_with(law)), 5e6 * (0.016 - 0.0145) / 1e-6, rtol=1e-12)
+    share = 1 + getattr(evolution, "c_nagata", 0.0)
+    expected = 5e6 * (0.016 - 0.0145) / 1e-6 / share
+    np.testing.assert_allclose(ss.critical_stiffness(rig_with(law)), expected, rtol=1e-12)
 
 
 def test_two_state_critical_stiffness():

@@ -91,10 +91,10 @@ def _stiffnesses(rig: Slider, own: float, given: Any) -> Any:
         if k[0] <= 0:
             raise ParameterError([Problem("stiffness", f"got {k[0]!r}; allowed: numbers > 0 in Pa/m")])
         return k
-    centre = float(critical_stiffness(rig))
-    if not centre > 0:
-        centre = own
-    if not centre > 0:
+    # the gain of a controller acts as a stiffness, so it is a scale too
+    choices = (float(critical_stiffness(rig)), own, float(rig.drive.proportional()))
+    centre = next((size for size in choices if size > 0), None)
+    if centre is None:
         raise NotAvailable("the rig has no critical stiffness and its own is zero; pass stiffness, an array in Pa/m")
     return np.geomspace(centre / _HALF_SPAN, centre * _HALF_SPAN, 801)
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.errors import NoSteadySliding
+from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.expressions import array_function
 from steadyslip.model import Model
 from steadyslip.quantities import shown
@@ -157,6 +157,14 @@ def steady_stress(values: Values) -> Any:
     return np.where((slope < 1) & (np.asarray(sigma) > 0), sigma, np.nan)[()]
 
 
+def out_of_range(values: Values) -> Any:
+    """Where the equation for σss leaves the range of floating point, so that nothing can be said."""
+    equation = steady_equation(values.model)
+    if equation.parts is None:
+        return np.zeros(values.shape, dtype=bool)
+    return ~np.isfinite(sum(np.broadcast_to(part, values.shape) for part in equation.parts(*values.arguments)))
+
+
 def steady_stress_roots(values: Values) -> list[float]:
     """All positive σss of a single rig, rising."""
     equation = steady_equation(values.model)
@@ -195,7 +203,15 @@ def _search(residual: Callable[[Any], Any]) -> list[float]:
 
 
 def explain_absence(rig: Slider, values: Values) -> NoSteadySliding:
-    """The exception that says why a rig has no steady sliding."""
+    """The exception that says why a rig has no steady sliding.
+
+    Raises
+    ------
+    NotAvailable
+        If the numbers leave the range of floating point.
+    """
+    if np.any(out_of_range(values)):
+        raise NotAvailable(OUT_OF_RANGE)
     equation = steady_equation(values.model)
     if equation.parts is None:
         return NoSteadySliding(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.errors import NoSteadySliding, NotAvailable
+from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Boundary, Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
@@ -21,7 +21,6 @@ from steadyslip.values import Values, axial_projection, model_values
 if TYPE_CHECKING:
     import sympy as sp
 
-_OUT_OF_RANGE = "the numbers of this rig leave the range of floating point; check the sizes of its parameters"
 _ON_THE_EDGE = 1e-9  # growth per radian below which a verdict is within rounding of the boundary
 
 
@@ -171,13 +170,13 @@ def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:
     """Everything that follows from the characteristic polynomial."""
     c = characteristic(values)
     if not np.all(np.isfinite(c)):
-        raise NotAvailable(_OUT_OF_RANGE)
+        raise NotAvailable(OUT_OF_RANGE)
     bad = bool(ill_posed(c))
     while len(c) > 2 and c[-1] == 0:
         c = c[:-1]
     eigenvalues = roots(c)
     if not np.all(np.isfinite(eigenvalues)):
-        raise NotAvailable(_OUT_OF_RANGE)
+        raise NotAvailable(OUT_OF_RANGE)
     numbers: dict[str, Any] = {
         "stable": bool(is_hurwitz(c)) and not bad,
         "eigenvalues": tuple(complex(s) for s in eigenvalues),

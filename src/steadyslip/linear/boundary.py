@@ -20,7 +20,7 @@ from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
 from steadyslip.quantities import shown, unit
 from steadyslip.records import Parameter
 from steadyslip.slider import Slider
-from steadyslip.steady import explain_absence, steady_stress
+from steadyslip.steady import explain_absence, out_of_range, steady_stress
 from steadyslip.values import Values, checked_array, model_values
 
 _PER_DECADE = 40
@@ -248,7 +248,8 @@ class _Search:
         exists = np.isfinite(steady_stress(values))
         c = characteristic(values)
         verdict = np.where(is_hurwitz(c), STABLE, UNSTABLE)
-        return np.where(exists, np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN), ABSENT)
+        absent = np.where(out_of_range(values), UNKNOWN, ABSENT)
+        return np.where(exists, np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN), absent)
 
     def growth(self, x: Any) -> Any:
         c = characteristic(self.values(np.asarray(x, dtype=float)))

@@ -71,10 +71,11 @@ def _strength_solver(said: Statement) -> Callable[..., float]:
     def solve(v: float, sigma: float, memory: Any, guess: float) -> float:
         tau = guess
         for _ in range(50):
-            strength, slope = (float(x) for x in function(v, sigma, *memory, tau))
+            with np.errstate(all="ignore"):
+                strength, slope = (float(x) for x in function(v, sigma, *memory, tau))
             step = (strength - tau) / (1 - slope)
             tau += step
-            if not abs(step) > 1e-14 * abs(tau):
+            if not abs(step) > 1e-14 * abs(tau):  # NaN returns too, and is reported by the caller
                 return tau
         raise ContractViolation(
             f"{said.law!r}: strength(v, σ, memory, tau) = tau cannot be solved at v = {v}, σ = {sigma}"

@@ -52,10 +52,10 @@ def stated(law: Record, what: str, method: Callable[..., Any], *arguments: Any) 
     """Call a law's method with symbols and turn what comes back into SymPy, or say why that fails."""
     try:
         result = method(*arguments)
-    except (TypeError, ValueError, AttributeError, sp.SympifyError) as error:
+    except (TypeError, ValueError, AttributeError, LookupError, sp.SympifyError) as error:
         raise ContractViolation(
-            f"{law!r}: {what} does not accept SymPy symbols ({error}); write it with arithmetic and functions of "
-            "sympy (sympy.log, not math.log or numpy.log), and branches as sympy.Piecewise"
+            f"{law!r}: {what} does not accept SymPy symbols ({type(error).__name__}: {error}); write it with "
+            "arithmetic and functions of sympy (sympy.log, not math.log or numpy.log), and branches as sympy.Piecewise"
         ) from error
     if isinstance(result, (tuple, list)):
         return tuple(sp.sympify(item) for item in result)
@@ -82,19 +82,28 @@ def precise_function(
     names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(arguments)}
     renamed = [sp.sympify(e).xreplace(names) for e in expressions]
     own = {"asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y))}
-    compiled = sp.lambdify(list(names.values()), renamed, modules=[own, "mpmath"])
+
+    def unusable(error: Exception) -> ContractViolation:
+        return ContractViolation(
+            f"{law!r}: an equation cannot be evaluated ({str(error).splitlines()[0]}); allowed: elementary functions "
+            "of sympy and steadyslip.expressions.asinh_exp"
+        )
+
+    try:
+        compiled = sp.lambdify(list(names.values()), renamed, modules=[own, "mpmath"])
+    except (NotImplementedError, ValueError) as error:
+        raise unusable(error) from error
 
     def function(*numbers: Any) -> list[mpmath.mpf]:
         with mpmath.workdps(DIGITS):
             try:
                 return [mpmath.mpmathify(value) for value in compiled(*(mpmath.mpf(n) for n in numbers))]
             except (NameError, TypeError) as error:
-                raise ContractViolation(
-                    f"{law!r}: an equation cannot be evaluated ({error}); allowed: elementary functions of sympy and "
-                    "steadyslip.expressions.asinh_exp"
-                ) from error
+                raise unusable(error) from error
             except ZeroDivisionError as error:
-                raise ContractViolation(f"{law!r}: an equation divides by zero at {[shown(n) for n in numbers]}") from error
+                raise ContractViolation(
+                    f"{law!r}: an equation divides by zero at {[shown(n) for n in numbers]}"
+                ) from error
 
     return function
 
@@ -103,17 +112,22 @@ def disagreement(function: Callable[[Any], Any], derivative: Any, at: Any, scale
     """A derivative against central differences: the central difference, and by how much the two differ too much.
 
     The error of a central difference with step h is c h² + O(h⁴); from steps h and h/2 the error of the
-    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed.
+    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed. The
+    bend f(x+h) − 2f(x) + f(x−h) over h must halve with h, else there is a kink, where a symmetric difference
+    may agree by chance.
     """
     with mpmath.workdps(DIGITS):
         step = mpmath.mpf("1e-8") * scale
+        middle = function(at)
         values = {d: function(at + d * step) for d in (-1.0, -0.5, 0.5, 1.0)}
         wide = (values[1.0] - values[-1.0]) / (2 * step)
         narrow = (values[0.5] - values[-0.5]) / step
         size = max(abs(value) for value in values.values()) + abs(derivative * at)
         rounding = 10**6 * mpmath.eps * size / step  # a million: the terms inside may be larger than the value
-        excess = abs(narrow - derivative) - abs(wide - narrow) - rounding
-        return narrow, excess
+        wide_bend = abs(values[1.0] - 2 * middle + values[-1.0]) / step
+        narrow_bend = abs(values[0.5] - 2 * middle + values[-0.5]) / (step / 2)
+        error = abs(narrow - derivative) - abs(wide - narrow)
+        return narrow, max(error, narrow_bend - mpmath.mpf("0.6") * wide_bend) - rounding
 
 
 def eigenvalues(matrix: Any) -> list[Any]:

@@ -61,8 +61,13 @@ class Statement:
         self.strength = stated(law, "strength", copy.strength, *present)
         self.rates = stated(law, "rates", copy.rates, *present)
         self.steady_memory = stated(law, "steady_memory", copy.steady_memory, self.v, self.sigma)
-        self.steady_strength = stated(law, "steady_strength", copy.steady_strength, self.v, self.sigma)
+        self._copy = copy
         self.inputs = (self.v, self.sigma, *self.memory, self.tau)
+
+    @cached_property
+    def steady_strength(self) -> sp.Expr:
+        """τss(v, σ); stated last, because by default it uses the memory variables stated before."""
+        return stated(self.law, "steady_strength", self._copy.steady_strength, self.v, self.sigma)
 
     def function(self, *expressions: sp.Expr) -> Callable[..., list[mpmath.mpf]]:
         """The expressions as a function of v, σ, memory variables, τ."""

@@ -157,6 +157,11 @@ FRICTION_FAULTS = [
         {"strength": lambda self, v, s, y, t: s * (0.7 + self.a * sp.log(v / 1e-6) + sp.sqrt(1 - s / 6e6))},
         "no finite value after a sudden change of normal stress",
     ),
+    (
+        "check_signs",
+        {"strength": lambda self, v, s, y, t: s * (0.7 + self.a * sp.log(v / 1e-6) + sp.sqrt(1 - s / 6e6))},
+        "the strength is nan Pa at v = 1.0e-9 m/s, σ = 5.0e.7 Pa",
+    ),
     ("check_two_routes", {"steady_strength": lambda self, v, s: 0.7 * s}, "coefficient of s.1 .*different laws"),
     ("check_friction_round_trip", {"__post_init__": doubled}, "a rig file changes it"),
 ]

@@ -114,10 +114,9 @@ def parameter(
     return field(default=default, metadata={_ROLE: role})
 
 
-def option(*choices: Any, doc: str, default: Any = MISSING) -> Any:
-    """Declare a choice; the first is the default unless another is given."""
-    chosen = choices[0] if default is MISSING else default
-    return field(default=chosen, metadata={_ROLE: Option(choices, doc)})
+def option(*choices: Any, doc: str, default: Any) -> Any:
+    """Declare a choice between words, or between true and false."""
+    return field(default=default, metadata={_ROLE: Option(choices, doc)})
 
 
 def part(family: type[Record], doc: str, *, default: Any = MISSING, inline: bool = False) -> Any:
@@ -125,9 +124,9 @@ def part(family: type[Record], doc: str, *, default: Any = MISSING, inline: bool
     return field(default=default, metadata={_ROLE: Part(family, doc, inline)})
 
 
-def parts(family: type[Record], doc: str) -> Any:
-    """Declare a field that holds a tuple of records, empty by default."""
-    return field(default=(), metadata={_ROLE: Part(family, doc, many=True)})
+def parts(family: type[Record], doc: str, *, default: tuple[()]) -> Any:
+    """Declare a field that holds a tuple of records; the default is the empty one."""
+    return field(default=default, metadata={_ROLE: Part(family, doc, many=True)})
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option, part, parts))

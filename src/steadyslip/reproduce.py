@@ -46,9 +46,7 @@ def paper_rig(angle: float = -45 * deg) -> Slider:
         d_c=D_C,
         mu_ref=0.7,
         v_ref=V0,
-        states=(),
         evolution=Slip(),
-        regularised=False,
         normal_memory=LinkerDieterich(alpha=0.56),
     )
     contact = InclinedSpring(preload=5 * MPa, angle=angle)

@@ -50,7 +50,7 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
     crank_angle: float = parameter("rad", turn, "crank angle from the slide line")
     crank_radius: float = parameter("m", positive, "crank radius")
     rod_length: float = parameter("m", positive, "connecting-rod length, longer than the crank")
-    stroke: str = option("pull", "push", doc="whether the rod pulls the slider or pushes it")
+    stroke: str = option("pull", "push", doc="whether the rod pulls the slider or pushes it", default="pull")
 
     def inconsistencies(self) -> Iterator[Problem]:
         yield from super().inconsistencies()
@@ -149,7 +149,7 @@ class LeadScrew(ContactLaw, name="lead-screw"):
 
     lead_angle: float = parameter("rad", acute, "lead angle β of the thread")
     axial_load: float = parameter("Pa", positive, "axial load W per unit thread area")
-    direction: str = option("raising", "lowering", doc="whether the screw raises or lowers the load")
+    direction: str = option("raising", "lowering", doc="whether the screw raises or lowers the load", default="raising")
 
     def load(self) -> Expression | None:
         return self.axial_load / sp.cos(self.lead_angle)

@@ -144,5 +144,5 @@ def _finish(ax: Axes, x: Axis, y: Axis) -> None:
     ax.set_ylim(y.shown(y.low), y.shown(y.high))
     ax.set_xlabel(x.label)
     ax.set_ylabel(y.label)
-    # above the axes, where it hides no region
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.01), ncols=2, frameon=False, borderaxespad=0.2)
+    # above the axes, where it hides no region, with room for a power of ten on the axis
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.04), ncols=2, frameon=False, borderaxespad=0.2)

@@ -18,6 +18,7 @@ from steadyslip.values import checked_array, model_values
 
 _HALF_SPAN = 1e2  # two decades to each side
 _VIEW = 3.0  # half the width of the view in sizes of the eigenvalues that decide stability
+_FAST = 1e3  # an eigenvalue faster than the slowest by more would leave the others on one spot
 
 
 def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Axes:
@@ -80,8 +81,10 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         mine.real, mine.imag, "o", color=VERMILION, markeredgecolor=BLACK, markersize=7, zorder=4, label=_own(ax, mine)
     )
     ax.set_xlabel("growth rate Re s (1/s)")
+    ax.ticklabel_format(style="sci", scilimits=(-3, 4))
+    ax.locator_params(axis="x", nbins=6)
     ax.set_ylabel("angular frequency Im s (rad/s)")
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.01), frameon=False, borderaxespad=0.2)
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.04), frameon=False, borderaxespad=0.2)
     return ax
 
 
@@ -115,9 +118,16 @@ def _crossings(rig: Slider, k: Any) -> tuple[list[float], list[Any]]:
 
 
 def _set_view(ax: Axes, roots: Any, mine: Any, crossings: list[Any]) -> None:
-    """Limits around the origin, the crossings and the rig's slowest-decaying eigenvalues."""
-    sizes = [abs(mine[0]), *(abs(at[0]) for at in crossings)]
-    size = _VIEW * (max(sizes) or float(np.abs(mine).max()) or 1.0)
+    """Limits around the origin and what decides stability: the crossings and the slowest eigenvalue.
+
+    Without a crossing, around all eigenvalues of the rig that grow or are not far faster than its slowest.
+    """
+    own = np.abs(mine)
+    if crossings:
+        size = _VIEW * max(own[0], *(abs(at[0]) for at in crossings))
+    else:
+        slowest = own[own > 0].min(initial=np.inf)
+        size = 1.3 * own[(own <= _FAST * slowest) | (mine.real > 0)].max() or 1.0
     seen = roots.real[np.abs(roots) < size]
     ax.set_xlim(-size, min(size, max(1.2 * seen.max(initial=0.0), 0.25 * size)))
     ax.set_ylim(-size, size)
@@ -129,8 +139,8 @@ def _own(ax: Axes, mine: Any) -> str:
     outside = mine[(mine.real < left) | (mine.real > right) | (np.abs(mine.imag) > top)]
     if not outside.size:
         return "this rig"
-    return "this rig, and out of view s = " + ", ".join(map(_number, outside)) + " 1/s"
+    return "this rig; out of view: " + ", ".join(_number(s) for s in outside if s.imag >= 0) + " 1/s"
 
 
 def _number(s: complex) -> str:
-    return (f"{s.real:.3g}" + (f"{s.imag:+.3g}i" if s.imag else "")).replace("-", "−")
+    return (f"{s.real:.3g}" + (f" ± {s.imag:.3g}i" if s.imag else "")).replace("-", "−")

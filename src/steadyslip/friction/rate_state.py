@@ -37,9 +37,9 @@ class RateState(FrictionLaw, name="rate-state"):
     d_c: float | None = parameter("m", positive, "characteristic slip distance (one state)", default=None)
     mu_ref: float = parameter("1", positive, "friction coefficient in steady sliding at v_ref")
     v_ref: float = parameter("m/s", positive, "reference velocity v*")
-    states: tuple[State, ...] = parts(State, "several states, each with its own b and d_c")
+    states: tuple[State, ...] = parts(State, "several states, each with its own b and d_c", default=())
     evolution: Evolution = part(Evolution, "evolution of the state", default=Slip(), inline=True)
-    regularised: bool = option(False, True, doc="regularised at low velocity (asinh form)")
+    regularised: bool = option(False, True, doc="regularised at low velocity (asinh form)", default=False)
     normal_memory: NormalMemory = part(NormalMemory, "memory of normal stress", default=NoMemory())
 
     def inconsistencies(self) -> Iterator[Problem]:

@@ -78,7 +78,7 @@ def require_known_symbols(law: Record, what: str, expression: sp.Expr, allowed: 
 def precise_function(
     law: Record, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]
 ) -> Callable[..., list[mpmath.mpf]]:
-    """A function of numbers that returns the expressions' values to fifty digits."""
+    """A function of numbers that returns the expressions' values to fifty digits, NaN where they are not real."""
     names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(arguments)}
     renamed = [sp.sympify(e).xreplace(names) for e in expressions]
     own = {"asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y))}
@@ -97,13 +97,14 @@ def precise_function(
     def function(*numbers: Any) -> list[mpmath.mpf]:
         with mpmath.workdps(DIGITS):
             try:
-                return [mpmath.mpmathify(value) for value in compiled(*(mpmath.mpf(n) for n in numbers))]
+                values = [mpmath.mpmathify(value) for value in compiled(*(mpmath.mpf(n) for n in numbers))]
             except (NameError, TypeError) as error:
                 raise unusable(error) from error
             except ZeroDivisionError as error:
                 raise ContractViolation(
                     f"{law!r}: an equation divides by zero at {[shown(n) for n in numbers]}"
                 ) from error
+            return [mpmath.nan if isinstance(value, mpmath.mpc) else value for value in values]  # log of -1
 
     return function
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.linear import formula as linear_formula
-from steadyslip.linear.boundary import Boundary, Margin, margins, present_zeros
+from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
+from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
 from steadyslip.slider import Slider
 from steadyslip.steady import SteadySliding, steady_states

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from steadyslip.linear import paper
-from steadyslip.linear.boundary import Boundary, Margin, boundary, margins
+from steadyslip.linear.boundary import Margin, boundary, margins
 from steadyslip.linear.formula import formula
 from steadyslip.linear.response import Response, small_signal
+from steadyslip.linear.search import Boundary
 from steadyslip.linear.state_space import state_space, to_control
 from steadyslip.linear.stiffness import critical_stiffness, eigenvalues, growth_rate, stable_stiffness
 

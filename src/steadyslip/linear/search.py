@@ -1,0 +1,236 @@
+"""The scan of one parameter for edges of stability.
+
+The parameter is sampled over its range; where the status (stable, unstable, no steady sliding) of two samples
+differs, the change is bracketed and narrowed to rounding. Extrema of the growth rate between samples are
+followed, so that a narrow window is not stepped over. For the stiffness itself the edges are exact (theory 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.errors import NoSteadySliding
+from steadyslip.linear.linearise import linearise
+from steadyslip.linear.polynomials import is_hurwitz, roots
+from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
+from steadyslip.quantities import shown, unit
+from steadyslip.slider import Slider
+from steadyslip.steady import explain_absence, out_of_range, steady_stress
+from steadyslip.values import Values, model_values
+
+_PER_DECADE = 40
+_DECADES = 6
+_LINEAR = 721
+_SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
+
+ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)  # unknown: beyond the range of floating point
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """One value of a parameter at which stability changes.
+
+    Attributes
+    ----------
+    parameter : str
+        Dotted name.
+    value : float
+        SI units; the middle of `bracket`.
+    bracket : tuple of float
+        Neighbouring values with different status.
+    kind : str
+        ``oscillatory`` (a pair of eigenvalues crosses at ±iβ), ``divergence`` (one crosses at zero),
+        ``ill-posed`` (the effective mass or direct effect changes sign), ``lock-up``, ``lift-off`` or
+        ``no solution`` (steady sliding ceases to exist).
+    angular_frequency : float
+        β in rad/s, 0 unless oscillatory.
+    stable : str
+        On which side steady sliding is stable: ``above``, ``below`` or ``neither``.
+    unit : str
+    """
+
+    parameter: str
+    value: float
+    bracket: tuple[float, float]
+    kind: str
+    angular_frequency: float
+    stable: str
+    unit: str
+
+    def __str__(self) -> str:
+        text = f"{self.parameter} = {shown(self.value, self.unit, 6)}: {self.kind}"
+        if self.kind == "oscillatory":
+            text += f", period {shown(2 * np.pi / self.angular_frequency, 's')}"
+        return f"{text}, stable {self.stable}" if self.stable != "neither" else text
+
+
+class Search:
+    """Scanning one parameter of one rig."""
+
+    def __init__(self, rig: Slider, name: str, present: Iterable[str], branch: int) -> None:
+        self.rig, self.name, self.present, self.branch = rig, name, tuple(present), branch
+        address = rig.parameters()[name]
+        self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
+
+    def values(self, x: Any) -> Values:
+        return model_values(self.rig, {self.name: x}, self.present, self.branch)
+
+    # -- the range
+
+    def grid(self, between: tuple[float, float] | None) -> Any:
+        """Sample values, rising; the rig's own value is one of them."""
+        if between is not None:
+            return self._grid_between(*between)
+        domain = self.role.domain
+        if np.isfinite(domain.high):
+            inset = 1e-9 * (domain.high - domain.low)
+            low = domain.low if domain.low_allowed else domain.low + inset
+            high = domain.high if domain.high_allowed else domain.high - inset
+            samples = np.linspace(low, high, _LINEAR)
+        else:
+            size = abs(self.value) or self.natural_size()
+            count = 2 * _DECADES * _PER_DECADE + 1
+            samples = size * np.geomspace(10.0**-_DECADES, 10.0**_DECADES, count)
+            if domain.low < 0:
+                samples = np.concatenate([-samples[::-1], [0.0], samples])
+            elif domain.low_allowed and not self.role.adds_state:
+                samples = np.concatenate([[0.0], samples])
+        return np.unique(np.append(samples, self.value))
+
+    def _grid_between(self, low: float, high: float) -> Any:
+        samples = [np.linspace(low, high, _LINEAR)]
+        for a, b, sign in ((low, high, 1.0), (-high, -low, -1.0)):  # even in logarithm too
+            if b > 0:
+                a = max(a, b * 1e-12)
+                decades = np.log10(b / a)
+                samples.append(sign * np.geomspace(a, b, int(_PER_DECADE * decades) + 2)[1:-1])
+        return np.unique(np.concatenate(samples))
+
+    def natural_size(self) -> float:
+        """A size for a parameter that is zero, from σss, v0 and the slip distance v0/r."""
+        values = model_values(self.rig, None, self.present, self.branch)
+        sigma, v0 = float(steady_stress(values)), values.named()["drive.velocity"]
+        length = v0 / (_decay_rate(values, sigma) or 1.0)
+        _, d = unit(self.role.unit)
+        by_velocity = -2 * d.mass - d.time
+        sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
+        size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
+        return float(size) if np.isfinite(size) and size > 0 else 1.0
+
+    # -- status along the parameter
+
+    def status(self, x: Any) -> Any:
+        values = self.values(np.asarray(x, dtype=float))
+        exists = np.isfinite(steady_stress(values))
+        c = characteristic(values)
+        verdict = np.where(is_hurwitz(c), STABLE, UNSTABLE)
+        absent = np.where(out_of_range(values), UNKNOWN, ABSENT)
+        return np.where(exists, np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN), absent)
+
+    def growth(self, x: Any) -> Any:
+        c = characteristic(self.values(np.asarray(x, dtype=float)))
+        found = roots(c).real
+        return np.max(np.where(np.isnan(found), -np.inf, found), axis=-1)
+
+    def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
+        grid = self.grid(between)
+        with np.errstate(all="ignore"):
+            if self.name == "slider.stiffness":
+                return self._of_stiffness(grid[0], grid[-1])
+            grid = self._with_hidden_windows(grid)
+            status = self.status(grid)
+            known = (status[1:] != UNKNOWN) & (status[:-1] != UNKNOWN)
+            at = np.flatnonzero((status[1:] != status[:-1]) & known)
+            low, high = self._narrowed(grid[at], grid[at + 1], status[at])
+            return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
+
+    def _with_hidden_windows(self, grid: Any) -> Any:
+        """Add samples inside windows that lie between two samples, found from extrema of the growth rate."""
+        status, growth = self.status(grid), self.growth(grid)
+        middle = growth[1:-1]
+        towards_zero = np.where(
+            middle > 0,
+            (middle <= growth[:-2]) & (middle <= growth[2:]),
+            (middle >= growth[:-2]) & (middle >= growth[2:]),
+        )
+        same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & np.isin(status[1:-1], (STABLE, UNSTABLE))
+        at = np.flatnonzero(towards_zero & same & np.isfinite(middle)) + 1
+        if not at.size:
+            return grid
+        low, high = grid[at - 1], grid[at + 1]
+        sign = np.where(growth[at] > 0, 1.0, -1.0)
+        extra: list[Any] = []
+        for _ in range(4):
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
+            g = sign[:, None] * self.growth(x.ravel()).reshape(x.shape)
+            best = np.clip(np.argmin(np.where(np.isnan(g), np.inf, g), axis=-1), 1, _SPLIT - 1)
+            row = np.arange(len(best))
+            extra.append(x[row, best])
+            low, high = x[row, best - 1], x[row, best + 1]
+        return np.unique(np.concatenate([grid, *extra]))
+
+    def _narrowed(self, low: Any, high: Any, low_status: Any) -> tuple[Any, Any]:
+        """Brackets down to rounding, all at once; keeps the lowest change inside each."""
+        for _ in range(12):
+            if not len(low):
+                break
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
+            x[:, -1] = high
+            status = self.status(x.ravel()).reshape(x.shape)
+            first = np.argmax(status != low_status[:, None], axis=-1)
+            first = np.where(first == 0, _SPLIT, first)
+            row = np.arange(len(low))
+            low, high = x[row, first - 1], x[row, first]
+        return low, high
+
+    def _described(self, low: float, high: float) -> Boundary:
+        below, above = (int(s) for s in self.status(np.array([low, high])))
+        kind, frequency = self._kind(low, high, below, above)
+        stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
+        middle = low + 0.5 * (high - low)
+        return Boundary(self.name, float(middle), (float(low), float(high)), kind, frequency, stable, self.role.unit)
+
+    def _kind(self, low: float, high: float, below: int, above: int) -> tuple[str, float]:
+        if ABSENT in (below, above):
+            outside = low if below == ABSENT else high
+            values = self.values(outside)
+            reason: NoSteadySliding = explain_absence(self.rig.with_values({self.name: outside}), values)
+            return reason.condition, 0.0
+        c = characteristic(self.values(np.array([low, high])))
+        if ill_posed(c)[0] != ill_posed(c)[1]:
+            return "ill-posed", 0.0
+        if c[0, 0] * c[1, 0] <= 0:
+            return "divergence", 0.0
+        found = roots(c)[0]
+        found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]
+        if not found.size:
+            return "divergence", 0.0
+        return "oscillatory", float(np.abs(found[np.argmax(found.real)].imag))
+
+    def _of_stiffness(self, low: float, high: float) -> tuple[Boundary, ...]:
+        """The exact edges of the stable set."""
+        edges = general_set(model_values(self.rig, None, self.present, self.branch))
+        keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
+        return tuple(
+            self._stiffness_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
+        )
+
+    def _stiffness_edge(self, k: float, frequency: float, intervals: Any) -> Boundary:
+        kind = "divergence" if frequency == 0 else "ill-posed" if np.isinf(frequency) else "oscillatory"
+        stable = "above" if np.any(intervals[:, 0] == k) else "below"
+        bracket = (float(np.nextafter(k, 0)), float(np.nextafter(k, np.inf)))
+        beta = frequency if kind == "oscillatory" else 0.0
+        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit)
+
+
+def _decay_rate(values: Values, sigma: float) -> float:
+    """Fastest decay rate of the memory (1/s), zero without memory."""
+    linear = linearise(values.model)
+    numbers = dict(zip(values.model.parameters.values(), values.arguments, strict=True))
+    numbers[values.model.sigma_ss] = sigma
+    own = [row[s].xreplace(numbers) for s, row in linear.rates.items() if s.name not in ("x", "I_x")]
+    return max((abs(float(rate)) for rate in own if rate.is_number), default=0.0)

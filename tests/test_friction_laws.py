@@ -227,7 +227,7 @@ def test_lugre_closed_forms(v, sigma0, sigma1, viscous, static):
     rounding = 1e-13 * (1 + (v / v_s) ** 2)
     size = [sigma * (viscous + sigma1 * (1 + v * abs(slope) / g)), sigma * (viscous + abs(slope)), sigma0 * v / g, 1, 1]
     found = ingredients(law, v, sigma)
-    assert np.all(np.abs(np.subtract(found, expected)) <= rounding * np.array(size))
+    assert np.all(np.abs(np.subtract(found, expected)) <= rounding * np.array(size) + 1e-200)  # underflow aside
 
 
 def test_lugre_weakening_at_once():

@@ -91,6 +91,31 @@ def _quadratic(c: Array) -> ComplexArray:
     return np.stack([first, second], axis=-1)
 
 
+def damping_measures(s: ComplexArray) -> Array:
+    """Scale-free distance of eigenvalues (..., n) from the imaginary axis, (2, ...).
+
+    First, −(s_i + s_j)/√(s_i s_j) of the least damped pair, conjugate or real of one sign: it vanishes where an
+    oscillation sets in, and is smooth where the pair turns from real to complex. Second, −s over the
+    geometric mean of all |s| for the least damped real eigenvalue: it vanishes where one crosses zero.
+    NaN where there is no such pair or eigenvalue.
+    """
+    n = s.shape[-1]
+    real = s.imag == 0
+    with np.errstate(all="ignore"):
+        i, j = np.triu_indices(n, 1)
+        first, second = s[..., i], s[..., j]
+        product = first * second
+        paired = (first == np.conj(second)) | (real[..., i] & real[..., j] & (product.real > 0))
+        pairs = np.where(paired, -(first + second).real / np.sqrt(np.abs(product)), np.inf)
+        sizes = np.log(np.abs(s))
+        present = np.isfinite(sizes)
+        total = np.sum(np.where(present, sizes, 0.0), axis=-1, keepdims=True)
+        mean = np.exp(total / np.maximum(present.sum(axis=-1, keepdims=True), 1))
+        single = np.where(real, -s.real / mean, np.inf)
+    least = np.stack([pairs.min(axis=-1, initial=np.inf), single.min(axis=-1, initial=np.inf)])
+    return np.where(np.isfinite(least), least, np.nan)
+
+
 def is_hurwitz(c: Array) -> NDArray[np.bool_]:
     """Whether the highest coefficient is positive and all roots have negative real parts (Routh)."""
     n = c.shape[-1] - 1

@@ -1,8 +1,8 @@
 """The scan of one parameter for edges of stability.
 
 The parameter is sampled over its range; where the status (stable, unstable, no steady sliding) of two samples
-differs, the change is bracketed and narrowed to rounding. Extrema of the growth rate between samples are
-followed, so that a narrow window is not stepped over. For the stiffness itself the edges are exact (theory 3).
+differs, the change is bracketed and narrowed to rounding. Dips of the damping between samples are followed,
+so that a narrow window is not stepped over. For the stiffness itself the edges are exact (theory 3).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from steadyslip.errors import NoSteadySliding
 from steadyslip.linear.linearise import linearise
-from steadyslip.linear.polynomials import is_hurwitz, roots
+from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
 from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
 from steadyslip.quantities import shown, unit
 from steadyslip.slider import Slider
@@ -131,10 +131,9 @@ class Search:
         absent = np.where(out_of_range(values), UNKNOWN, ABSENT)
         return np.where(exists, np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN), absent)
 
-    def growth(self, x: Any) -> Any:
-        c = characteristic(self.values(np.asarray(x, dtype=float)))
-        found = roots(c).real
-        return np.max(np.where(np.isnan(found), -np.inf, found), axis=-1)
+    def measures(self, x: Any) -> Any:
+        """Two functions that pass through zero at an edge: damping of pairs, and of single eigenvalues."""
+        return damping_measures(roots(characteristic(self.values(np.asarray(x, dtype=float)))))
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         grid = self.grid(between)
@@ -149,29 +148,29 @@ class Search:
             return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
 
     def _with_hidden_windows(self, grid: Any) -> Any:
-        """Add samples inside windows that lie between two samples, found from extrema of the growth rate."""
-        status, growth = self.status(grid), self.growth(grid)
-        middle = growth[1:-1]
-        towards_zero = np.where(
-            middle > 0,
-            (middle <= growth[:-2]) & (middle <= growth[2:]),
-            (middle >= growth[:-2]) & (middle >= growth[2:]),
-        )
+        """Add samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
+        status, measures = self.status(grid), self.measures(grid)
         same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & np.isin(status[1:-1], (STABLE, UNSTABLE))
-        at = np.flatnonzero(towards_zero & same & np.isfinite(middle)) + 1
-        if not at.size:
-            return grid
-        low, high = grid[at - 1], grid[at + 1]
-        sign = np.where(growth[at] > 0, 1.0, -1.0)
-        extra: list[Any] = []
+        extra = [grid]
+        for which, measure in enumerate(measures):
+            size = np.abs(measure)
+            dips = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
+            at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
+            if at.size:
+                extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
+        return np.unique(np.concatenate(extra))
+
+    def _descended(self, which: int, sign: Any, low: Any, high: Any) -> list[Any]:
+        """Lowest points of a measure (times its sign) inside brackets, ever more closely."""
+        found = []
+        row = np.arange(len(low))
         for _ in range(4):
             x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
-            g = sign[:, None] * self.growth(x.ravel()).reshape(x.shape)
-            best = np.clip(np.argmin(np.where(np.isnan(g), np.inf, g), axis=-1), 1, _SPLIT - 1)
-            row = np.arange(len(best))
-            extra.append(x[row, best])
+            value = sign[:, None] * self.measures(x.ravel())[which].reshape(x.shape)
+            best = np.clip(np.argmin(np.where(np.isnan(value), np.inf, value), axis=-1), 1, _SPLIT - 1)
+            found.append(x[row, best])
             low, high = x[row, best - 1], x[row, best + 1]
-        return np.unique(np.concatenate([grid, *extra]))
+        return found
 
     def _narrowed(self, low: Any, high: Any, low_status: Any) -> tuple[Any, Any]:
         """Brackets down to rounding, all at once; keeps the lowest change inside each."""

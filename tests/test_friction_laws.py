@@ -509,6 +509,15 @@ def test_regularised_memory_evolves_alike_in_reverse(evolution):
     assert forward == back != 0
 
 
+@pytest.mark.parametrize("law", [law for law in LAWS if isinstance(law, ss.CoulombStribeck)], ids=repr)
+def test_machine_friction_is_odd(law):
+    """Bristles bend the other way in reverse."""
+    bent = (2e-6,) if law.memory() else ()
+    back = tuple(-z for z in bent)
+    assert float(law.strength(-3e-6, 5e6, back, 0)) == -float(law.strength(3e-6, 5e6, bent, 0)) < 0
+    assert [float(r) for r in law.rates(-3e-6, 5e6, back, 0)] == [-float(r) for r in law.rates(3e-6, 5e6, bent, 0)]
+
+
 def test_statement_of_a_law_is_symbolic_throughout():
     """No number of a law enters its equations: the contract and the Model see parameters."""
     for law in LAWS:

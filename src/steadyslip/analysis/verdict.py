@@ -6,6 +6,7 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
+from steadyslip.config.layout import is_per_area, total_unit
 from steadyslip.quantities import shown
 from steadyslip.records import resolve
 
@@ -89,9 +90,16 @@ def _why_none(analysis: Analysis) -> str:
     return ""
 
 
-def _stiffness(analysis: Analysis, value: float) -> str:
+def _quantity(analysis: Analysis, value: float, unit: str) -> str:
+    """A value per unit area, or for the whole area where the rig has one, as in its file."""
     area = analysis.rig.area
-    return shown(value, "Pa/m") if area is None else shown(value * area, "N/m")
+    if area is None or not is_per_area(unit):
+        return shown(value, unit)
+    return shown(value * area, total_unit(unit))
+
+
+def _stiffness(analysis: Analysis, value: float) -> str:
+    return _quantity(analysis, value, "Pa/m")
 
 
 def _stress(analysis: Analysis, value: float) -> str:
@@ -190,8 +198,8 @@ def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str,
         words = _BEYOND.get(edge.kind, edge.kind)
     return (
         _short(analysis, margin.parameter),
-        shown(margin.value, margin.unit),
-        f"-> {shown(edge.value, margin.unit)}",
+        _quantity(analysis, margin.value, margin.unit),
+        f"-> {_quantity(analysis, edge.value, margin.unit)}",
         change,
         words,
     )

@@ -14,13 +14,11 @@ from steadyslip.errors import ParameterError, Problem
 from steadyslip.figures import regions
 from steadyslip.figures.axis import Axis, axis
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
-from steadyslip.linear.polynomials import is_hurwitz
-from steadyslip.linear.stiffness import characteristic
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
 from steadyslip.slider import Slider
 from steadyslip.steady import explain_absence
 from steadyslip.values import model_values
 
-ABSENT, STABLE, UNSTABLE = 0, 1, 2
 _SAMPLES = 12  # points at which the reason for no steady sliding is asked
 
 
@@ -68,7 +66,7 @@ def stability_chart(
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a whole number >= 2")])
 
     def status(a: Any, b: Any) -> Any:
-        return _status(rig, {first.name: first.at(a), second.name: second.at(b)})
+        return status_of(model_values(rig, {first.name: first.at(a), second.name: second.at(b)}))
 
     ax = axes_or_new(ax)
 
@@ -90,13 +88,6 @@ def stability_chart(
     _mark_own(ax, rig, first, second)
     _finish(ax, first, second)
     return ax
-
-
-def _status(rig: Slider, vary: dict[str, Any]) -> Any:
-    with np.errstate(all="ignore"):
-        c = characteristic(model_values(rig, vary))
-        exists = np.all(np.isfinite(c), axis=-1)
-        return np.where(exists, np.where(is_hurwitz(c), STABLE, UNSTABLE), ABSENT)
 
 
 def _reasons(rig: Slider, x: Axis, y: Axis, status: Any, points: int) -> str:

@@ -15,19 +15,18 @@ import numpy as np
 
 from steadyslip.errors import NoSteadySliding
 from steadyslip.linear.linearise import linearise
-from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
+from steadyslip.linear.polynomials import damping_measures, roots
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, status
 from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
 from steadyslip.quantities import shown, unit
 from steadyslip.slider import Slider
-from steadyslip.steady import explain_absence, out_of_range, steady_stress
+from steadyslip.steady import explain_absence, steady_stress
 from steadyslip.values import Values, model_values
 
 _PER_DECADE = 40
 _DECADES = 6
 _LINEAR = 721
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
-
-ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)  # unknown: beyond the range of floating point
 
 
 @dataclass(frozen=True)
@@ -124,12 +123,7 @@ class Search:
     # -- status along the parameter
 
     def status(self, x: Any) -> Any:
-        values = self.values(np.asarray(x, dtype=float))
-        exists = np.isfinite(steady_stress(values))
-        c = characteristic(values)
-        verdict = np.where(is_hurwitz(c), STABLE, UNSTABLE)
-        absent = np.where(out_of_range(values), UNKNOWN, ABSENT)
-        return np.where(exists, np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN), absent)
+        return status(self.values(np.asarray(x, dtype=float)))
 
     def measures(self, x: Any) -> Any:
         """Two functions that pass through zero at an edge: damping of pairs, and of single eigenvalues."""

@@ -22,6 +22,7 @@ _LETTERS = {
     "contact.preload": "sigma_0",
     "contact.angle": "psi",
 }
+_RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 
 
 @dataclass(frozen=True)
@@ -163,31 +164,33 @@ def _build_cached(structure: _Structure) -> Model:
 
 def _parameter_symbols(rig: Slider, present: frozenset[str]) -> dict[str, Any]:
     """A symbol for every given parameter; structural zeros stay zero, gauges stay symbols."""
-    known = parameters(rig)
-    last = [name.rpartition(".")[2] for name in known]
     symbols: dict[str, Any] = {}
-    for name, address in known.items():
+    taken = set(_RESERVED) | set(_LETTERS.values())
+    for name, address in parameters(rig).items():
         if name == "slider.area" or address.value is None:
             continue
         if address.role.structural and address.value == 0 and name not in present:
             symbols[name] = sp.Integer(0)
             continue
-        bare = name.rpartition(".")[2]
-        section = name.partition(".")[0]
-        letter = _LETTERS.get(name)
-        if letter is None:
-            parts = name.split(".")
-            letter = f"{bare}_{parts[-2]}" if parts[-2].isdigit() else bare
-            if last.count(bare) > 1 and not parts[-2].isdigit() and section != "friction":
-                letter = f"{bare}_{section}"
         domain = address.role.domain
         symbols[name] = sp.Symbol(
-            letter,
+            _LETTERS.get(name) or _unused_letter(name, taken),
             real=True,
             positive=True if domain.low == 0 and not domain.low_allowed else None,
             nonnegative=True if domain.low == 0 else None,
         )
     return symbols
+
+
+def _unused_letter(name: str, taken: set[str]) -> str:
+    """The last part of a dotted name, with as many earlier parts behind it as make it unique."""
+    *before, letter = name.split(".")
+    if before[-1].isdigit():
+        letter = f"{letter}_{before.pop()}"
+    while letter in taken and before:
+        letter = f"{letter}_{before.pop()}"
+    taken.add(letter)
+    return letter
 
 
 def _assemble(rig: Slider, k: sp.Symbol, given: dict[str, sp.Symbol], units: dict[str, str]) -> Model:
@@ -200,7 +203,8 @@ def _assemble(rig: Slider, k: sp.Symbol, given: dict[str, sp.Symbol], units: dic
     time = sp.Symbol("t", real=True)
     v0 = rig.drive.velocity
     friction, contact, drive = rig.friction, rig.contact, rig.drive
-    memory = tuple(sp.Symbol(name, real=True) for name in friction.memory())
+    taken = set(_RESERVED) | {str(symbol) for symbol in given.values()}
+    memory = tuple(sp.Symbol(_unused_letter(f"memory.{name}", taken), real=True) for name in friction.memory())
 
     tau_ss = sp.sympify(friction.steady_strength(v0, sigma_ss))
     spring_ss = tau_ss + rig.radiation_damping * v0

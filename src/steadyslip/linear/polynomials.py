@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+quietly = np.errstate(all="ignore")  # overflow ends as inf or NaN, which every function here expects
 _NEARLY_REAL = 1e-6  # relative imaginary part below which a root in β² is tried as a boundary
 _SAME = 1e-9  # relative distance below which two boundaries in k are one
 
@@ -34,6 +35,7 @@ def evaluate(c: Any, s: Any) -> Any:
     return value
 
 
+@quietly
 def roots(c: Array) -> ComplexArray:
     """All roots, (..., n) complex, sorted by falling real part; NaN where the degree is lower.
 
@@ -91,6 +93,7 @@ def _quadratic(c: Array) -> ComplexArray:
     return np.stack([first, second], axis=-1)
 
 
+@quietly
 def damping_measures(s: ComplexArray) -> Array:
     """Scale-free distance of eigenvalues (..., n) from the imaginary axis, (2, ...).
 
@@ -116,6 +119,7 @@ def damping_measures(s: ComplexArray) -> Array:
     return np.where(np.isfinite(least), least, np.nan)
 
 
+@quietly
 def is_hurwitz(c: Array) -> NDArray[np.bool_]:
     """Whether the highest coefficient is positive and all roots have negative real parts (Routh)."""
     n = c.shape[-1] - 1
@@ -130,6 +134,7 @@ def is_hurwitz(c: Array) -> NDArray[np.bool_]:
     return result.reshape(c.shape[:-1])
 
 
+@quietly
 def routh_column(c: Array) -> Array:
     """First column of the Routh array of polynomials of full degree; all positive means stable.
 
@@ -177,6 +182,7 @@ class StableSet:
     changes: NDArray[np.bool_]
 
 
+@quietly
 def stable_set(p: Array, q: Array) -> StableSet:
     """The set of k > 0 for which p(s) + k q(s) has all roots in the left half plane.
 
@@ -245,6 +251,7 @@ def _product(a: Array, b: Array) -> Array:
     return out
 
 
+@quietly
 def crossing_squares(p: Array, q: Array) -> Array:
     """Positive β² where p(iβ)/q(iβ) is real, NaN padded: the roots of Im[p conj q]/β."""
     pe, po = _even_odd(p)

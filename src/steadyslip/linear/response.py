@@ -19,6 +19,7 @@ import sympy as sp
 from steadyslip.errors import NotAvailable
 from steadyslip.expressions import array_function
 from steadyslip.linear import cubic
+from steadyslip.linear.polynomials import quietly
 from steadyslip.model import Model
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
@@ -167,6 +168,7 @@ def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Ex
     return b0, b1, b2, b3
 
 
+@quietly
 def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     """f, S, r, f1, μ and B0...B3 of a rig as numbers.
 

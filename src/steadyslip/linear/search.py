@@ -16,6 +16,7 @@ import numpy as np
 from steadyslip.errors import NoSteadySliding
 from steadyslip.linear.linearise import linearise
 from steadyslip.linear.polynomials import damping_measures, roots
+from steadyslip.linear.response import memory_symbols
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, status
 from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
 from steadyslip.quantities import shown, unit
@@ -225,5 +226,5 @@ def _decay_rate(values: Values, sigma: float) -> float:
     linear = linearise(values.model)
     numbers = dict(zip(values.model.parameters.values(), values.arguments, strict=True))
     numbers[values.model.sigma_ss] = sigma
-    own = [row[s].xreplace(numbers) for s, row in linear.rates.items() if s.name not in ("x", "I_x")]
+    own = [linear.rates[s][s].xreplace(numbers) for s in memory_symbols(values.model)]
     return max((abs(float(rate)) for rate in own if rate.is_number), default=0.0)

@@ -16,7 +16,7 @@ import sympy as sp
 from steadyslip.expressions import array_function
 from steadyslip.linear import cubic
 from steadyslip.linear.linearise import characteristic_coefficients, stiffness_split
-from steadyslip.linear.polynomials import StableSet, roots, stable_set
+from steadyslip.linear.polynomials import StableSet, quietly, roots, stable_set
 from steadyslip.linear.response import has_closed_form, response
 from steadyslip.model import Model
 from steadyslip.slider import Slider
@@ -247,6 +247,7 @@ def _nearest_edge(values: Values) -> Any:
     return np.take_along_axis(ends, nearest, axis=-1)[..., 0]
 
 
+@quietly
 def in_chunks(values: Values, kernel: Callable[[Values], Any]) -> Any:
     """Apply a kernel to the varied rigs some thousand at a time."""
     whole: Any = None
@@ -261,6 +262,7 @@ def in_chunks(values: Values, kernel: Callable[[Values], Any]) -> Any:
     return whole.reshape(values.shape + whole.shape[1:])
 
 
+@quietly
 def _in_chunks_of_intervals(values: Values) -> tuple[Any, Any]:
     """Interval ends of all rigs; chunks may differ in the number of intervals."""
     pieces = [

@@ -1,6 +1,9 @@
 """Rig files: what is read is what was written, and everything wrong is said at once."""
 
 import math
+import os
+import subprocess
+import sys
 import tomllib
 from dataclasses import fields
 from pathlib import Path
@@ -275,3 +278,29 @@ def test_every_parameter_has_unit_and_meaning():
                 role = item.metadata["steadyslip"]
                 assert role.doc
                 assert isinstance(role, Parameter | Option | Part)
+
+
+def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
+    """In a process of its own, with a package that exists on its path only."""
+    (tmp_path / "my_laws.py").write_text(
+        "import steadyslip as ss\nclass Mine(ss.RateState, name='my-law'):\n    'A law of one's own.'\n"
+    )
+    info = tmp_path / "my_laws-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-laws\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[steadyslip.laws]\nmy-law = my_laws:Mine\n")
+    rig = tmp_path / "rig.toml"
+    rig.write_text(TEXT.replace('"rate-state"', '"my-law"'), encoding="utf-8")
+    command = [sys.executable, "-m", "steadyslip", "analyze", str(rig)]
+    done = subprocess.run(
+        command, capture_output=True, encoding="utf-8", env=os.environ | {"PYTHONPATH": str(tmp_path)}
+    )
+    assert done.stdout.startswith("UNSTABLE"), done.stderr
+    without = subprocess.run(command, capture_output=True, encoding="utf-8")
+    assert without.returncode == 2
+    assert "unknown friction law 'my-law'" in without.stderr
+    (tmp_path / "my_laws.py").write_text("import nonsense_that_is_not_there")
+    broken = subprocess.run(command, capture_output=True, encoding="utf-8", env=on_path)
+    assert broken.returncode == 2
+    assert "cannot be loaded" in broken.stderr
+    assert "Traceback" not in broken.stderr

@@ -1,15 +1,16 @@
-"""Write rig-file.md from the records' own declarations: python docs/reference/make_tables.py"""
+"""Write rig-file.md and python.md from the code's own declarations: python docs/reference/make_tables.py"""
 
 from __future__ import annotations
 
 from dataclasses import MISSING
 from pathlib import Path
 
+import steadyslip as ss
 from steadyslip.config.layout import own_fields, sections, selector
 from steadyslip.records import Option, Parameter, Part, Record
 from steadyslip.slider import Slider
 
-PAGE = Path(__file__).with_name("rig-file.md")
+HERE = Path(__file__).parent
 HEAD = """# Rig file
 
 A rig file is TOML with the tables `[friction]`, `[contact]`, `[slider]` and `[drive]`. Numbers are SI; text
@@ -72,7 +73,7 @@ def parts_of(law, done: set[type]) -> list[str]:
     return lines
 
 
-def page() -> str:
+def rig_file() -> str:
     lines = [HEAD]
     done: set[type] = set()
     for section in sections():
@@ -86,5 +87,28 @@ def page() -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
+PYTHON_HEAD = """# Python
+
+Public names of `steadyslip`, loaded on first use; `help(ss.NAME)` tells the whole of each. Results are frozen and print
+themselves. Quantities are SI floats, per unit contact area; `steadyslip.units` has the usual units as numbers.
+This page is written by `make_tables.py`.
+"""
+
+
+def python() -> str:
+    groups: dict[str, list[str]] = {}
+    for name in ss.__all__:
+        thing = getattr(ss, name)
+        home = getattr(thing, "__module__", None) or "steadyslip modules"
+        groups.setdefault(".".join(home.split(".")[:2]), []).append(f"| `{name}` | {summary(thing)} |")
+    lines = [PYTHON_HEAD]
+    for home in sorted(groups):
+        lines += [f"## {home}", "", "| name | what it is |", "|---|---|", *groups[home], ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+PAGES = {"rig-file.md": rig_file, "python.md": python}
+
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    for name, make in PAGES.items():
+        (HERE / name).write_text(make(), encoding="utf-8")

@@ -47,7 +47,11 @@ def find_law(family: type[Record], name: object) -> type[Record]:
         if name in family.registry:
             return family.registry[name]
         for entry in entry_points(group=ENTRY_POINTS, name=name):
-            law = entry.load()
+            try:
+                law = entry.load()
+            except Exception as error:  # whatever a foreign package does when imported
+                message = f"{name!r} is offered by {entry.value!r}, which cannot be loaded: {error!r}"
+                raise ParameterError([Problem("", message)]) from error
             if isinstance(law, type) and issubclass(law, family):
                 return law
     raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])

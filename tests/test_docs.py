@@ -1,55 +1,173 @@
-"""Pages that are made from the code are up to date, and pages point at what exists."""
+"""Pages that are made from the code are up to date, point at what exists, and show what really happens."""
 
+import doctest
 import re
+import runpy
+import shlex
+import shutil
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import steadyslip as ss
+from steadyslip.linear import paper
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+SHOWN_PAGES = [page for page in PAGES if "```console\n" in page.read_text(encoding="utf-8")]
+COMPARE = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
-@pytest.mark.parametrize("page", ["rig-file.md", "python.md"])
-def test_pages_made_from_the_code_are_up_to_date(page):
+def names(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+# --- pages made from the code -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rig-file.md", "python.md"])
+def test_generated_pages_are_up_to_date(name):
     """In a process of its own: other tests register laws of theirs."""
-    code = f"import runpy; print(runpy.run_path('docs/reference/make_tables.py')['PAGES']['{page}'](), end='')"
+    code = f"import runpy; print(runpy.run_path('docs/reference/make_tables.py')['PAGES'][{name!r}](), end='')"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", check=True)
-    current = (ROOT / "docs/reference" / page).read_text(encoding="utf-8")
-    assert done.stdout == current, "run python docs/reference/make_tables.py"
+    assert done.stdout == (ROOT / "docs/reference" / name).read_text(encoding="utf-8"), (
+        "run python docs/reference/make_tables.py"
+    )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / target).exists(), target
-
-
-def test_equations_page_names_files_that_exist():
-    text = (ROOT / "docs/reference/equations.md").read_text(encoding="utf-8")
-    for name in re.findall(r"`([\w/]+\.py)`", text):
-        assert (ROOT / "src/steadyslip" / name).exists(), name
-
-
-def test_every_public_name_has_a_docstring_and_loads():
+def test_every_public_name_is_on_the_python_page_and_has_a_docstring():
+    text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
     for name in ss.__all__:
-        thing = getattr(ss, name)
-        assert (thing.__doc__ or "").strip(), name
+        assert (getattr(ss, name).__doc__ or "").strip(), name
+        assert re.search(rf"^\| `{name}\b", text, re.MULTILINE), name
 
 
-def test_readme_shows_the_verdict_as_it_is():
-    shown = (ROOT / "README.md").read_text(encoding="utf-8").split("and answers:")[1].split("```")[1].strip()
-    actual = str(ss.analyze(ss.read_rig(ROOT / "examples" / "inclined-spring.toml")))
-    assert actual.startswith(shown.removesuffix("...").rstrip())
+# --- links and names --------------------------------------------------------------------------------
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings, made as the usual viewers of Markdown make them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=names)
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        target, _, anchor = link.partition("#")
+        goal = page.parent / target if target else page
+        assert goal.exists(), link
+        assert not anchor or anchor in anchors(goal), link
+
+
+def test_every_page_can_be_reached_from_the_index():
+    index = ROOT / "docs/index.md"
+    reached = {(index.parent / link).resolve() for link in re.findall(r"\]\(([^)#\s]+)", index.read_text("utf-8"))}
+    assert {page for page in PAGES if page.parent != ROOT and page != index} <= reached
+
+
+def test_equations_page_names_what_exists():
+    text = (ROOT / "docs/reference/equations.md").read_text(encoding="utf-8")
+    files = re.findall(r"`([\w/]+\.py)`", text)
+    assert files
+    for name in files:
+        assert (ROOT / "src/steadyslip" / name).exists(), name
+    for path, name in re.findall(r"`([\w/]+)\.(\w+)`", text.replace(".py`", "`")):
+        source = (ROOT / "src/steadyslip" / f"{path}.py").read_text(encoding="utf-8")
+        assert re.search(rf"^ *(def|class) {name}\b|^{name}\b", source, re.MULTILINE), f"{path}.{name}"
+
+
+def test_equations_page_has_every_function_of_the_paper():
+    text = (ROOT / "docs/reference/equations.md").read_text(encoding="utf-8")
+    own = [name for name, thing in vars(paper).items() if getattr(thing, "__module__", "") == paper.__name__]
+    missing = [name for name in own if f"`linear/paper.{name}`" not in text]
+    assert own
+    assert missing == []
 
 
 def test_the_arrow_line_is_the_same_everywhere():
-    arrow = "friction law + contact law -> slider + drive -> Model (symbolic) -> steady sliding"
-    for text in [
-        ss.__doc__,
-        *((ROOT / p).read_text(encoding="utf-8") for p in ("README.md", "docs/explanation/how-it-works.md")),
-    ]:
-        assert arrow in " ".join(text.split())
+    arrow = (
+        "friction law + contact law -> slider + drive -> Model (symbolic) -> steady sliding "
+        "-> linear stability -> verdict, figures, command line"
+    )
+    for path in ("README.md", "docs/explanation/how-it-works.md"):
+        assert arrow in " ".join((ROOT / path).read_text(encoding="utf-8").split())
+    assert arrow in " ".join(ss.__doc__.replace(" (`analyze`)", "").split())
+
+
+# --- the command line as shown ----------------------------------------------------------------------
+
+
+def steps(page: Path) -> Iterator[tuple[str, str, str]]:
+    """What a reader does, in order: ("save", file name, text) and ("run", command, output shown).
+
+    A block of TOML whose first line is a comment with a file name is saved under it.
+    """
+    for language, block in re.findall(r"^```(\w+)\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S):
+        if language == "toml":
+            tomllib.loads(block)
+            if title := re.match(r"# ([\w-]+\.toml)\n", block):
+                yield "save", title[1], block
+        elif language == "console":
+            for command, shown in re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE):
+                yield "run", command, shown
+
+
+@pytest.mark.parametrize("page", SHOWN_PAGES, ids=names)
+def test_commands_print_what_the_page_shows(page, tmp_path):
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    status = 0
+    for action, name, text in steps(page):
+        if action == "save":
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        elif name == "echo $?":
+            assert text == f"{status}\n"
+        else:
+            status, printed = run(name, tmp_path)
+            assert "Traceback" not in printed
+            same = doctest.OutputChecker().check_output(text, printed, COMPARE)
+            assert same, f"$ {name}\n{printed}"
+
+
+def run(command: str, folder: Path) -> tuple[int, str]:
+    """Status and output of `steadyslip ...` or `python3 run.py ...`, in a process of its own."""
+    arguments = shlex.split(command)
+    if arguments[:2] == ["python3", "run.py"]:
+        arguments = ["steadyslip", *arguments[2:]]
+    assert arguments[0] == "steadyslip", command
+    done = subprocess.run(
+        [sys.executable, "-m", *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+    )
+    return done.returncode, done.stdout
+
+
+def test_the_reference_of_the_command_line_has_every_option():
+    text = (ROOT / "docs/reference/command-line.md").read_text(encoding="utf-8")
+    from typer.main import get_command
+
+    from steadyslip.cli import app
+
+    for name, command in get_command(app).commands.items():
+        assert f"steadyslip {name}" in text
+        for option in (o for p in command.params if p.param_type_name == "option" for o in p.opts):
+            assert f"`{option}" in text, option
+
+
+def test_the_reference_of_the_command_line_has_every_key_of_the_json():
+    text = (ROOT / "docs/reference/command-line.md").read_text(encoding="utf-8")
+    data = ss.analyze(ss.read_rig(ROOT / "examples" / "slow-axis.toml")).to_dict()
+    keys = {*data, *data["steady"], *data["forces"], *data["boundaries"][0]}
+    assert [key for key in sorted(keys) if f"`{key}`" not in text] == []
+
+
+def test_make_tables_knows_its_pages():
+    pages = runpy.run_path(str(ROOT / "docs/reference/make_tables.py"))["PAGES"]
+    assert set(pages) == {"rig-file.md", "python.md"}

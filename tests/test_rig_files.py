@@ -283,7 +283,7 @@ def test_every_parameter_has_unit_and_meaning():
 def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
     """In a process of its own, with a package that exists on its path only."""
     (tmp_path / "my_laws.py").write_text(
-        "import steadyslip as ss\nclass Mine(ss.RateState, name='my-law'):\n    'A law of one's own.'\n"
+        "import steadyslip as ss\nclass Mine(ss.RateState, name='my-law'):\n    'A law from elsewhere.'\n"
     )
     info = tmp_path / "my_laws-1.0.dist-info"
     info.mkdir()
@@ -292,9 +292,8 @@ def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
     rig = tmp_path / "rig.toml"
     rig.write_text(TEXT.replace('"rate-state"', '"my-law"'), encoding="utf-8")
     command = [sys.executable, "-m", "steadyslip", "analyze", str(rig)]
-    done = subprocess.run(
-        command, capture_output=True, encoding="utf-8", env=os.environ | {"PYTHONPATH": str(tmp_path)}
-    )
+    on_path = os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", env=on_path)
     assert done.stdout.startswith("UNSTABLE"), done.stderr
     without = subprocess.run(command, capture_output=True, encoding="utf-8")
     assert without.returncode == 2

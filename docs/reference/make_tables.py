@@ -1,52 +1,72 @@
-"""Write rig-file.md and python.md from the code's own declarations: python docs/reference/make_tables.py"""
+"""Write rig-file.md and python.md from the package's own declarations: python docs/reference/make_tables.py"""
 
 from __future__ import annotations
 
+import ast
+import importlib
+import inspect
 from dataclasses import MISSING
 from pathlib import Path
 
-import steadyslip as ss
-from steadyslip.config.layout import own_fields, sections, selector
+import steadyslip
+from steadyslip.config.layout import is_per_area, own_fields, sections, selector, total_unit
 from steadyslip.records import Option, Parameter, Part, Record
 from steadyslip.slider import Slider
 
 HERE = Path(__file__).parent
-HEAD = """# Rig file
 
-A rig file is TOML with the tables `[friction]`, `[contact]`, `[slider]` and `[drive]`. Numbers are SI; text
-such as `"9 GPa/m"` or `"-45 deg"` carries its unit and is checked for the right dimension. The keys are the
-last parts of the dotted names used in Python and with `--set`.
+# --- rig-file.md ------------------------------------------------------------------------------------
 
-All stresses, stiffnesses, dampings and the mass are per unit contact area. With `area` in `[slider]` those
-quantities are totals instead (N, N/m, N s/m, kg); text may then give either.
+RIG_HEAD = """# Rig file
 
-`steadyslip schema` prints the JSON schema of this format, for editors. This page is written by
-`make_tables.py` from the same declarations.
+A rig file is TOML, plain text in UTF-8, with the tables `[friction]`, `[contact]`, `[slider]` and `[drive]`. A whole
+one is [examples/inclined-spring.toml](../../examples/inclined-spring.toml).
+
+- A number without quotes is in the SI unit of the table below. Text such as `"9 GPa/m"` or `"-45 deg"` carries its
+  unit and is checked for the right dimension; anything that can be written so may be.
+- Everything is per unit contact area. With `area` in `[slider]`, a quantity that has two units below is the total for
+  the whole contact, in the second one; text may then be in either.
+- A key has a dotted name, `contact.angle`, the same in Python and with `--set`. Members of a list count from 1:
+  `friction.states.1.b`.
+- A law inside a table is a table of its own: `[friction.normal_memory]` with `law = "linker-dieterich"`; one
+  without parameters may be a word, `normal_memory = "prakash-clifton"`. The parameters of `evolution` stand beside it
+  in `[friction]`.
+- Several states are a list: `[[friction.states]]` once for each.
+- A key without default that is not required is absent unless given.
+- `law` may also name a law of yours: see [Add a friction law](../how-to/add-a-friction-law.md).
+
+`steadyslip schema` prints the JSON schema of this format, for editors. This page is written by `make_tables.py` from
+the declarations in the source.
 """
 
 
 def default_of(item) -> str:
     if item.default is MISSING:
         return "required"
-    if item.default is None:
+    if item.default is None or item.default == ():
         return ""
-    value = item.default
-    if isinstance(value, Record):
-        return f"`{value.name}`"
-    if value == ():
-        return ""
-    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+    if isinstance(item.default, Record):
+        return f"`{item.default.name}`"
+    if isinstance(item.default, bool):
+        return f"`{str(item.default).lower()}`"
+    return f"`{item.default:g}`" if isinstance(item.default, float) else f"`{item.default}`"
+
+
+def unit_of(role) -> str:
+    if role.unit == "1":
+        return "–"
+    return f"{role.unit} or {total_unit(role.unit)}" if is_per_area(role.unit) else role.unit
 
 
 def row(item, role) -> str:
     if isinstance(role, Parameter):
-        unit = "" if role.unit == "1" else role.unit
-        return f"| `{item.name}` | {unit} | {role.domain.text} | {default_of(item)} | {role.doc} |"
-    if isinstance(role, Option):
-        words = ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)
-        return f"| `{item.name}` | | {words} | {default_of(item)} | {role.doc} |"
-    kind = "list of tables" if role.many else "one of " + ", ".join(f"`{n}`" for n in role.family.registry)
-    return f"| `{item.name}` | | {kind} | {default_of(item)} | {role.doc} |"
+        unit, allowed = unit_of(role), role.domain.text
+    elif isinstance(role, Option):
+        unit, allowed = "", ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)
+    else:
+        words = ", ".join(f"`{name}`" for name in role.family.registry)
+        unit, allowed = "", "list of tables" if role.many else f"one of {words}"
+    return f"| `{item.name}` | {unit} | {allowed} | {default_of(item)} | {role.doc} |"
 
 
 def table(law) -> list[str]:
@@ -56,8 +76,11 @@ def table(law) -> list[str]:
     return ["| key | unit | allowed | default | meaning |", "|---|---|---|---|---|", *rows, ""]
 
 
-def summary(law) -> str:
-    return (law.__doc__ or "").strip().splitlines()[0]
+def summary(thing) -> str:
+    """The first line of a docstring, safe inside a Markdown table."""
+    line = (inspect.getdoc(thing) or "").partition("\n")[0].replace("``", "`").replace("|", "\\|")
+    pieces = line.split("`")  # every second one is code
+    return "`".join(piece if i % 2 else piece.replace("*", "\\*") for i, piece in enumerate(pieces))
 
 
 def parts_of(law, done: set[type]) -> list[str]:
@@ -69,46 +92,89 @@ def parts_of(law, done: set[type]) -> list[str]:
             if role.many:
                 lines += [f"### Each of `{item.name}`", "", *table(role.family)]
             for name, choice in role.family.registry.items():
-                lines += [f"### `{item.name}` = `{name}`", "", summary(choice), "", *table(choice)]
+                key = f"{item.name} = " if role.inline else f"{item.name}: law = "
+                lines += [f'### `{key}"{name}"`', "", summary(choice), "", *table(choice)]
     return lines
 
 
-def rig_file() -> str:
-    lines = [HEAD]
+def rig_page() -> str:
+    lines = [RIG_HEAD]
     done: set[type] = set()
     for section in sections():
         if section.family is None:
-            lines += [f"## `[{section.name}]`", "", *table(Slider)]
+            lines += [f"## `[{section.name}]`", "", summary(Slider), "", *table(Slider)]
             continue
-        key, _ = selector(section.family)
+        key, default = selector(section.family)
         for name, law in section.family.registry.items():
-            lines += [f'## `[{section.name}]` with `{key} = "{name}"`', "", summary(law), "", *table(law)]
+            absent = f", or without `{key}`" if name == default else ""
+            lines += [f'## `[{section.name}]` with `{key} = "{name}"`{absent}', "", summary(law), "", *table(law)]
             lines += parts_of(law, done)
     return "\n".join(lines).rstrip() + "\n"
 
 
+# --- python.md --------------------------------------------------------------------------------------
+
 PYTHON_HEAD = """# Python
 
-Public names of `steadyslip`, loaded on first use; `help(ss.NAME)` tells the whole of each. Results are frozen and print
-themselves. Quantities are SI floats, per unit contact area; `steadyslip.units` has the usual units as numbers.
-This page is written by `make_tables.py`.
+Everything public is a name in `steadyslip`; nothing needs importing from deeper. Each entry is the first line of the
+docstring; `help(steadyslip.analyze)` shows the rest. Numbers in and out are SI, per unit contact area also where the
+rig has an `area`; constructors, `with_values` and `between=` read text such as `"9 GPa/m"` too. Laws are frozen; their
+arguments are the keys of a [rig file](rig-file.md), by keyword (a drive's velocity also by position). "Theory 3" is
+section 3 of [Equations and where they live](equations.md). This page is written by `make_tables.py`.
 """
+GROUPS = {
+    "": "Modules",
+    "analysis": "The verdict",
+    "config": "Rig files",
+    "contact": "Contact laws",
+    "drive": "Drives",
+    "errors": "Exceptions",
+    "friction": "Friction laws",
+    "linear": "Linear stability",
+    "model": "The Model",
+    "records": "To declare a law of your own",
+    "slider": "The rig",
+    "steady": "Steady sliding",
+}
+ORDER = ("slider", "friction", "contact", "drive", "config", "analysis", "steady", "linear", "model", "records")
+MODULES = {
+    "figures": ("critical_stiffness_against_mass", "root_locus", "stability_chart"),
+    "testing": ("check_friction_law", "check_contact_law"),
+}
 
 
-def python() -> str:
-    groups: dict[str, list[str]] = {}
-    for name in ss.__all__:
-        thing = getattr(ss, name)
-        home = getattr(thing, "__module__", None) or "steadyslip modules"
-        groups.setdefault(".".join(home.split(".")[:2]), []).append(f"| `{name}` | {summary(thing)} |")
+def public_names() -> dict[str, list[str]]:
+    """Names of ``__init__.pyi`` by the module they come from."""
+    tree = ast.parse((Path(steadyslip.__file__).with_suffix(".pyi")).read_text(encoding="utf-8"))
+    return {node.module or "": [a.name for a in node.names] for node in tree.body if isinstance(node, ast.ImportFrom)}
+
+
+def entry(name: str, thing) -> str:
+    called = name
+    if inspect.isfunction(thing):
+        called += "(" + ", ".join(inspect.signature(thing).parameters) + ")"
+    elif getattr(thing, "name", ""):
+        called += f'` `"{thing.name}"'
+    return f"| `{called}` | {summary(thing)} |"
+
+
+def python_page() -> str:
+    names = public_names()
     lines = [PYTHON_HEAD]
-    for home in sorted(groups):
-        lines += [f"## {home}", "", "| name | what it is |", "|---|---|", *groups[home], ""]
+    for module in (*ORDER, *sorted(set(names) - set(ORDER) - {""}), ""):
+        lines += [f"## {GROUPS[module]}", "", "| name | what it is |", "|---|---|"]
+        lines += [entry(name, getattr(steadyslip, name)) for name in names[module]]
+        lines.append("")
+    for module, functions in MODULES.items():
+        lines += [f"### `steadyslip.{module}`", "", "| name | what it is |", "|---|---|"]
+        found = importlib.import_module(f"steadyslip.{module}")
+        lines += [entry(name, getattr(found, name)) for name in functions]
+        lines.append("")
     return "\n".join(lines).rstrip() + "\n"
 
 
-PAGES = {"rig-file.md": rig_file, "python.md": python}
+PAGES = {"rig-file.md": rig_page, "python.md": python_page}
 
 if __name__ == "__main__":
-    for name, make in PAGES.items():
-        (HERE / name).write_text(make(), encoding="utf-8")
+    for file, page in PAGES.items():
+        (HERE / file).write_text(page(), encoding="utf-8", newline="\n")

@@ -134,3 +134,22 @@ def test_formula_and_plain_result():
     assert float(right.subs({s: numbers[s.name] for s in right.free_symbols})) == pytest.approx(5e9)
     with pytest.raises(AttributeError):
         a.stable = True
+
+
+@pytest.mark.parametrize("mass", [1e15, 1e20, 1e25])
+def test_a_mass_that_swamps_the_direct_effect_costs_no_digits(mass):
+    """σ(b−a)/d_c (1 + m v0²/(aσd_c)), of which the polynomial alone would keep few digits."""
+    expected = 5e9 * (1 + mass * 1e-12 / (0.01 * 1e7 * 1e-5))
+    a = ss.analyze(PLAIN.with_values({"mass": mass}))
+    assert a.critical_stiffness == pytest.approx(expected, rel=1e-13)
+    assert a.critical_angular_frequency == pytest.approx(0.1 * math.sqrt(0.5), rel=1e-13)
+    (edge,) = ss.boundary(PLAIN.with_values({"mass": mass}), "stiffness", between=(1.0, 1e30))
+    assert (edge.value, edge.kind, edge.stable) == (a.critical_stiffness, "oscillatory", "above")
+
+
+def test_static_edge_of_the_closed_form_is_a_divergence():
+    contact = ss.Linear(steady_normal_stress=1e7, b3=-1e10)
+    rig = PLAIN.with_values({"friction.b": 0.005})
+    rig = ss.Slider(friction=rig.friction, contact=contact, stiffness=1e10, drive=rig.drive)
+    kinds = {e.kind: e.value for e in ss.boundary(rig, "stiffness")}
+    assert kinds == {"divergence": pytest.approx(6e9, rel=1e-13)}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -148,12 +149,12 @@ def parse(text: str, expected: str) -> float:
     match = _NUMBER.match(cleaned)
     if match is None:
         raise QuantityError(f"{text!r} is not a number with a unit; write for example {example(expected)}")
-    number, name = float(match.group()), cleaned[match.end() :].strip()
+    digits, name = match.group(), cleaned[match.end() :].strip()
     _, wanted = unit(expected)
     if not name:
         if wanted != Dimension():
             raise QuantityError(f"{text!r} has no unit; write for example {example(expected)}")
-        return number
+        return float(digits)
     try:
         factor, found = unit(name)
     except QuantityError as error:
@@ -162,7 +163,18 @@ def parse(text: str, expected: str) -> float:
         raise QuantityError(
             f"{text!r} has the wrong dimension; expected {described(expected)}, for example {example(expected)}"
         )
-    return number * factor
+    return _scaled(digits, factor)
+
+
+def _scaled(digits: str, factor: float) -> float:
+    """Number times factor, rounded once: ``10 um`` is 1e-05, not the next float below."""
+    plain = float(digits)
+    if not math.isfinite(plain) or abs(plain) < 1e-290:
+        return plain * factor
+    try:
+        return float(Fraction(digits) * Fraction(repr(factor)))
+    except OverflowError:
+        return math.copysign(math.inf, plain)
 
 
 _EXAMPLES = {

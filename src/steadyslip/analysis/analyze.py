@@ -14,7 +14,7 @@ from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
+from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.slider import Slider
 from steadyslip.steady import SteadySliding, steady_states
 from steadyslip.values import Values, axial_projection, model_values
@@ -197,7 +197,7 @@ def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:
 
 def _stiffness_numbers(rig: Slider, values: Values) -> dict[str, Any]:
     """The stable set in k and its edge nearest to the rig's own stiffness."""
-    found = general_set(values)
+    found = set_of_one(values)
     own = float(values.named()["slider.stiffness"])
     intervals = found.intervals[np.all(np.isfinite(found.intervals[:, :1]), axis=-1)]
     numbers: dict[str, Any] = {"stable_stiffness": tuple((float(a), float(b)) for a, b in intervals)}

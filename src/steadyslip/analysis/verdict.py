@@ -7,6 +7,9 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from steadyslip.config.layout import is_per_area, total_unit
+from steadyslip.errors import NotAvailable
+from steadyslip.linear import small_signal
+from steadyslip.linear.cubic import hopf_line
 from steadyslip.quantities import shown
 from steadyslip.records import resolve
 
@@ -82,10 +85,15 @@ def _own_stiffness(analysis: Analysis) -> float:
 
 
 def _why_none(analysis: Analysis) -> str:
-    """For rigs with one memory variable, which Hurwitz condition rules out every stiffness."""
-    if any(value <= 0 for value in analysis.characteristic_polynomial[:1]):
+    """Which condition of stability rules out every stiffness, where that can be told."""
+    if analysis.characteristic_polynomial[0] <= 0:
         return ": a disturbance runs away without oscillating (static stability, a0 > 0, fails)"
-    if analysis.rig.mass > 0:
+    try:
+        known = small_signal(analysis.rig).as_dict()
+    except NotAvailable:
+        return ""
+    known.pop("k")
+    if hopf_line(**known)[1] < 0 and known["f"] > 0:
         return ": with this mass the memory of normal stress drives the oscillation (eq. 31)"
     return ""
 

@@ -23,7 +23,7 @@ from steadyslip.linear.polynomials import quietly
 from steadyslip.model import Model
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
-from steadyslip.values import Vary, model_values
+from steadyslip.values import Values, Vary, model_values
 
 
 @dataclass(frozen=True)
@@ -190,16 +190,18 @@ def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
         If the rig has no memory variable, several, or integral control.
     """
     values = model_values(rig, vary)
+    wrapped = {}
+    for name, x in response_numbers(values).as_dict().items():
+        wrapped[name] = values.wrap(np.broadcast_to(x, values.shape)[()], name, _UNITS[name])
+    return Response(**wrapped)
+
+
+def response_numbers(values: Values) -> Response:
+    """The response as bare numbers or arrays; NaN where steady sliding does not exist."""
     names, function = _response_function(values.model)
     sigma = steady_stress(values)
-    numbers = function(*values.arguments, sigma)
-    missing = 0 * sigma  # NaN where steady sliding does not exist
-    return Response(
-        **{
-            name: values.wrap(np.broadcast_to(x + missing, values.shape)[()], name, _UNITS[name])
-            for name, x in zip(names, numbers, strict=True)
-        }
-    )
+    missing = 0 * sigma
+    return Response(**{name: x + missing for name, x in zip(names, function(*values.arguments, sigma), strict=True)})
 
 
 _UNITS = {"f": "Pa s/m", "S": "Pa s/m", "r": "1/s", "f1": "1", "mu": "1", "B0": "kg/m^2", "B1": "Pa s/m"}

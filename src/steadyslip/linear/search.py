@@ -18,7 +18,7 @@ from steadyslip.linear.linearise import linearise
 from steadyslip.linear.polynomials import damping_measures, roots
 from steadyslip.linear.response import memory_symbols
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, status
-from steadyslip.linear.stiffness import characteristic, general_set, ill_posed
+from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.quantities import shown, unit
 from steadyslip.slider import Slider
 from steadyslip.steady import explain_absence, steady_stress
@@ -207,7 +207,7 @@ class Search:
 
     def _of_stiffness(self, low: float, high: float) -> tuple[Boundary, ...]:
         """The exact edges of the stable set."""
-        edges = general_set(model_values(self.rig, None, self.present, self.branch))
+        edges = set_of_one(model_values(self.rig, None, self.present, self.branch))
         keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
         return tuple(
             self._stiffness_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep

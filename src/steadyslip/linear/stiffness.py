@@ -17,7 +17,7 @@ from steadyslip.expressions import array_function
 from steadyslip.linear import cubic
 from steadyslip.linear.linearise import characteristic_coefficients, stiffness_split
 from steadyslip.linear.polynomials import StableSet, quietly, roots, stable_set
-from steadyslip.linear.response import has_closed_form, response
+from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.model import Model
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_equation, steady_stress
@@ -216,6 +216,28 @@ def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
         numerator, denominator = short
     values = {symbol: known[key] for key, symbol in names.items() if isinstance(symbol, sp.Symbol)}
     return numerator.xreplace(values), denominator.xreplace(values)
+
+
+def set_of_one(values: Values) -> StableSet:
+    """The stable set of a single rig with its edges: closed form where there is one, else the general route.
+
+    The closed form keeps its digits where a large mass swamps the direct effect in the polynomial.
+    """
+    if not has_closed_form(values.model):
+        return general_set(values)
+    low, high = (float(end) for end in closed_form_interval(values))
+    part = response_numbers(values)
+    gain = part.k - float(values.named()["slider.stiffness"])
+    edges, frequencies = [], []
+    for end in (low, high):
+        if np.isfinite(end) and end > 0:
+            total = Response(**(part.as_dict() | {"k": end + gain}))
+            static = abs(total.k * (1 + part.mu * part.B2) + part.mu * part.B3)
+            largest = abs(total.k) + abs(part.mu * (total.k * part.B2 + part.B3))
+            is_static = static <= 1e-12 * largest
+            edges.append(end)
+            frequencies.append(0.0 if is_static else float(np.sqrt(cubic.squared_frequency(**total.as_dict()))))
+    return StableSet(np.array([[low, high]]), np.array(edges), np.array(frequencies), np.ones(len(edges), dtype=bool))
 
 
 # --- intervals to answers, chunk by chunk -----------------------------------------------------------

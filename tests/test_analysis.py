@@ -153,3 +153,37 @@ def test_static_edge_of_the_closed_form_is_a_divergence():
     rig = ss.Slider(friction=rig.friction, contact=contact, stiffness=1e10, drive=rig.drive)
     kinds = {e.kind: e.value for e in ss.boundary(rig, "stiffness")}
     assert kinds == {"divergence": pytest.approx(6e9, rel=1e-13)}
+
+
+def test_what_is_printed_is_accepted():
+    """The short names of the verdict's table work in Python and with --set."""
+    for line in lines(PAPER):
+        if "->" in line:
+            assert PAPER.resolve(line.split()[0]) in PAPER.parameters()
+    text = ss.rig_to_text(PAPER)
+    assert ss.rig_from_text(text, "x", ["friction.alpha=0.3"]).value("alpha") == 0.3
+    assert ss.rig_from_text(text, "x", ["control=pd", "kp=1"]).drive == ss.PD(1e-6, kp=1.0)
+    with pytest.raises(ss.UnknownNameError):
+        PAPER.resolve("contact.alpha")
+
+
+def test_reason_names_the_direct_effect_where_that_is_the_fault():
+    lugre = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0)
+    rig = ss.Slider(friction=lugre, contact=ss.Constant(preload=1e5), stiffness=1e3, drive=ss.Steady(1e-3))
+    assert "direct effect is negative" in ss.analyze(rig).reason
+    taking = ss.Slider(
+        friction=PLAIN.friction, contact=ss.Linear(steady_normal_stress=1e7, b1=-1e12), stiffness=1e9, drive=PLAIN.drive
+    )
+    assert "normal stress takes away" in ss.analyze(taking).reason
+
+
+def test_controllers_are_judged_by_their_gain():
+    rig = ss.Slider(friction=PLAIN.friction, contact=PLAIN.contact, drive=ss.PD(1e-6, kp=4e9))
+    assert "gain kp, 4 GPa/m, is 0.8 times the critical 5 GPa/m" in ss.analyze(rig).reason
+    assert all(edge.value > 0 for edge in ss.boundary(rig, "kp"))
+
+
+def test_only_rigs_are_judged():
+    with pytest.raises(ss.ParameterError, match="allowed: a Slider"):
+        ss.analyze("rig.toml")
+    assert repr(ss.analyze(PLAIN)).startswith("<Analysis: UNSTABLE")

@@ -79,6 +79,10 @@ def test_bad_input_is_one_message_and_status_2(arguments, words):
 
 def test_formula_schema_version():
     assert "k_cr = " in run("analyze", EXAMPLE, "--formula").stdout
+    without = run("analyze", EXAMPLE, "--formula", "--set", "friction.normal_memory.law=prakash-clifton")
+    assert "unknown key 'alpha'" in without.stderr
+    two = run("analyze", EXAMPLE.with_name("two-states.toml"), "--formula")
+    assert (two.returncode, "No formula" in two.stdout) == (0, True)
     assert json.loads(run("schema").stdout) == ss.json_schema()
     assert run("--version").stdout.strip() == f"steadyslip {ss.__version__}"
 

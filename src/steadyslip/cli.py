@@ -46,12 +46,16 @@ def analyze(
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.analysis import analyze as run
     from steadyslip.config import read_rig
+    from steadyslip.errors import NotAvailable
 
     result = run(read_rig(rig, changes or ()), branch=branch)
     if as_json:
         data = result.to_dict()
         if formula:
-            data["formula"] = str(result.formula().rhs)
+            try:
+                data["formula"] = str(result.formula().rhs)
+            except NotAvailable:
+                data["formula"] = None
         import json
 
         typer.echo(json.dumps(data, indent=2, allow_nan=False))
@@ -61,8 +65,11 @@ def analyze(
         typer.secho(head, bold=True, fg=colour)
         typer.echo(rest)
         if formula:
-            equation = result.formula()
-            typer.echo(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
+            try:
+                equation = result.formula()
+                typer.echo(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
+            except NotAvailable as reason:
+                typer.echo(f"\nNo formula: {reason}")
     if require_stable and not result.stable:
         raise typer.Exit(1)
 

@@ -311,7 +311,7 @@ def parameters(record: Record, prefix: str = "") -> dict[str, Address]:
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:
-    """The full dotted name for `name`, which may be a bare unique last part.
+    """The full dotted name for `name`, which may leave out leading or middle parts where that is unique.
 
     Raises
     ------
@@ -320,7 +320,9 @@ def resolve(name: str, known: Mapping[str, Any]) -> str:
     """
     if name in known:
         return name
+    first, _, rest = name.partition(".")
     ends = [full for full in known if full.endswith("." + name)]
+    ends = ends or [full for full in known if rest and full.startswith(first + ".") and full.endswith("." + rest)]
     if len(ends) == 1:
         return ends[0]
     if ends:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
+from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _ON_THE_EDGE = 1e-9  # growth per radian below which a verdict is within rounding of the boundary
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Analysis:
     """Verdict on one rig; printing it gives the verdict in words.
 
@@ -117,6 +117,11 @@ class Analysis:
 
         return verdict(self)
 
+    def __repr__(self) -> str:
+        from steadyslip.analysis.verdict import headline
+
+        return f"<Analysis: {headline(self)}; print it for the whole verdict>"
+
     def _repr_markdown_(self) -> str:
         return f"```\n{self}\n```"
 
@@ -137,11 +142,15 @@ def analyze(rig: Slider, *, branch: int = 0) -> Analysis:
 
     Raises
     ------
+    ParameterError
+        If `rig` is not a Slider.
     NotAvailable
         If `branch` does not exist, or the numbers of the rig leave the range of floating point.
     """
     from steadyslip import __version__
 
+    if not isinstance(rig, Slider):
+        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig gives")])
     with np.errstate(all="ignore"):
         try:
             states = steady_states(rig)

@@ -52,26 +52,24 @@ def reason(analysis: Analysis) -> str:
     own = analysis.rig.parameters()["slider.stiffness"].value
     critical, side = analysis.critical_stiffness, analysis.critical_side
     if analysis.growth_rate == math.inf:
-        return (
-            "the equations are ill-posed: normal stress takes away more than the mass (or the direct effect of "
-            "friction) provides, so any small lag grows at once"
-        )
+        return _why_ill_posed(analysis)
     if critical is None:
         if analysis.stable_stiffness:
             if analysis.rig.drive.proportional():
                 return "with this controller sliding is stable whatever the stiffness beside it"
-            return "sliding is stable at every stiffness: nothing in friction or contact feeds a disturbance"
+            return "sliding is stable at every stiffness" + _why_all(analysis)
         if analysis.rig.friction.memory():
             return "no stiffness makes sliding stable" + _why_none(analysis)
         return "friction falls with velocity and has no memory: no stiffness makes sliding stable"
     if own is None:
         own = _own_stiffness(analysis)
-    ratio = own / critical
     position = "above" if own > critical else "below"
-    beside = " (beside the controller's gain)" if analysis.rig.drive.proportional() else ""
+    gain = float(analysis.rig.drive.proportional())
+    which = "stiffness and gain kp together, " if gain and own else "gain kp, " if gain else "stiffness "
     text = (
-        f"the stiffness {_stiffness(analysis, own)}{beside} is {ratio:.3g} times the critical stiffness "
-        f"{_stiffness(analysis, critical)}, {side} which sliding is stable"
+        f"the {which}{_stiffness(analysis, own + gain)}{',' if gain else ''} is "
+        f"{(own + gain) / (critical + gain):.3g} times the critical "
+        f"{'' if gain else 'stiffness '}{_stiffness(analysis, critical + gain)}, {side} which sliding is stable"
     )
     if analysis.stable is (position == side):
         return text
@@ -96,6 +94,32 @@ def _why_none(analysis: Analysis) -> str:
     if hopf_line(**known)[1] < 0 and known["f"] > 0:
         return ": with this mass the memory of normal stress drives the oscillation (eq. 31)"
     return ""
+
+
+def _why_ill_posed(analysis: Analysis) -> str:
+    """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
+    try:
+        falling = small_signal(analysis.rig).f < 0
+    except NotAvailable:
+        falling = not analysis.rig.friction.memory()
+    if falling:
+        return (
+            "the equations are ill-posed: friction falls at once when velocity rises (its direct effect is negative), "
+            "and there is no mass to slow that down"
+        )
+    return (
+        "the equations are ill-posed: normal stress takes away more than the mass (or the direct effect of "
+        "friction) provides, so any small lag grows at once"
+    )
+
+
+def _why_all(analysis: Analysis) -> str:
+    """The plain cause of stability at every stiffness, where there is one."""
+    try:
+        known = small_signal(analysis.rig)
+    except NotAvailable:
+        return ""
+    return ": friction in steady sliding rises with velocity, dampings included" if known.S >= 0 else ""
 
 
 def _quantity(analysis: Analysis, value: float, unit: str) -> str:

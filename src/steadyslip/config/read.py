@@ -11,7 +11,7 @@ from typing import Any
 
 from steadyslip.config.layout import Section, find_law, is_per_area, own_fields, sections, selector, total_unit
 from steadyslip.config.lines import key_lines, line_of
-from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, unknown_name
+from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, UnknownNameError, unknown_name
 from steadyslip.quantities import parse
 from steadyslip.records import (
     Option,
@@ -24,6 +24,7 @@ from steadyslip.records import (
     contradictions,
     is_required,
     positive,
+    resolve,
 )
 from steadyslip.slider import Slider
 
@@ -74,7 +75,7 @@ def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -
         raise _failed(source, f"is not TOML: {error}") from error
     reader = _Reader(tables)
     lines = key_lines(text)
-    for change in changes:
+    for change in [changes] if isinstance(changes, str) else changes:
         reader.change(change, lines)
     rig = reader.rig()
     if rig is None or reader.problems:
@@ -130,16 +131,14 @@ class _Reader:
             del lines[key]
 
     def _full_name(self, name: str) -> str:
-        """A bare last part stands for the one key of that name that the chosen laws have."""
-        if "." in name:
+        """A shortened name stands for the one key of that name that the chosen laws have."""
+        known = dict.fromkeys(self.known_names())
+        try:
+            return resolve(name, known)
+        except UnknownNameError as error:
+            if "." not in name:
+                self.problem(name, str(error))
             return name
-        known = self.known_names()
-        ends = [full for full in known if full.rpartition(".")[2] == name]
-        if len(ends) == 1:
-            return ends[0]
-        if ends:
-            self.problem(name, f"is ambiguous; allowed: {', '.join(ends)}")
-        return name
 
     def known_names(self) -> list[str]:
         """Every dotted name that the laws chosen in the file know."""
@@ -150,6 +149,7 @@ class _Reader:
                 names += self._names_of(Slider, {}, section.name + ".")
             elif isinstance(table, dict):
                 key, default = selector(section.family)
+                names.append(f"{section.name}.{key}")
                 law = section.family.registry.get(table.get(key, default))  # type: ignore[arg-type]
                 names += self._names_of(law, table, section.name + ".") if law else []
         return names

@@ -105,7 +105,7 @@ def response(model: Model) -> Response:
     if not has_closed_form(model):
         raise NotAvailable(
             "the closed form needs exactly one memory variable and no integral control; this model has "
-            f"{len(memory_symbols(model))} memory variables; use the characteristic polynomial instead"
+            f"{len(memory_symbols(model))} memory variables; stable_stiffness gives the edges as numbers"
         )
     (memory,) = memory_symbols(model)
     symbol = model.symbols

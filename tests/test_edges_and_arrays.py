@@ -132,5 +132,7 @@ def test_bad_arrays_are_all_reported():
     assert "nan at position (0,)" in found["friction.d_c"]
     assert "unknown parameter" in found["angel"]
     assert "empty" in found["slider.mass"]
+    with pytest.raises(ss.ParameterError, match="the rig does not have it"):
+        ss.critical_stiffness(rig(), {"axial_stiffness": [1e9]})
     with pytest.raises(ss.ParameterError, match="do not broadcast"):
         ss.critical_stiffness(rig(), {"a": [0.01, 0.02], "b": [1, 2, 3]})

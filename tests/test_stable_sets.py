@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import sympy as sp
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
@@ -12,6 +13,7 @@ from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.state_space import jacobian
 from steadyslip.linear.stiffness import characteristic, closed_form_interval, general_set
+from steadyslip.model import build_model
 from steadyslip.quantities import unit
 from steadyslip.values import model_values
 
@@ -162,3 +164,27 @@ def test_results_do_not_depend_on_the_units(kilogram, metre, second):
         mine, theirs = ss.boundary(r, name), ss.boundary(changed, name)
         assert [e.kind for e in mine] == [e.kind for e in theirs]
         assert [e.value * scale for e in mine] == pytest.approx([e.value for e in theirs], rel=1e-8)
+
+
+@pytest.mark.parametrize("contact", CONTACTS, ids=lambda law: law.name)
+def test_the_model_is_at_rest_in_its_own_steady_state(contact):
+    """T, τ, σ and the rates, evaluated where the Model says that steady sliding is."""
+    r = rig(friction=ONE_MEMORY[1], contact=contact, mass=1e9, damping=1e9, radiation_damping=1e9)
+    model, values = build_model(r), model_values(r)
+    numbers = dict(zip(model.parameters.values(), values.arguments, strict=True))
+    numbers[model.sigma_ss] = ss.steady_state(r).normal_stress
+
+    def value(expression):
+        return float(sp.sympify(expression.xreplace(model.steady)).subs(numbers))
+
+    for symbol, definition in model.definitions.items():
+        assert value(definition) == pytest.approx(value(symbol), rel=1e-13)
+    assert abs(value(model.balance)) < 1e-13 * value(model.symbols["tau"])
+    for rate in model.rates:
+        assert abs(value(rate)) < 1e-13
+
+
+def test_pid_without_integral_gain_is_pd():
+    gains = {"kp": 1e9, "kd": 1e9}
+    pid, pd = (rig(stiffness=None, mass=1e9, drive=law(V0, **gains)) for law in (ss.PID, ss.PD))
+    np.testing.assert_array_equal(ss.eigenvalues(pid), ss.eigenvalues(pd))

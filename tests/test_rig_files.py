@@ -15,7 +15,8 @@ from hypothesis import given, settings, strategies as st
 import steadyslip as ss
 from steadyslip.config.layout import own_fields, sections
 from steadyslip.config.lines import key_lines, line_of
-from steadyslip.records import Option, Parameter, Part
+from steadyslip.protocol import Piece
+from steadyslip.records import Option, Parameter, Role
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")
@@ -224,6 +225,8 @@ def test_changes_override_and_complete_the_file():
         ("contact.angle=", "write NAME=VALUE"),
         ("contact.angle=5 MPa", "wrong dimension"),
         ("friction.states.1.b=3", "unknown|list of tables|cannot be set"),
+        ("protocol.pieces.1.to=3", "a list of tables, [[protocol.pieces]]"),
+        ("protocol.end=3", "unknown key 'end'; allowed: until, pieces"),
     ],
 )
 def test_bad_changes(change, words):
@@ -272,12 +275,12 @@ def test_lines_of_keys():
 
 
 def test_every_parameter_has_unit_and_meaning():
-    for family in [s.family for s in sections() if s.family is not None]:
+    for family in [s.family for s in sections() if s.family is not None] + [Piece]:
         for law in family.registry.values():
             for item in fields(law):
                 role = item.metadata["steadyslip"]
                 assert role.doc
-                assert isinstance(role, Parameter | Option | Part)
+                assert isinstance(role, Role)
 
 
 def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):

@@ -3,15 +3,40 @@
 import json
 import math
 import re
+from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import steadyslip as ss
+from steadyslip.config import protocol_from_text
+from steadyslip.protocol import pack
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")
+EXPERIMENT = """
+[protocol]
+until = "200 s"
+[[protocol.pieces]]
+kind = "slide-hold-slide"
+at = "10 s"
+hold = 2
+slide = "1 s"
+factor = 2
+repeats = 3
+[[protocol.pieces]]
+kind = "normal-stress-table"
+time = [0, "1 min"]
+change = [0, "1 MPa"]
+[[protocol.pieces]]
+kind = "disturbance-harmonic"
+amplitude = 3
+period = "2 s"
+phase = "90 deg"
+until = 100
+"""
 
 values = st.one_of(
     st.floats(),
@@ -68,9 +93,24 @@ def test_any_value_anywhere(data):
 
 
 @given(st.data())
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_any_value_anywhere_in_a_protocol(data):
+    """A protocol that can be cut into segments of finite numbers, or one message."""
+    lines = EXPERIMENT.splitlines()
+    keys = [i for i, line in enumerate(lines) if re.match(r"\w+ =", line)]
+    for i in data.draw(st.lists(st.sampled_from(keys), min_size=1, max_size=3)):
+        lines[i] = f"{lines[i].split('=')[0]}= {toml(data.draw(values))}"
+    try:
+        segments = pack(protocol_from_text("\n".join(lines)), 1e-6, 200.0)
+    except ss.SteadyslipError:
+        return
+    assert all(np.all(np.isfinite(getattr(segments, item.name))) for item in fields(segments))
+
+
+@given(st.data())
 @settings(max_examples=200, deadline=None)
 def test_any_damage_to_the_text(data):
-    text = TEXT
+    text = TEXT + EXPERIMENT
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(text)))
         to = data.draw(st.integers(at, min(len(text), at + 30)))

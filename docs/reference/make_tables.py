@@ -9,8 +9,9 @@ from dataclasses import MISSING
 from pathlib import Path
 
 import steadyslip
-from steadyslip.config.layout import is_per_area, own_fields, sections, selector, total_unit
-from steadyslip.records import Option, Parameter, Part, Record
+from steadyslip.config.layout import PROTOCOL, has_choice, is_per_area, own_fields, sections, selector, total_unit
+from steadyslip.protocol import Protocol
+from steadyslip.records import Option, Parameter, Part, Record, Samples
 from steadyslip.slider import Slider
 
 HERE = Path(__file__).parent
@@ -19,8 +20,9 @@ HERE = Path(__file__).parent
 
 RIG_HEAD = """# Rig file
 
-A rig file is TOML, plain text in UTF-8, with the tables `[friction]`, `[contact]`, `[slider]` and `[drive]`. A whole
-one is [examples/inclined-spring.toml](../../examples/inclined-spring.toml).
+A rig file is TOML, plain text in UTF-8, with the tables `[friction]`, `[contact]`, `[slider]` and `[drive]`; a
+table `[protocol]` may say what is done to the rig in an experiment. A whole one is
+[examples/inclined-spring.toml](../../examples/inclined-spring.toml).
 
 - A number without quotes is in the SI unit of the table below. Text such as `"9 GPa/m"` or `"-45 deg"` carries its
   unit and is checked for the right dimension; anything that can be written so may be.
@@ -31,7 +33,9 @@ one is [examples/inclined-spring.toml](../../examples/inclined-spring.toml).
 - A law inside a table is a table of its own: `[friction.normal_memory]` with `law = "linker-dieterich"`; one
   without parameters may be a word, `normal_memory = "prakash-clifton"`. The parameters of `evolution` stand beside it
   in `[friction]`.
-- Several states are a list: `[[friction.states]]` once for each.
+- Several states are a list: `[[friction.states]]` once for each; so are the pieces of a protocol, `[[protocol.pieces]]`
+  with `kind = "velocity-step"` and its keys.
+- A measured column is a list of numbers, `[0, 1.5, 3]`, or of texts with units.
 - A key without default that is not required is absent unless given.
 - `law` may also name a law of yours: see [Add a friction law](../how-to/add-a-friction-law.md).
 
@@ -61,6 +65,8 @@ def unit_of(role) -> str:
 def row(item, role) -> str:
     if isinstance(role, Parameter):
         unit, allowed = unit_of(role), role.domain.text
+    elif isinstance(role, Samples):
+        unit, allowed = unit_of(role), "list of finite numbers"
     elif isinstance(role, Option):
         unit, allowed = "", ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)
     else:
@@ -89,10 +95,11 @@ def parts_of(law, done: set[type]) -> list[str]:
     for item, role in own_fields(law):
         if isinstance(role, Part) and role.family not in done:
             done.add(role.family)
-            if role.many:
+            if role.many and not has_choice(role.family):
                 lines += [f"### Each of `{item.name}`", "", *table(role.family)]
             for name, choice in role.family.registry.items():
-                key = f"{item.name} = " if role.inline else f"{item.name}: law = "
+                word = selector(role.family)[0]
+                key = f"{item.name} = " if role.inline else f"{item.name}: {word} = "
                 lines += [f'### `{key}"{name}"`', "", summary(choice), "", *table(choice)]
     return lines
 
@@ -109,6 +116,7 @@ def rig_page() -> str:
             absent = f", or without `{key}`" if name == default else ""
             lines += [f'## `[{section.name}]` with `{key} = "{name}"`{absent}', "", summary(law), "", *table(law)]
             lines += parts_of(law, done)
+    lines += [f"## `[{PROTOCOL.name}]`", "", summary(Protocol), "", *table(Protocol), *parts_of(Protocol, done)]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -132,11 +140,16 @@ GROUPS = {
     "friction": "Friction laws",
     "linear": "Linear stability",
     "model": "The Model",
+    "motion": "Motion",
+    "protocol": "Protocols of experiments",
     "records": "To declare a law of your own",
     "slider": "The rig",
     "steady": "Steady sliding",
 }
-ORDER = ("slider", "friction", "contact", "drive", "config", "analysis", "steady", "linear", "model", "records")
+ORDER = (
+    *("slider", "friction", "contact", "drive", "protocol", "config"),
+    *("analysis", "steady", "linear", "model", "records"),
+)
 MODULES = {
     "figures": ("critical_stiffness_against_mass", "root_locus", "stability_chart"),
     "testing": ("check_friction_law", "check_contact_law"),
@@ -161,7 +174,7 @@ def entry(name: str, thing) -> str:
 def python_page() -> str:
     names = public_names()
     lines = [PYTHON_HEAD]
-    for module in (*ORDER, *sorted(set(names) - set(ORDER) - {""}), ""):
+    for module in (*(name for name in ORDER if name in names), *sorted(set(names) - set(ORDER) - {""}), ""):
         lines += [f"## {GROUPS[module]}", "", "| name | what it is |", "|---|---|"]
         lines += [entry(name, getattr(steadyslip, name)) for name in names[module]]
         lines.append("")

@@ -7,6 +7,9 @@ from .analysis import (
 )
 from .config import (
     json_schema as json_schema,
+    piece_from_text as piece_from_text,
+    protocol_from_text as protocol_from_text,
+    read_protocol as read_protocol,
     read_rig as read_rig,
     rig_from_text as rig_from_text,
     rig_to_text as rig_to_text,
@@ -79,11 +82,42 @@ from .model import (
     Model as Model,
     build_model as build_model,
 )
+from .motion import (
+    Ensemble as Ensemble,
+    Event as Event,
+    History as History,
+    SlipEvent as SlipEvent,
+    load_history as load_history,
+    simulate as simulate,
+    simulate_many as simulate_many,
+)
+from .protocol import (
+    DisplacementStep as DisplacementStep,
+    DisturbanceHarmonic as DisturbanceHarmonic,
+    DisturbancePulse as DisturbancePulse,
+    DisturbanceRamp as DisturbanceRamp,
+    DisturbanceStep as DisturbanceStep,
+    DisturbanceTable as DisturbanceTable,
+    Hold as Hold,
+    LoadPointTable as LoadPointTable,
+    NormalStressHarmonic as NormalStressHarmonic,
+    NormalStressPulse as NormalStressPulse,
+    NormalStressRamp as NormalStressRamp,
+    NormalStressStep as NormalStressStep,
+    NormalStressTable as NormalStressTable,
+    Piece as Piece,
+    Protocol as Protocol,
+    SlideHoldSlide as SlideHoldSlide,
+    VelocityHarmonic as VelocityHarmonic,
+    VelocityRamp as VelocityRamp,
+    VelocityStep as VelocityStep,
+)
 from .records import (
     option as option,
     parameter as parameter,
     part as part,
     parts as parts,
+    samples as samples,
 )
 from .slider import (
     Slider as Slider,

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from fractions import Fraction
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from steadyslip import units
 from steadyslip.errors import QuantityError
@@ -175,6 +178,56 @@ def _scaled(digits: str, factor: float) -> float:
         return float(Fraction(digits) * Fraction(repr(factor)))
     except OverflowError:
         return math.copysign(math.inf, plain)
+
+
+def numbers(values: Any, expected: str, read: Callable[[str, str], float] = parse) -> tuple[float, ...]:
+    """Read a column of quantities.
+
+    Parameters
+    ----------
+    values : list, tuple or 1-D array
+        Numbers in SI units, or texts.
+    expected : str
+        SI unit of the column.
+    read : callable, optional
+        What reads a text, given `expected`.
+
+    Returns
+    -------
+    tuple of float
+        The values in SI units, all finite.
+
+    Raises
+    ------
+    QuantityError
+        If this is no such column; names the place, from 1, and the value of the first fault.
+    """
+    if isinstance(values, np.ndarray) and values.ndim == 1:
+        values = values.tolist()
+    if not isinstance(values, (list, tuple)):
+        raise QuantityError(f"got {values!r}; allowed: a list of numbers in {expected}, or of texts with units")
+    found = []
+    for place, value in enumerate(values, start=1):
+        try:
+            number = read(value, expected) if isinstance(value, str) else _plain(value)
+        except QuantityError as error:
+            raise QuantityError(f"value {place}: {error}") from error
+        if not math.isfinite(number):
+            raise QuantityError(f"value {place}: got {value!r}; allowed: a finite number")
+        found.append(number)
+    return tuple(found)
+
+
+def _plain(value: Any) -> float:
+    """A number as a float; truth values, complex numbers and whatever else are none."""
+    if type(value) is float:  # long columns are of these
+        return value
+    if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__") or np.ndim(value) != 0:
+        raise QuantityError(f"got {value!r}; allowed: a finite number or text with a unit")
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise QuantityError(f"got {value!r}; allowed: a finite number or text with a unit") from error
 
 
 _EXAMPLES = {

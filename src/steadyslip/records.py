@@ -19,7 +19,7 @@ from typing import Any, ClassVar, TypeVar, dataclass_transform
 import numpy as np
 
 from steadyslip.errors import ParameterError, Problem, QuantityError, UnknownNameError, unknown_name
-from steadyslip.quantities import example, parse
+from steadyslip.quantities import example, numbers, parse
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,13 @@ class Domain:
     low_allowed: bool
     high_allowed: bool
     text: str
+    whole: bool = False
 
     def contains(self, value: Any) -> Any:
         """Elementwise test, false for NaN and infinity."""
         above = value >= self.low if self.low_allowed else value > self.low
         below = value <= self.high if self.high_allowed else value < self.high
-        return above & below & np.isfinite(value)
+        return above & below & np.isfinite(value) & (not self.whole or np.floor(value) == value)
 
 
 _INF = math.inf
@@ -47,6 +48,7 @@ share = Domain(0, 1, True, True, "a number from 0 to 1")
 angle = Domain(-math.pi / 2, math.pi / 2, False, False, "an angle between -90 deg and 90 deg, both excluded")
 acute = Domain(0, math.pi / 2, False, False, "an angle between 0 and 90 deg, both excluded")
 turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 360 deg")
+count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,14 @@ class Option:
 
 
 @dataclass(frozen=True)
+class Samples:
+    """A field that holds a measured column: a tuple of finite numbers in the SI unit."""
+
+    unit: str
+    doc: str
+
+
+@dataclass(frozen=True)
 class Part:
     """A field that holds another record; ``inline`` puts its parameters beside the owner's."""
 
@@ -95,6 +105,7 @@ class Part:
     many: bool = False
 
 
+Role = Parameter | Option | Part | Samples
 _ROLE = "steadyslip"
 R = TypeVar("R", bound="Record")
 
@@ -119,6 +130,11 @@ def option(*choices: Any, doc: str, default: Any) -> Any:
     return field(default=default, metadata={_ROLE: Option(choices, doc)})
 
 
+def samples(unit: str, doc: str) -> Any:
+    """Declare a measured column: a list or array of numbers, or of texts with units."""
+    return field(metadata={_ROLE: Samples(unit, doc)})
+
+
 def part(family: type[Record], doc: str, *, default: Any = MISSING, inline: bool = False) -> Any:
     """Declare a field that holds another record of `family`."""
     return field(default=default, metadata={_ROLE: Part(family, doc, inline)})
@@ -129,7 +145,9 @@ def parts(family: type[Record], doc: str, *, default: tuple[()]) -> Any:
     return field(default=default, metadata={_ROLE: Part(family, doc, many=True)})
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option, part, parts))
+@dataclass_transform(
+    kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option, samples, part, parts)
+)
 class Record:
     """Frozen, checked when built, addressed by dotted names.
 
@@ -188,32 +206,12 @@ class Record:
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
-def role_of(item: Field[Any]) -> Parameter | Option | Part:
+def role_of(item: Field[Any]) -> Role:
     """The declaration behind a dataclass field."""
-    role: Parameter | Option | Part | None = item.metadata.get(_ROLE)
+    role: Role | None = item.metadata.get(_ROLE)
     if role is None:
         raise TypeError(f"field {item.name!r} has no unit or domain; declare it with parameter(), option() or part()")
     return role
-
-
-def contradictions(law: type[Record], valid: Mapping[str, Any], given: set[str]) -> list[Problem]:
-    """Problems between the fields of a record that cannot be built, because other fields are bad.
-
-    Numbers that were given but are bad, or missing, stand as NaN, which contradicts nothing.
-    """
-    partial = object.__new__(law)
-    for item in fields(law):  # type: ignore[arg-type]
-        role = role_of(item)
-        if item.name in valid:
-            value = valid[item.name]
-        elif item.name in given or is_required(item):
-            if not isinstance(role, Parameter):
-                return []
-            value = math.nan
-        else:
-            value = item.default
-        object.__setattr__(partial, item.name, value)
-    return list(partial.inconsistencies())
 
 
 def field_name(record: Record | type[Record], item: Field[Any], prefix: str) -> str:
@@ -239,6 +237,11 @@ def checked(item: Field[Any], value: Any) -> Any:
                 raise _fault(f"got {value!r}; allowed: true or false")
             raise _fault(unknown_name("choice", value, [str(c) for c in role.choices]))
         return value
+    if isinstance(role, Samples):
+        try:
+            return numbers(value, role.unit)
+        except QuantityError as error:
+            raise _fault(str(error)) from error
     if role.many:
         if not isinstance(value, (list, tuple)):
             raise _fault(f"got {value!r}; allowed: a list of {role.family.__name__}")
@@ -375,6 +378,8 @@ def shape_of(record: Record, prefix: str = "") -> tuple[Any, ...]:
             shape.append(value)
         elif isinstance(role, Parameter):
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")
+        elif isinstance(role, Samples):
+            shape.append("samples")
         elif role.many:
             shape.append(tuple(shape_of(member) for member in value))
         else:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, fields
 from importlib.metadata import entry_points
+from typing import Any
 
 from steadyslip.drive import Drive
 from steadyslip.errors import ParameterError, Problem, unknown_name
+from steadyslip.protocol import Piece, Protocol
 from steadyslip.quantities import Dimension, unit
-from steadyslip.records import Option, Parameter, Part, Record, role_of
+from steadyslip.records import Part, Record, Role, role_of
 from steadyslip.slider import Slider
 
 ENTRY_POINTS = "steadyslip.laws"
@@ -23,8 +25,12 @@ class Section:
     family: type[Record] | None
 
 
+PROTOCOL = Section("protocol", Protocol)
+"""The table that a file may have besides those of the rig."""
+
+
 def sections() -> tuple[Section, ...]:
-    """The tables of a rig file, in order."""
+    """The tables of a rig, in order."""
     found = [Section(item.name, role.family) for item in fields(Slider) if isinstance(role := role_of(item), Part)]
     found.insert(2, Section(Slider.section.rstrip("."), None))
     return tuple(found)
@@ -32,7 +38,14 @@ def sections() -> tuple[Section, ...]:
 
 def selector(family: type[Record]) -> tuple[str, str | None]:
     """The key that names the law of a table, and the law meant when it is absent."""
+    if family is Piece:
+        return "kind", None
     return ("control", "steady") if family is Drive else ("law", None)
+
+
+def has_choice(family: type[Record]) -> bool:
+    """Whether a table of this family names one of several laws, rather than being the one record itself."""
+    return bool(family.registry) and not family.name
 
 
 def find_law(family: type[Record], name: object) -> type[Record]:
@@ -57,7 +70,7 @@ def find_law(family: type[Record], name: object) -> type[Record]:
     raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])
 
 
-def own_fields(law: type[Record]) -> Iterator[tuple[Field[object], Parameter | Option | Part]]:
+def own_fields(law: type[Record]) -> Iterator[tuple[Field[Any], Role]]:
     """The fields of a record that are keys of its own table."""
     for item in fields(law):  # type: ignore[arg-type]
         role = role_of(item)

@@ -2,33 +2,44 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import Field
+from dataclasses import Field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from steadyslip.config.layout import Section, find_law, is_per_area, own_fields, sections, selector, total_unit
+from steadyslip.config.changes import Table, apply
+from steadyslip.config.layout import (
+    PROTOCOL,
+    Section,
+    find_law,
+    has_choice,
+    is_per_area,
+    own_fields,
+    sections,
+    selector,
+    total_unit,
+)
 from steadyslip.config.lines import key_lines, line_of
-from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, UnknownNameError, unknown_name
-from steadyslip.quantities import parse
+from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, unknown_name
+from steadyslip.protocol import Protocol
+from steadyslip.quantities import numbers, parse
 from steadyslip.records import (
-    Option,
     Parameter,
     Part,
     Record,
+    Role,
+    Samples,
     allowed,
     checked,
     checked_number,
-    contradictions,
     is_required,
     positive,
-    resolve,
+    role_of,
 )
 from steadyslip.slider import Slider
-
-Table = dict[str, Any]
 
 
 def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
@@ -50,9 +61,14 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
     RigFileError
         If the file cannot be read or anything in it is wrong; ``problems`` lists everything.
     """
+    return rig_from_text(text_of(path), str(path), changes)
+
+
+def text_of(path: str | PathLike[str]) -> str:
+    """The text of a rig file."""
     name = str(path)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        return Path(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise _failed(name, "no such file") from error
     except IsADirectoryError as error:
@@ -61,11 +77,22 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
         raise _failed(name, "is not UTF-8 text; a rig file is plain text in TOML") from error
     except OSError as error:
         raise _failed(name, f"cannot be read ({error.strerror or error})") from error
-    return rig_from_text(text, name, changes)
 
 
 def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
     """Read a rig from TOML text; see `read_rig`."""
+    rig, _ = read_text(text, source, changes)
+    assert rig is not None
+    return rig
+
+
+def read_text(
+    text: str, source: str, changes: Iterable[str], rig_needed: bool = True
+) -> tuple[Slider | None, Protocol | None]:
+    """The rig and the protocol of a TOML text; all problems of both are reported at once.
+
+    Unless `rig_needed`, a text that has no table but the protocol's is complete without a rig.
+    """
     if not text.strip():
         names = ", ".join(f"[{section.name}]" for section in sections())
         raise _failed(source, f"is empty; a rig file has the tables {names}")
@@ -73,22 +100,24 @@ def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -
         tables = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise _failed(source, f"is not TOML: {error}") from error
-    reader = _Reader(tables)
+    reader = Reader(tables)
     lines = key_lines(text)
     for change in [changes] if isinstance(changes, str) else changes:
-        reader.change(change, lines)
-    rig = reader.rig()
-    if rig is None or reader.problems:
+        reader.problems += apply(change, tables, lines)
+    alone = not rig_needed and set(tables) == {PROTOCOL.name}
+    rig = None if alone else reader.rig()
+    protocol = reader.protocol()
+    if reader.problems or (rig is None and not alone):
         found = [Problem(p.name, p.message, line_of(p.name, lines)) for p in reader.problems]
         raise RigFileError(sorted(found, key=lambda p: p.line or 0), title=source)
-    return rig
+    return rig, protocol
 
 
 def _failed(name: str, message: str) -> RigFileError:
     return RigFileError([Problem(name, message)])
 
 
-class _Reader:
+class Reader:
     """One pass over a file's tables, collecting problems."""
 
     def __init__(self, tables: Table) -> None:
@@ -99,82 +128,8 @@ class _Reader:
     def problem(self, name: str, message: str) -> None:
         self.problems.append(Problem(name, message))
 
-    # -- changes from the command line
-
-    def change(self, text: str, lines: dict[str, int]) -> None:
-        """Apply ``name=value`` to the tables."""
-        name, equals, raw = (part.strip() for part in text.partition("="))
-        if not equals or not name or not raw:
-            self.problem(text, "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")
-            return
-        try:
-            value = tomllib.loads(f"value = {raw}")["value"]
-        except tomllib.TOMLDecodeError:
-            value = raw
-        full = self._full_name(name)
-        *path, last = full.split(".")
-        table: Any = self.tables
-        for step in path:
-            if isinstance(table, list):
-                index = int(step) - 1 if step.isdigit() else -1
-                table = table[index] if 0 <= index < len(table) else None
-            elif isinstance(table, dict):
-                table = table.setdefault(step, {})
-            if not isinstance(table, (dict, list)):
-                self.problem(name, "cannot be set: there is no such table in the file")
-                return
-        if isinstance(table, list):
-            self.problem(name, "cannot be set: name one value of one member, such as friction.states.1.b")
-            return
-        table[last] = value
-        for key in [key for key in lines if key == full]:  # the fault is no longer on that line
-            del lines[key]
-
-    def _full_name(self, name: str) -> str:
-        """A shortened name stands for the one key of that name that the chosen laws have."""
-        known = dict.fromkeys(self.known_names())
-        try:
-            return resolve(name, known)
-        except UnknownNameError as error:
-            if "." not in name:
-                self.problem(name, str(error))
-            return name
-
-    def known_names(self) -> list[str]:
-        """Every dotted name that the laws chosen in the file know."""
-        names: list[str] = []
-        for section in sections():
-            table = self.tables.get(section.name)
-            if section.family is None:
-                names += self._names_of(Slider, {}, section.name + ".")
-            elif isinstance(table, dict):
-                key, default = selector(section.family)
-                names.append(f"{section.name}.{key}")
-                law = section.family.registry.get(table.get(key, default))  # type: ignore[arg-type]
-                names += self._names_of(law, table, section.name + ".") if law else []
-        return names
-
-    def _names_of(self, law: type[Record], table: Table, prefix: str) -> list[str]:
-        names: list[str] = []
-        for item, role in own_fields(law):
-            inner = table.get(item.name)
-            if not isinstance(role, Part):
-                names.append(prefix + item.name)
-            elif role.many and isinstance(inner, list):
-                for index, member in enumerate(inner, start=1):
-                    names += self._names_of(role.family, member, f"{prefix}{item.name}.{index}.")
-            elif not role.many:
-                chosen = inner.get("law") if isinstance(inner, dict) else inner
-                found = role.family.registry.get(chosen) if isinstance(chosen, str) else None
-                part_prefix = prefix if role.inline else f"{prefix}{item.name}."
-                names += [prefix + item.name] if role.inline else []
-                names += self._names_of(found, {}, part_prefix) if found else []
-        return names
-
-    # -- tables to records
-
     def rig(self) -> Slider | None:
-        known = {section.name for section in sections()}
+        known = {section.name for section in (*sections(), PROTOCOL)}
         for name in self.tables:
             if name not in known:
                 self.problem(name, unknown_name("table", name, sorted(known)))
@@ -185,6 +140,16 @@ class _Reader:
         if self.problems or any(part is None for part in parts.values()):
             return None
         return self._built(Slider, {**arguments, **parts}, "slider.")  # type: ignore[return-value]
+
+    def protocol(self) -> Protocol | None:
+        """The protocol, None if the file has none; comes after the rig, whose area it needs."""
+        if PROTOCOL.name not in self.tables:
+            return None
+        before = len(self.problems)
+        table = self._table(PROTOCOL.name)
+        if len(self.problems) > before:
+            return None
+        return self._complete(Protocol, table, f"{PROTOCOL.name}.")  # type: ignore[return-value]
 
     def _table(self, name: str) -> Table:
         table = self.tables.get(name, {})
@@ -208,11 +173,11 @@ class _Reader:
             example = f"{key} = {next(iter(section.family.registry))!r}" if default is None else "velocity = '1 um/s'"
             self.problem(section.name, f"missing table; write [{section.name}] with {example} and its parameters")
             return None
-        return self._record(section.family, self._table(section.name), f"{section.name}.")
+        return self.record(section.family, self._table(section.name), f"{section.name}.")
 
-    def _record(self, family: type[Record], table: Table, prefix: str) -> Record | None:
+    def record(self, family: type[Record], table: Table, prefix: str) -> Record | None:
         """The record that a table describes, or None after noting its problems."""
-        if not family.registry or family.name:
+        if not has_choice(family):
             law, rest = family, table
         else:
             key, default = selector(family)
@@ -231,7 +196,7 @@ class _Reader:
         arguments = self._arguments(law, table, prefix)
         if len(self.problems) == before:
             return self._built(law, arguments, prefix)
-        self.problems += [p.under(prefix.rstrip(".")) for p in contradictions(law, arguments, set(table))]
+        self.problems += [p.under(prefix.rstrip(".")) for p in _contradictions(law, arguments, set(table))]
         return None
 
     def _law(self, family: type[Record], name: object, where: str) -> type[Record] | None:
@@ -280,13 +245,13 @@ class _Reader:
         mine = {name: rest.pop(name) for name in names if name in rest}
         return self._complete(law, mine, prefix)
 
-    def _value(self, item: Field[Any], role: Parameter | Option | Part, raw: Any, name: str) -> Any:
+    def _value(self, item: Field[Any], role: Role, raw: Any, name: str) -> Any:
         """One checked value, None after noting a problem."""
         if isinstance(role, Part):
             return self._part(role, raw, name)
         try:
-            if isinstance(role, Parameter) and self.area is not None and is_per_area(role.unit):
-                return self._total(role, raw)
+            if isinstance(role, (Parameter, Samples)) and self.area is not None and is_per_area(role.unit):
+                return self._total(role, raw) if isinstance(role, Parameter) else self._totals(role, raw, self.area)
             return checked(item, raw)
         except ParameterError as error:
             self.problem(name, error.problems[0].message)
@@ -297,7 +262,7 @@ class _Reader:
             if not isinstance(raw, list) or not all(isinstance(member, dict) for member in raw):
                 self.problem(name, f"got {raw!r}; allowed: a list of tables, [[{name}]]")
                 return None
-            members = [self._record(role.family, member, f"{name}.{i}.") for i, member in enumerate(raw, start=1)]
+            members = [self.record(role.family, member, f"{name}.{i}.") for i, member in enumerate(raw, start=1)]
             return None if None in members else tuple(members)
         table = {"law": raw} if isinstance(raw, str) else raw
         if not isinstance(table, Mapping):
@@ -305,7 +270,7 @@ class _Reader:
                 name, f"got {raw!r}; allowed: a table [{name}] with law = one of {', '.join(role.family.registry)}"
             )
             return None
-        return self._record(role.family, dict(table), f"{name}.")
+        return self.record(role.family, dict(table), f"{name}.")
 
     def _total(self, role: Parameter, raw: Any) -> float:
         """A value for the whole area (N, N/m, kg, ...) as one per unit area; text may give either."""
@@ -321,8 +286,47 @@ class _Reader:
         whole = Parameter(total_unit(role.unit), role.domain, role.doc)
         return checked_number(role, checked_number(whole, raw) / self.area)
 
+    def _totals(self, role: Samples, raw: Any, area: float) -> tuple[float, ...]:
+        """A column for the whole area as one per unit area; its texts may give either."""
 
-def _missing(role: Parameter | Option | Part) -> str:
+        def read(text: str, total: str) -> float:
+            try:
+                return parse(text, total)
+            except QuantityError as error:
+                try:
+                    return parse(text, role.unit) * area
+                except QuantityError:
+                    raise QuantityError(f"{error} (the rig has an area)") from error
+
+        try:
+            return tuple(value / area for value in numbers(raw, total_unit(role.unit), read))
+        except QuantityError as error:
+            raise ParameterError([Problem("", str(error))]) from error
+
+
+def _missing(role: Role) -> str:
     if isinstance(role, Parameter):
         return f"missing ({role.doc}); allowed: {allowed(role)}"
+    if isinstance(role, Samples):
+        return f"missing ({role.doc}); allowed: a list of numbers in {role.unit}, or of texts with units"
     return f"missing ({role.doc})"
+
+
+def _contradictions(law: type[Record], valid: Mapping[str, Any], given: set[str]) -> list[Problem]:
+    """Problems between the fields of a record that cannot be built, because other fields are bad.
+
+    Numbers that were given but are bad, or missing, stand as NaN, which contradicts nothing.
+    """
+    partial = object.__new__(law)
+    for item in fields(law):  # type: ignore[arg-type]
+        role = role_of(item)
+        if item.name in valid:
+            value = valid[item.name]
+        elif item.name in given or is_required(item):
+            if not isinstance(role, Parameter):
+                return []
+            value = math.nan
+        else:
+            value = item.default
+        object.__setattr__(partial, item.name, value)
+    return list(partial.inconsistencies())

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from steadyslip.config.layout import own_fields, sections, selector
+from steadyslip.config.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.protocol import Protocol
 from steadyslip.quantities import example
-from steadyslip.records import Option, Parameter, Part, Record, is_required
+from steadyslip.records import Option, Parameter, Part, Record, Role, Samples, is_required
 from steadyslip.slider import Slider
 
 Schema = dict[str, Any]
@@ -23,6 +24,7 @@ def json_schema() -> Schema:
         else:
             properties[section.name] = _family(section.family)
             required.append(section.name)
+    properties[PROTOCOL.name] = _table(Protocol, {}, _summary(Protocol))
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "steadyslip rig",
@@ -66,22 +68,33 @@ def _table(law: type[Record], properties: Schema, description: str) -> Schema:
     return schema
 
 
-def _value(role: Parameter | Option | Part) -> Schema:
+def _value(role: Role) -> Schema:
     if isinstance(role, Option):
         return {"enum": list(role.choices), "description": role.doc}
     if isinstance(role, Part):
         if role.many:
-            return {"type": "array", "items": _table(role.family, {}, _summary(role.family)), "description": role.doc}
+            member = _family(role.family) if has_choice(role.family) else _table(role.family, {}, _summary(role.family))
+            return {"type": "array", "items": member, "description": role.doc}
         return {"description": role.doc, "anyOf": [{"enum": list(role.family.registry)}, _family(role.family)]}
-    number: Schema = {"type": "number"}
+    if isinstance(role, Samples):
+        member = {"anyOf": [{"type": "number"}, _text(role.unit)]}
+        return {"type": "array", "items": member, "description": f"{role.doc}, {role.unit}"}
+    return _number(role)
+
+
+def _number(role: Parameter) -> Schema:
     domain = role.domain
+    number: Schema = {"type": "integer" if domain.whole else "number"}
     if math.isfinite(domain.low):
         number["minimum" if domain.low_allowed else "exclusiveMinimum"] = domain.low
     if math.isfinite(domain.high):
         number["maximum" if domain.high_allowed else "exclusiveMaximum"] = domain.high
     unit = "" if role.unit == "1" else f", {role.unit}"
-    text = {"type": "string", "description": f"text such as {example(role.unit)}"}
-    return {"description": role.doc + unit, "anyOf": [number, text]}
+    return {"description": role.doc + unit, "anyOf": [number, _text(role.unit)]}
+
+
+def _text(unit: str) -> Schema:
+    return {"type": "string", "description": f"text such as {example(unit)}"}
 
 
 def _summary(law: type[Record]) -> str:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
-from steadyslip.config.layout import is_per_area, own_fields, sections, selector, total_unit
+from steadyslip.config.layout import PROTOCOL, has_choice, is_per_area, own_fields, sections, selector, total_unit
 from steadyslip.errors import ParameterError, Problem
-from steadyslip.records import Option, Parameter, Part, Record
+from steadyslip.protocol import Protocol
+from steadyslip.records import Option, Parameter, Part, Record, Samples
 from steadyslip.slider import Slider
 
 
-def write_rig(rig: Slider, path: str | PathLike[str]) -> None:
-    """Write a rig file; see `rig_to_text`.
+def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None = None) -> None:
+    """Write a rig file, with the protocol of an experiment if one is given; see `rig_to_text`.
 
     Raises
     ------
@@ -22,16 +24,16 @@ def write_rig(rig: Slider, path: str | PathLike[str]) -> None:
     OSError
         If the file cannot be written.
     """
-    Path(path).write_text(rig_to_text(rig), encoding="utf-8")
+    Path(path).write_text(rig_to_text(rig, protocol), encoding="utf-8")
 
 
-def rig_to_text(rig: Slider) -> str:
+def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
     """The rig as TOML, SI numbers with the unit as a comment; with an area, totals (N, N/m, kg).
 
     Raises
     ------
     ParameterError
-        If the rig has a law without registered name, which no file can refer to.
+        If the rig or the protocol has a law without registered name, which no file can refer to.
     """
     blocks = []
     for section in sections():
@@ -42,6 +44,8 @@ def rig_to_text(rig: Slider) -> str:
             word = _law_name(record, section.name)
             first = [] if word == default else [f'{key} = "{word}"']
         blocks.append(_table(f"[{section.name}]", record, first, section.name, rig.area))
+    if protocol is not None:
+        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, rig.area))
     return "\n".join(blocks)
 
 
@@ -59,10 +63,12 @@ def _table(header: str, record: Record, first: list[str], path: str, area: float
         value = getattr(record, item.name)
         if value is None or value == item.default:
             continue
-        if not isinstance(role, Part):
+        if isinstance(role, Samples):
+            lines.append(f"{item.name} = {_column(role, value, area)}")
+        elif not isinstance(role, Part):
             lines.append(f"{item.name} = {_scalar(role, value, area)}")
         elif role.many:
-            below += [_table(f"[[{path}.{item.name}]]", member, [], path, area) for member in value]
+            below += [_member(role.family, member, f"{path}.{item.name}", path, area) for member in value]
         elif role.inline:
             lines.append(f'{item.name} = "{_law_name(value, path)}"')
             lines += _table("", value, [], path, area).splitlines()[1:]
@@ -72,10 +78,27 @@ def _table(header: str, record: Record, first: list[str], path: str, area: float
     return "\n".join(["\n".join(lines) + "\n", *below])
 
 
+def _member(family: type[Record], member: Record, name: str, path: str, area: float | None) -> str:
+    """One table of a list."""
+    first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
+    return _table(f"[[{name}]]", member, first, path, area)
+
+
 def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
     if isinstance(role, Option):
         return str(value).lower() if isinstance(value, bool) else f'"{value}"'
-    unit = role.unit
-    if area is not None and is_per_area(unit):
-        value, unit = value * area, total_unit(unit)
-    return repr(float(value)) + (f"  # {unit}" if unit != "1" else "")
+    factor, unit = _written(role.unit, area)
+    number = f"{value:.0f}" if role.domain.whole else repr(float(value) * factor)
+    return number + (f"  # {unit}" if unit != "1" else "")
+
+
+def _column(role: Samples, values: tuple[float, ...], area: float | None) -> str:
+    """A list of numbers, on as many lines as it needs."""
+    factor, unit = _written(role.unit, area)
+    text = wrap(", ".join(repr(value * factor) for value in values), 100, break_on_hyphens=False)
+    return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
+
+
+def _written(unit: str, area: float | None) -> tuple[float, str]:
+    """Factor and unit in which a quantity is written."""
+    return (area, total_unit(unit)) if area is not None and is_per_area(unit) else (1.0, unit)

@@ -1,0 +1,189 @@
+"""Kernel text to machine code, kept between processes in the user's cache folder.
+
+A compiled function is stored under the hash of its text, of all versions that matter and of the processor, in
+one file with its own checksum, written under a temporary name and moved into place. Anything odd about such a
+file (damaged, foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder
+that cannot be written to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import hashlib
+import math
+import os
+import pickle
+import struct
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+ENTRIES = {
+    "advance": "int64(float64[::1], int64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], "
+    "float64[:,:,::1], float64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1], "
+    "float64[:,::1], int64)",
+    "observe": "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
+}
+_MAGIC = b"steadyslip kernel 1\n"
+_lock = threading.RLock()
+_loaded: dict[str, ModuleType] = {}
+
+
+def cache_folder() -> Path | None:
+    """Where compiled kernels are kept; None if they are not."""
+    chosen = os.environ.get("STEADYSLIP_CACHE")
+    if chosen is not None:
+        return Path(chosen) if chosen else None
+    from platformdirs import user_cache_path
+
+    return user_cache_path("steadyslip") / "kernels"
+
+
+def source_of(text: str) -> str:
+    """The whole source of a kernel: primitives, then its own text."""
+    return files("steadyslip.compiled").joinpath("primitives.py").read_text(encoding="utf-8") + text
+
+
+def interpreted(text: str) -> ModuleType:
+    """The kernel as plain Python, slow: for tests of the text itself."""
+
+    def keep(**_: Any) -> Any:
+        return lambda function: function
+
+    def bits(x: float) -> int:
+        return int(struct.unpack("<q", struct.pack("<d", x))[0])
+
+    def real(i: int) -> np.float64:
+        number = struct.unpack("<d", struct.pack("<q", (i + 2**63) % 2**64 - 2**63))[0]
+        return np.float64(number)  # division by zero gives infinity, as in machine code
+
+    module = ModuleType("steadyslip_kernel_interpreted")
+    options: dict[str, Any] = {"PLAIN": {}, "INLINE": {}, "FLAT": {}, "ENTRY": {}}
+    module.__dict__.update(math=math, np=np, njit=keep, bits=bits, real=real, **options)
+    exec(compile(source_of(text), "<kernel>", "exec"), module.__dict__)
+    return module
+
+
+def compiled(text: str) -> ModuleType:
+    """The kernel as machine code: compiled now, or found in the cache."""
+    source = source_of(text)
+    key = _key(source)
+    with _lock:
+        if key not in _loaded:
+            _loaded[key] = _module(source, key)
+        return _loaded[key]
+
+
+@lru_cache(maxsize=1)
+def _surroundings() -> str:
+    """Everything but the source that machine code depends on."""
+    import llvmlite
+    import llvmlite.binding as llvm
+    import numba
+
+    switches = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    processor = [llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
+    versions = [sys.version, numba.__version__, llvmlite.__version__, np.__version__]
+    return "\n".join([*versions, *processor, *switches])
+
+
+def _key(source: str) -> str:
+    return hashlib.sha256(f"{_surroundings()}\n{ENTRIES}\n{source}".encode()).hexdigest()
+
+
+def _module(source: str, key: str) -> ModuleType:
+    import numba
+
+    from steadyslip.compiled.bits import bits, real
+
+    fast = {"fastmath": {"contract", "nsz"}, "error_model": "numpy", "boundscheck": False}
+    inner = fast | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    module = ModuleType(f"steadyslip_kernel_{key}")
+    sys.modules[module.__name__] = module  # numba finds a cached function's globals by module name
+    options = {"PLAIN": inner, "FLAT": inner, "INLINE": inner | {"forceinline": True}, "ENTRY": fast | {"nogil": True}}
+    module.__dict__.update(math=math, np=np, njit=numba.njit, bits=bits, real=real, **options)
+    exec(compile(source, f"<{module.__name__}>", "exec"), module.__dict__)
+    folder = cache_folder()
+    with _without_collection():
+        for name, signature in ENTRIES.items():
+            function = getattr(module, name)
+            function._cache = _FileCache(None if folder is None else folder / f"{key}-{name}")
+            function.compile(signature)
+            function.disable_compile()
+    return module
+
+
+@contextlib.contextmanager
+def _without_collection() -> Iterator[None]:
+    """Compilation makes millions of objects that live; looking for garbage among them takes a third of its time."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+class _FileCache:
+    """What a numba dispatcher asks of its cache, for one function in one checked file."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+
+    @property
+    def cache_path(self) -> str:
+        return str(self.path)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled function, or None if there is no sound file for it."""
+        content = self._sound_content()
+        if content is None:
+            return None
+        from numba.core.compiler import CompileResult
+
+        target_context.refresh()
+        try:
+            return CompileResult._rebuild(target_context, *pickle.loads(content))  # type: ignore[no-untyped-call]
+        except Exception:  # whatever a file of another build may raise: compile instead
+            return None
+
+    def _sound_content(self) -> bytes | None:
+        if self.path is None:
+            return None
+        try:
+            if hasattr(os, "getuid") and self.path.stat().st_uid != os.getuid():
+                return None  # a pickle from somebody else is not to be trusted
+            raw = self.path.read_bytes()
+        except OSError:
+            return None
+        head, digest, content = raw[: len(_MAGIC)], raw[len(_MAGIC) : len(_MAGIC) + 32], raw[len(_MAGIC) + 32 :]
+        if head != _MAGIC or hashlib.sha256(content).digest() != digest:
+            return None
+        return content
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Write the file, or do without."""
+        if self.path is None:
+            return
+        content = pickle.dumps(data._reduce(), protocol=-1)
+        temporary = None
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            descriptor, temporary = tempfile.mkstemp(dir=self.path.parent, prefix="writing-")
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(_MAGIC + hashlib.sha256(content).digest() + content)
+            os.replace(temporary, self.path)
+        except OSError:
+            if temporary is not None:
+                with contextlib.suppress(OSError):
+                    os.unlink(temporary)

@@ -1,0 +1,145 @@
+"""Runs kernels: one trajectory with everything recorded, or many in lanes on all cores."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.compiled.program import TALLY, Program
+from steadyslip.motion.setup import Jobs
+
+LANES = 16
+CHUNK = 2048  # jobs per call: keeps the arrays small and Ctrl-C prompt
+QUOTA = 20_000  # passes between looks at the clock and at Ctrl-C, some tens of milliseconds
+INTERRUPTED = 7
+NO_STEADY = 8
+ILL_POSED = 9
+
+
+@dataclass
+class Outcome:
+    """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only.
+
+    ``final`` has columns time, segment, accepted, rejected, then the state.
+    """
+
+    status: np.ndarray
+    final: np.ndarray
+    tally: np.ndarray
+    samples: np.ndarray
+    log: np.ndarray
+    recorded: np.ndarray
+
+
+class _Call:
+    """The arrays of one chain of calls to a kernel."""
+
+    def __init__(self, machine: Program, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
+        text = machine.text
+        lanes = text.choice.lanes
+        self.advance = machine.module.advance
+        self.tables, self.times = tables, times
+        self.work = np.zeros(text.row_count * lanes)
+        self.ids = np.zeros(lanes, dtype=np.int64)
+        self.cursor = np.array([0, size, lanes, -1, 0, 0, 0, 0], dtype=np.int64)
+        self.status = np.zeros(size, dtype=np.int64)
+        self.final = np.full((size, 4 + text.size), np.nan)
+        self.tally = np.full((size, len(TALLY) + 1), np.nan)
+        self.samples = np.full((size, len(times), text.size), np.nan)
+        self.log = np.zeros((0, 8))
+        self.recorded = np.zeros((0, 2 + text.size))
+
+    def go(self, quota: int) -> int:
+        """0 done, 1 a buffer is full, 2 quota used up."""
+        found: int = self.advance(
+            self.work, self.ids, self.cursor, *self.tables, self.times, self.status, self.final, self.tally,
+            self.samples, self.log, self.recorded, quota,
+        )  # fmt: skip
+        return found
+
+    def outcome(self) -> Outcome:
+        self.status[self.status == 0] = INTERRUPTED
+        return Outcome(
+            self.status, self.final, self.tally, self.samples,
+            self.log[: self.cursor[4]], self.recorded[: self.cursor[5]],
+        )  # fmt: skip
+
+
+def run_single(jobs: Jobs, machine: Program, times: np.ndarray, watch: bool, record: bool) -> Outcome:
+    """One trajectory, with its events and, if asked, its own steps. Ctrl-C ends it early, with what there is."""
+    tables = jobs.tables(machine, 0, 1, watch, record)
+    call = _Call(machine, tables, 1, times)
+    if watch:
+        call.log = np.zeros((64, 8))
+    if record:
+        call.recorded = np.zeros((512, call.recorded.shape[1]))
+    try:
+        while (reason := call.go(QUOTA * 10)) != 0:
+            if reason == 1:
+                call.log = np.concatenate([call.log, np.zeros_like(call.log)])
+                call.recorded = np.concatenate([call.recorded, np.zeros_like(call.recorded)])
+    except KeyboardInterrupt:
+        pass
+    return call.outcome()
+
+
+def run_chunk(
+    jobs: Jobs, machine: Program, start: int, stop: int, times: np.ndarray, watch: bool, stopped: threading.Event
+) -> Outcome:
+    """Some jobs in lanes, until done or asked to stop."""
+    call = _Call(machine, jobs.tables(machine, start, stop, watch, False), stop - start, times)
+    while call.go(QUOTA) != 0 and not stopped.is_set():
+        pass
+    return call.outcome()
+
+
+def run_many(
+    work: Callable[[int, int, threading.Event], None],
+    size: int,
+    threads: int | None = None,
+    chunk: int = CHUNK,
+    advanced: Callable[[int], None] | None = None,
+) -> bool:
+    """Do `work` on consecutive chunks of jobs on all cores; False if Ctrl-C ended it early.
+
+    At most two chunks per thread wait at any time, so that memory does not grow with the number of jobs.
+    """
+    count = threads or available_cores()
+    chunk = max(LANES, min(chunk, -(-size // (4 * count))))
+    stopped = threading.Event()
+    starts = iter(range(0, size, chunk))
+    pending: dict[Future[None], int] = {}
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            while True:
+                while len(pending) < 2 * count and (start := next(starts, None)) is not None:
+                    stop = min(start + chunk, size)
+                    pending[pool.submit(work, start, stop, stopped)] = stop - start
+                if not pending:
+                    return True
+                done, _ = wait(pending, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+                    if advanced is not None:
+                        advanced(pending[future])
+                    del pending[future]
+        except KeyboardInterrupt:
+            stopped.set()
+            for future in pending:
+                future.cancel()
+            return False
+        except BaseException:
+            stopped.set()
+            raise
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,97 @@
+"""What happened in a run: moments, and the slip events that they delimit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.compiled.program import LOG_KINDS
+
+
+@dataclass(frozen=True)
+class Event:
+    """A moment of a run.
+
+    Attributes
+    ----------
+    kind : str
+        ``slip begins`` (the block becomes faster than the load point), ``slip ends``, ``velocity peak``,
+        ``arrest``, ``restart``, ``contact lost`` or ``blow-up``.
+    time : float
+        s, located on the dense output.
+    velocity : float
+        m/s.
+    normal_stress, shear_stress, spring_stress : float
+        Pa.
+    slip : float
+        Distance slipped since the start of the run, m.
+    """
+
+    kind: str
+    time: float
+    velocity: float
+    normal_stress: float
+    shear_stress: float
+    spring_stress: float
+    slip: float
+
+
+@dataclass(frozen=True)
+class SlipEvent:
+    """A time in which the block is faster than the load point: the spring unloads.
+
+    Attributes
+    ----------
+    begin, end, duration : float
+        s.
+    slip : float
+        m.
+    stress_drop : float
+        Fall of the spring stress, Pa.
+    peak_velocity, peak_time : float
+        m/s and s.
+    recurrence : float
+        Time since the event before began, s; NaN for the first.
+    """
+
+    begin: float
+    end: float
+    duration: float
+    slip: float
+    stress_drop: float
+    peak_velocity: float
+    peak_time: float
+    recurrence: float
+
+
+def events_of(log: np.ndarray) -> tuple[Event, ...]:
+    """The kernel's log as records, in the order of time."""
+    return tuple(Event(LOG_KINDS[int(row[0])], *(float(x) for x in row[1:7])) for row in log)
+
+
+def slip_events(events: tuple[Event, ...]) -> tuple[SlipEvent, ...]:
+    """Complete slip events of a run; one that is still going on at the end is not among them."""
+    found: list[SlipEvent] = []
+    begin: Event | None = None
+    peak: Event | None = None
+    for event in events:
+        if event.kind == "slip begins":
+            begin, peak = event, event
+        elif begin is not None and event.kind == "velocity peak":
+            peak = event if peak is None or event.velocity > peak.velocity else peak
+        elif begin is not None and peak is not None and event.kind == "slip ends":
+            found.append(
+                SlipEvent(
+                    begin=begin.time,
+                    end=event.time,
+                    duration=event.time - begin.time,
+                    slip=event.slip - begin.slip,
+                    stress_drop=begin.spring_stress - event.spring_stress,
+                    peak_velocity=peak.velocity,
+                    peak_time=peak.time,
+                    recurrence=begin.time - found[-1].begin if found else float("nan"),
+                )
+            )
+            begin = None
+    return tuple(found)

@@ -1,0 +1,338 @@
+"""Many runs at once: the same rig with other numbers, in lanes, on all cores."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.compiled.program import TALLY
+from steadyslip.errors import ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.motion.engine import ILL_POSED, INTERRUPTED, LANES, NO_STEADY, Outcome, run_chunk, run_many
+from steadyslip.motion.observe import observable_units, observe, segment_of
+from steadyslip.motion.setup import Jobs, Options, prepare
+from steadyslip.motion.single import checked_times
+from steadyslip.motion.status import WORDS
+from steadyslip.protocol import Protocol
+from steadyslip.records import resolve
+from steadyslip.slider import Slider
+
+EVENT_UNITS = dict(zip(TALLY, ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "1", "s", "s"), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Results of many runs; every array has the broadcast shape of what was varied.
+
+    Attributes
+    ----------
+    status_code : ndarray of int
+    end : ndarray
+        Time reached, s.
+    steps, rejected : ndarray of int
+    final : dict of str to ndarray
+        Observables at the end, SI units.
+    events : dict of str to ndarray
+        Per run: number of complete slip events, highest and lowest velocity, and of the last complete event
+        begin, duration, slip, stress drop, peak velocity and recurrence; number of arrests and velocity peaks,
+        time of the last peak and the period between the last two. NaN where there is none; empty unless asked for.
+    samples : dict of str to ndarray
+        Observables at `times`, which is the last axis; NaN after the end of a run.
+    times : ndarray
+    units : dict of str to str
+    """
+
+    status_code: np.ndarray
+    end: np.ndarray
+    steps: np.ndarray
+    rejected: np.ndarray
+    final: dict[str, np.ndarray] = field(repr=False)
+    events: dict[str, np.ndarray] = field(repr=False)
+    samples: dict[str, np.ndarray] = field(repr=False)
+    times: np.ndarray = field(repr=False)
+    units: dict[str, str] = field(repr=False)
+    _dims: tuple[str, ...] = field(default=(), repr=False)
+    _coords: Any = field(default=None, repr=False)
+
+    @property
+    def status(self) -> np.ndarray:
+        """How each run ended, in words."""
+        words: np.ndarray = np.array(WORDS)[self.status_code]
+        return words
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.status_code.shape
+
+    def summary(self) -> str:
+        """How many runs ended how."""
+        codes, counts = np.unique(self.status_code, return_counts=True)
+        parts = [f"{count} {WORDS[code]}" for code, count in zip(codes, counts, strict=True)]
+        return f"{self.status_code.size} runs: " + ", ".join(parts)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset; axes are named as those of the DataArrays that were varied, or dim_0, dim_1, ..."""
+        import xarray as xr
+
+        dims = self._dims or tuple(f"dim_{i}" for i in range(len(self.shape)))
+        variables: dict[str, Any] = {
+            "status": (dims, self.status),
+            "end": (dims, self.end, {"units": "s"}),
+            "steps": (dims, self.steps),
+            "rejected": (dims, self.rejected),
+        }
+        variables |= {f"final_{n}": (dims, a, {"units": self.units[n]}) for n, a in self.final.items()}
+        variables |= {f"event_{n}": (dims, a, {"units": EVENT_UNITS[n]}) for n, a in self.events.items()}
+        variables |= {n: ((*dims, "time"), a, {"units": self.units[n]}) for n, a in self.samples.items()}
+        coords = dict(self._coords or {})
+        if len(self.times):
+            coords["time"] = ("time", self.times, {"units": "s"})
+        return xr.Dataset(variables, coords=coords)
+
+
+def simulate_many(
+    rig: Slider,
+    vary: Mapping[str, Any],
+    protocol: Any = None,
+    *,
+    until: float | None = None,
+    initial: Mapping[str, Any] | None = None,
+    times: Any = None,
+    observables: Sequence[str] | None = None,
+    events: bool = True,
+    method: str = "auto",
+    rtol: float = 1e-7,
+    most_steps: int = 1_000_000,
+    arrest: float = 1e-3,
+    threads: int | None = None,
+    progress: bool | None = None,
+    branch: int = 0,
+) -> Ensemble:
+    """Integrate many variants of a rig side by side.
+
+    Results do not depend on the number of threads or on which other runs there are; they equal those of
+    `simulate` to within its tolerance (exactly the same steps are taken).
+
+    Parameters
+    ----------
+    rig : Slider
+    vary : mapping of str to array_like or xarray.DataArray
+        Parameters by dotted name, in SI units: of the rig, or of the protocol as ``protocol.pieces.1.to``.
+        Arrays broadcast against each other.
+    protocol, until, method, rtol, most_steps, arrest, branch
+        As in `simulate`.
+    initial : mapping of str to array_like, optional
+        Starting values as in `simulate`; arrays broadcast with those of `vary`.
+    times : array_like, optional
+        Times at which to sample, s.
+    observables : sequence of str, optional
+        Which to keep, in `final` and `samples`; all unless given.
+    events : bool, optional
+        Whether to gather event statistics; without, runs are some tenths faster.
+    threads : int, optional
+        All cores unless given.
+    progress : bool, optional
+        Whether to show a progress bar; by default on a terminal, for work of more than a second or two.
+
+    Returns
+    -------
+    Ensemble
+        After Ctrl-C, runs that were not finished have the status ``interrupted``.
+
+    Raises
+    ------
+    ParameterError
+        If anything given is wrong; everything is listed.
+    """
+    options = Options(method, rtol, most_steps, arrest)
+    flat, start, shape, dims, coords = _broadcast(rig, Protocol.of(protocol), vary, initial or {})
+    size = int(np.prod(shape, dtype=int))
+    store: _Store | None = None
+    groups = list(_regimes(rig, flat, size))
+    with _progress(size, progress) as advanced:
+        for group_rig, chosen, index in groups:
+            part = {name: _picked(a, index) for name, a in chosen.items()}
+            begin = {name: _picked(a, index) for name, a in start.items()}
+            jobs = prepare(group_rig, protocol, until, part, begin, options, branch)
+            requested = checked_times(times, float(jobs.segments.end.max()))
+            if store is None:
+                store = _Store(jobs, size, requested, observables, events)
+            count = size if index is None else len(index)
+            if not _run(jobs, store, index, count, requested, threads, advanced):
+                break
+    assert store is not None
+    return store.result(shape, dims, coords)
+
+
+def _broadcast(
+    rig: Slider, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, Any], tuple[int, ...], tuple[str, ...], Any]:
+    """Flat arrays of equal length by full name, the starting values apart, and the common shape."""
+    known = dict.fromkeys(rig.parameters())
+    from steadyslip.records import parameters
+
+    known |= dict.fromkeys(parameters(plan, "protocol."))
+    problems, named = [], {}
+    for name, value in vary.items():
+        try:
+            named[resolve(name, known)] = value
+        except UnknownNameError as error:
+            problems.append(Problem(name, str(error)))
+    named |= {f"initial.{name}": value for name, value in initial.items()}
+    dims: tuple[str, ...] = ()
+    coords = None
+    labelled = {name: value for name, value in named.items() if hasattr(value, "dims")}
+    if labelled:
+        import xarray as xr
+
+        bare = [n for n, v in named.items() if n not in labelled and np.ndim(v)]
+        problems += [Problem(n, "is a bare array beside DataArrays; name its dimensions") for n in bare]
+        together = dict(zip(labelled, xr.broadcast(*labelled.values()), strict=True))
+        first = next(iter(together.values()))
+        dims, coords = tuple(str(d) for d in first.dims), first.coords
+        named |= {name: array.values for name, array in together.items()}
+    try:
+        shape = np.broadcast_shapes(*(np.shape(v) for v in named.values()))
+    except ValueError:
+        shape = ()
+        shapes = ", ".join(f"{name} {np.shape(v)}" for name, v in named.items())
+        problems.append(Problem("vary", f"shapes do not broadcast: {shapes}"))
+    problems += [Problem(n, "got an empty array; give at least one value") for n, v in named.items() if not np.size(v)]
+    if problems:
+        raise ParameterError(problems)
+    flat = {
+        name: np.broadcast_to(value, shape).reshape(-1) if np.ndim(value) else value for name, value in named.items()
+    }
+    start = {name.removeprefix("initial."): flat.pop(name) for name in list(flat) if name.startswith("initial.")}
+    return flat, start, shape, dims, coords
+
+
+def _picked(array: Any, index: np.ndarray | None) -> Any:
+    return array[index] if index is not None and np.ndim(array) else array
+
+
+def _regimes(
+    rig: Slider, flat: dict[str, Any], size: int
+) -> Iterator[tuple[Slider, dict[str, Any], np.ndarray | None]]:
+    """Split where a structural parameter (mass, B0, ...) is zero in some runs: those have other equations."""
+    structural = [
+        name
+        for name, value in flat.items()
+        if not name.startswith("protocol.")
+        and rig.parameters()[name].role.structural
+        and not isinstance(value, str)
+        and np.any(np.asarray(value) == 0)
+    ]
+    if not structural:
+        yield rig, flat, None
+        return
+    zero = np.column_stack([np.broadcast_to(np.asarray(flat[name]) == 0, (size,)) for name in structural])
+    patterns, member = np.unique(zero, axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns):
+        absent = [name for name, is_zero in zip(structural, pattern, strict=True) if is_zero]
+        rest = {name: value for name, value in flat.items() if name not in absent}
+        yield rig.with_values(dict.fromkeys(absent, 0.0)), rest, np.flatnonzero(member.reshape(-1) == number)
+
+
+class _Store:
+    """Arrays of results for all runs."""
+
+    def __init__(
+        self, jobs: Jobs, size: int, times: np.ndarray, observables: Sequence[str] | None, events: bool
+    ) -> None:
+        self.units = observable_units(jobs.values.model)
+        wanted = list(self.units) if observables is None else list(observables)
+        problems = [
+            Problem("observables", unknown_name("observable", name, self.units))
+            for name in wanted
+            if name not in self.units
+        ]
+        if problems:
+            raise ParameterError(problems)
+        self.watch, self.times = events, times
+        self.code = np.full(size, INTERRUPTED, dtype=np.int8)
+        self.end = np.full(size, np.nan)
+        self.steps = np.zeros(size, dtype=np.int64)
+        self.rejected = np.zeros(size, dtype=np.int64)
+        self.final: dict[str, np.ndarray] = {name: np.full(size, np.nan) for name in wanted}
+        self.events = {name: np.full(size, np.nan) for name in TALLY} if events else {}
+        self.samples: dict[str, np.ndarray] = {}
+        if len(times):
+            self.samples = {name: np.full((size, len(times)), np.nan) for name in wanted}
+
+    def put(self, where: Any, jobs: Jobs, machine: Any, first: int, outcome: Outcome) -> None:
+        """Everything that a chunk of runs has to say."""
+        _, sigma = jobs.part(first, first + len(outcome.status))
+        absent = np.broadcast_to(~(sigma > 0), outcome.status.shape)
+        posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
+        self.code[where] = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
+        self.end[where] = outcome.final[:, 0]
+        self.steps[where], self.rejected[where] = outcome.final[:, 2], outcome.final[:, 3]
+        for i, name in enumerate(TALLY if self.watch else ()):
+            self.events[name][where] = outcome.tally[:, i]
+        if not self.final:
+            return
+        ran = np.flatnonzero(np.isfinite(outcome.final[:, 4:]).all(axis=1) & ~absent)
+        final = outcome.final[ran]
+        found = observe(jobs, machine, first, ran, final[:, 1].astype(int), final[:, 0], final[:, 4:])
+        rows = np.arange(len(self.code))[where]
+        for name, array in self.final.items():
+            if name in found:
+                array[rows[ran]] = found[name]
+        if self.samples:
+            lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, 0]) & ~absent[:, None])
+            segment = segment_of(jobs.segments, first + lane, self.times[k])
+            found = observe(jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k])
+            for name, array in self.samples.items():
+                if name in found:
+                    array[rows[lane], k] = found[name]
+
+    def result(self, shape: tuple[int, ...], dims: tuple[str, ...], coords: Any) -> Ensemble:
+        def shaped(array: np.ndarray) -> np.ndarray:
+            return array.reshape(*shape, *array.shape[1:])
+
+        return Ensemble(
+            shaped(self.code), shaped(self.end), shaped(self.steps), shaped(self.rejected),
+            {n: shaped(a) for n, a in self.final.items()}, {n: shaped(a) for n, a in self.events.items()},
+            {n: shaped(a) for n, a in self.samples.items()}, self.times, self.units, dims, coords,
+        )  # fmt: skip
+
+
+def _run(
+    jobs: Jobs, store: _Store, index: np.ndarray | None, size: int, times: np.ndarray, threads: int | None,
+    advanced: Callable[[int], None] | None,
+) -> bool:  # fmt: skip
+    machine = jobs.program(LANES, dense=store.watch or len(times) > 0)
+    lock = threading.Lock()
+
+    def work(start: int, stop: int, stopped: threading.Event) -> None:
+        outcome = run_chunk(jobs, machine, start, stop, times, store.watch, stopped)
+        where = slice(start, stop) if index is None else index[start:stop]
+        with lock:
+            store.put(where, jobs, machine, start, outcome)
+
+    _ = machine.module  # compile before the threads start
+    return run_many(work, size, threads, advanced=advanced)
+
+
+@contextmanager
+def _progress(size: int, wanted: bool | None) -> Iterator[Callable[[int], None] | None]:
+    """A bar with rate and time left, on a terminal or where asked for."""
+    if wanted is False or (wanted is None and not sys.stderr.isatty()):
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = [TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("runs", total=size)
+        yield lambda count: bar.advance(task, count)

@@ -1,0 +1,127 @@
+"""The history of one run: samples, events, status, and everything needed to know where it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.errors import unknown_name
+from steadyslip.motion.events import Event, SlipEvent, slip_events
+from steadyslip.motion.status import remedy
+from steadyslip.protocol import Protocol
+from steadyslip.quantities import shown
+from steadyslip.slider import Slider
+
+
+@dataclass(frozen=True, eq=False)
+class History(Mapping[str, np.ndarray]):
+    """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
+
+    Attributes
+    ----------
+    rig : Slider
+    protocol : Protocol
+        With its end.
+    data : dict of str to ndarray
+        Time ``t`` (s) and every observable, SI units. Where a jump happens, its time occurs twice if the
+        solver's own steps are kept.
+    units : dict of str to str
+    events : tuple of Event
+        In the order of time.
+    status : str
+        ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps`` or ``interrupted``.
+    end : float
+        Time reached, s: of the blow-up, of the loss of contact, or the end of the protocol.
+    method : str
+        Integration method used.
+    rtol : float
+    steps, rejected : int
+    """
+
+    rig: Slider
+    protocol: Protocol
+    data: dict[str, np.ndarray] = field(repr=False)
+    units: dict[str, str] = field(repr=False)
+    events: tuple[Event, ...] = field(repr=False)
+    status: str
+    end: float
+    method: str
+    rtol: float
+    steps: int
+    rejected: int
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        try:
+            return self.data[name]
+        except KeyError:
+            raise KeyError(unknown_name("observable", name, self.data)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    @property
+    def message(self) -> str:
+        """The status in a sentence, with what to do where the run ended early."""
+        head = f"{self.status} at {shown(self.end, 's')}"
+        advice = remedy(self.status)
+        return f"{head}: {advice}" if advice else head
+
+    @cached_property
+    def slip_events(self) -> tuple[SlipEvent, ...]:
+        """Complete slip events: from when the block outruns the load point until it no longer does."""
+        return slip_events(self.events)
+
+    def summary(self) -> str:
+        """What happened, in a few lines."""
+        v = self.data["v"]
+        lines = [f"{self.message}"]
+        if len(v):
+            lines.append(
+                f"velocity        {shown(float(v.min()), 'm/s')} to {shown(float(v.max()), 'm/s')}, "
+                f"at the end {shown(float(v[-1]), 'm/s')}"
+            )
+            stress = self.data["normal_stress"]
+            lines.append(f"normal stress   {shown(float(stress.min()), 'Pa')} to {shown(float(stress.max()), 'Pa')}")
+        slips = self.slip_events
+        if slips:
+            last = slips[-1]
+            lines.append(
+                f"slip events     {len(slips)}; the last: peak {shown(last.peak_velocity, 'm/s')}, stress drop "
+                f"{shown(last.stress_drop, 'Pa')}, slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
+            )
+            if len(slips) > 1:
+                lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
+        arrests = sum(event.kind == "arrest" for event in self.events)
+        if arrests:
+            lines.append(f"arrests         {arrests}")
+        lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions in its attributes."""
+        from steadyslip.motion.store import to_dataset
+
+        return to_dataset(self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write everything to a netCDF file (``.nc``); `load_history` reads it back."""
+        from steadyslip.motion.store import save
+
+        save(self, path)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the samples as text, one column for each observable, units in the header."""
+        from steadyslip.motion.store import to_csv
+
+        to_csv(self, path)

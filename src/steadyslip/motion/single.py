@@ -1,0 +1,153 @@
+"""One run: what does this rig do?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.compiled.program import Program
+from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.motion.engine import Outcome, run_single
+from steadyslip.motion.events import Event, events_of
+from steadyslip.motion.observe import observable_units, observe, segment_of
+from steadyslip.motion.result import History
+from steadyslip.motion.setup import Jobs, Options, prepare
+from steadyslip.motion.status import WORDS, remedy
+from steadyslip.protocol import Protocol
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_state
+
+
+def simulate(
+    rig: Slider,
+    protocol: Any = None,
+    *,
+    until: float | None = None,
+    initial: Mapping[str, float] | None = None,
+    times: Any = None,
+    events: bool = True,
+    method: str = "auto",
+    rtol: float = 1e-7,
+    most_steps: int = 10_000_000,
+    arrest: float = 1e-3,
+    branch: int = 0,
+) -> History:
+    """Integrate a rig's motion in time.
+
+    Parameters
+    ----------
+    rig : Slider
+    protocol : Protocol, Piece or sequence of Piece, optional
+        What load point, normal stress and disturbance do; by default the drive's steady velocity.
+    until : float, optional
+        End, s; the protocol's own unless given.
+    initial : mapping of str to float, optional
+        Starting values that differ from steady sliding, in SI units: ``x``, ``v`` and the memory variables of
+        the friction law (names as in ``build_model(rig)``). Without mass, velocity follows from the memory:
+        give one of the two (a given ``v`` adjusts the first memory variable that is not given).
+    times : array_like, optional
+        Times at which to report, s, rising; the solver's own steps unless given. At a jump, the value after it.
+    events : bool, optional
+        Whether to locate events.
+    method : str, optional
+        ``explicit``, ``rosenbrock``, or ``auto``: explicit for massless rate-and-state models, which are not
+        stiff in ln v, Rosenbrock for everything else.
+    rtol : float, optional
+        Error allowed per step, relative to the size of each variable or to its scale (1 for ln v).
+    most_steps : int, optional
+        Limit of steps.
+    arrest : float, optional
+        Share of the drive velocity below which the block counts as arrested.
+    branch : int, optional
+        Which steady sliding to start from where there are several.
+
+    Returns
+    -------
+    History
+        Its `status` says how the run ended. A run that cannot be continued returns what there is.
+
+    Raises
+    ------
+    ParameterError
+        If anything given is wrong; everything is listed.
+    NoSteadySliding
+        If there is no steady sliding to start from.
+    NotAvailable
+        If the rig's motion is ill-posed, or a law cannot move as asked.
+    """
+    options = Options(method, rtol, most_steps, arrest)
+    jobs = prepare(rig, protocol, until, {}, initial or {}, options, branch)
+    if not jobs.sigma[0] > 0:
+        steady_state(rig)  # raises, and says why
+    if not jobs.posed[0]:
+        raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
+    final = float(jobs.segments.end.max())
+    requested = checked_times(times, final)
+    machine = jobs.program(lanes=1, dense=True)
+    outcome = run_single(jobs, machine, requested, watch=events, record=times is None)
+    plan = replace(Protocol.of(protocol), until=final)
+    return _history(rig, plan, jobs, machine, outcome, requested, times is None)
+
+
+def checked_times(times: Any, until: float) -> np.ndarray:
+    """Requested times as an array.
+
+    Raises
+    ------
+    ParameterError
+        If they are not rising, or outside the run.
+    """
+    if times is None:
+        return np.empty(0)
+    try:
+        array = np.ascontiguousarray(np.atleast_1d(np.asarray(times, dtype=float)))
+    except (TypeError, ValueError):
+        array = np.array([np.nan])
+    good = array.ndim == 1 and np.all(np.isfinite(array)) and np.all(np.diff(array) >= 0)
+    if not good or (len(array) and (array[0] < 0 or array[-1] > until * (1 + 1e-12))):
+        message = f"got {np.array2string(array, threshold=6)}; allowed: rising times in s from 0 to {until!r}"
+        raise ParameterError([Problem("times", message)])
+    return np.asarray(np.minimum(array, until))
+
+
+def _history(
+    rig: Slider, plan: Protocol, jobs: Jobs, machine: Program, outcome: Outcome, requested: np.ndarray, own: bool
+) -> History:
+    status = WORDS[int(outcome.status[0])]
+    final = outcome.final[0]
+    if own:
+        time, segment, states = outcome.recorded[:, 0], outcome.recorded[:, 1].astype(int), outcome.recorded[:, 2:]
+    else:
+        reached = np.isfinite(outcome.samples[0, :, 0])
+        time, states = requested[reached], outcome.samples[0][reached]
+        segment = segment_of(jobs.segments, np.zeros(len(time), dtype=int), time)
+    lane = np.zeros(len(time), dtype=int)
+    found = observe(jobs, machine, 0, lane, segment, time, states)
+    units = {"t": "s"} | observable_units(machine.reduction.model)
+    events = events_of(outcome.log)
+    if status == "blow-up":
+        events += (_last_event("blow-up", jobs, machine, final),)
+    return History(
+        rig=rig,
+        protocol=plan,
+        data={"t": time} | {name: found[name] for name in units if name in found},
+        units=units,
+        events=events,
+        status=status,
+        end=float(final[0]),
+        method=machine.choice.method,
+        rtol=jobs.options.rtol,
+        steps=int(final[2]),
+        rejected=int(final[3]),
+    )
+
+
+def _last_event(kind: str, jobs: Jobs, machine: Program, final: np.ndarray) -> Event:
+    """The end of a run that could not go on, as an event."""
+    zero = np.zeros(1, dtype=int)
+    found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], final[None, 4:])
+    names = ("v", "normal_stress", "shear_stress", "spring_stress", "slip")
+    return Event(kind, float(final[0]), *(float(found[name][0]) for name in names))

@@ -1,0 +1,30 @@
+"""How a run ended, and what to do about it."""
+
+from __future__ import annotations
+
+from steadyslip.compiled.program import STATUSES
+
+WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed")
+
+REMEDIES = {
+    "done": "",
+    "contact lost": "the normal stress fell to zero; press harder (preload), or change what takes the load off",
+    "blow-up": "the massless model reaches infinite velocity at this time; give the slider a mass or "
+    "radiation_damping to follow the motion further",
+    "too many steps": "the limit of steps is used up; raise most_steps, shorten until, or loosen rtol",
+    "stuck": "no step is small enough: the equations have no solution beyond this point (with mass zero, friction "
+    "that falls at once when the block speeds up; or a normal stress that answers too strongly to acceleration); "
+    "give the slider mass or damping, or check the contact law",
+    "no velocity": "no velocity balances the forces after a jump of the inputs (or at the start); make the jump "
+    "smaller, or give the slider a mass",
+    "interrupted": "stopped by the user; run it again for the rest",
+    "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off); see steadyslip.steady_state",
+    "ill-posed": "without mass, friction falls at once when the block speeds up (or the normal stress answers too "
+    "strongly to acceleration): the smallest lag left out decides the motion; give the slider mass or damping",
+    "running": "",
+}
+
+
+def remedy(word: str) -> str:
+    """What to do about a status, empty for a run that is done."""
+    return REMEDIES[word]

@@ -1,0 +1,112 @@
+"""Pieces that move the load point. Until the first of them its velocity is that of the rig's drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from steadyslip.errors import ParameterError, Problem
+from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
+from steadyslip.protocol.protocol import Piece
+from steadyslip.protocol.shapes import Harmonic, table_problems
+from steadyslip.records import count, nonnegative, parameter, positive, real, samples
+
+
+class VelocityStep(Piece, name="velocity-step"):
+    """The load-point velocity changes at once and stays so."""
+
+    at: float = parameter("s", nonnegative, "time of the step")
+    to: float = parameter("m/s", real, "velocity from then on")
+
+    def curve(self, before: Any) -> Curve:
+        return knots((self.at, before, self.to))
+
+
+class VelocityRamp(Piece, name="velocity-ramp"):
+    """The load-point velocity changes at a constant rate from its present value to another, and stays so."""
+
+    at: float = parameter("s", nonnegative, "start of the ramp")
+    to: float = parameter("m/s", real, "velocity at its end")
+    duration: float = parameter("s", positive, "duration of the ramp")
+
+    def curve(self, before: Any) -> Curve:
+        return knots((self.at, before, before), (self.at + self.duration, self.to, self.to))
+
+
+class Hold(Piece, name="hold"):
+    """The load point rests for some time, then goes on with its former velocity."""
+
+    at: float = parameter("s", nonnegative, "start of the hold")
+    duration: float = parameter("s", positive, "duration of the hold")
+
+    def curve(self, before: Any) -> Curve:
+        return knots((self.at, before, 0), (self.at + self.duration, 0, before))
+
+
+class SlideHoldSlide(Piece, name="slide-hold-slide"):
+    """Several holds, each longer than the one before by a factor, with sliding at the former velocity between them."""
+
+    at: float = parameter("s", nonnegative, "start of the first hold")
+    hold: float = parameter("s", positive, "duration of the first hold")
+    factor: float = parameter("1", positive, "each hold is longer than the one before by this factor", default=1.0)
+    slide: float = parameter("s", positive, "time of sliding between holds")
+    repeats: float = parameter("1", count, "number of holds")
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        if self.repeats >= 1 and np.isinf(self._times()[0, -1]):
+            yield Problem("factor", f"got {self.factor!r}; the holds grow out of the range of floating point")
+
+    def curve(self, before: Any) -> Curve:
+        times = self._times()
+        holds = times.shape[1] // 2
+        sliding = side_by_side([column(before), np.zeros((1, 1))])
+        return Curve(times, np.tile(sliding, holds), np.tile(sliding[:, ::-1], holds))
+
+    def _times(self) -> Array:
+        """Start and end of every hold, in turn."""
+        holds = np.unique(np.asarray(self.repeats, dtype=int))
+        if holds.size != 1:
+            raise ParameterError([Problem("repeats", "differs between lanes; all need the same number of holds")])
+        with np.errstate(over="ignore"):
+            length = column(self.hold) * column(self.factor) ** np.arange(holds[0])
+            later = np.cumsum((length + column(self.slide))[:, :-1], axis=1)
+            starts = column(self.at) + np.insert(later, 0, 0.0, axis=1)
+            times: Array = np.stack([starts, starts + length], axis=-1).reshape(len(starts), -1)
+        return times
+
+
+class DisplacementStep(Piece, name="displacement-step"):
+    """The load point jumps forward (or back) without time passing; its velocity goes on as before."""
+
+    at: float = parameter("s", nonnegative, "time of the jump")
+    by: float = parameter("m", real, "displacement")
+
+    def jump(self) -> Jump:
+        return Jump(column(self.at), column(self.by))
+
+
+class VelocityHarmonic(Harmonic, name="velocity-harmonic"):
+    """The load-point velocity oscillates: amplitude · sin(2π (t − at)/period + phase) is added to it."""
+
+    amplitude: float = parameter("m/s", real, "amplitude of the velocity")
+
+
+class LoadPointTable(Piece, name="load-point-table"):
+    """A measured motion of the load point: the displacement is linear between samples.
+
+    So the velocity is constant between samples; displacements count from the first one. Before the first
+    sample the load point goes on with its former velocity, after the last one with that of the last interval.
+    """
+
+    time: tuple[float, ...] = samples("s", "times of the samples, ascending")
+    displacement: tuple[float, ...] = samples("m", "displacement of the load point at these times")
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        yield from table_problems(self.time, "displacement", self.displacement)
+
+    def curve(self, before: Any) -> Curve:
+        velocity = np.diff([self.displacement]) / np.diff([self.time])
+        left = side_by_side([column(before), velocity])
+        return Curve(np.array([self.time]), left, np.append(velocity, velocity[:, -1:], axis=1))

@@ -1,0 +1,112 @@
+"""The base of the pieces of an experiment, and the protocol that they make up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from steadyslip.errors import ParameterError, Problem
+from steadyslip.protocol.curves import Curve, Jump, Wave
+from steadyslip.quantities import shown
+from steadyslip.records import Record, parameter, parts, positive
+
+LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
+CHANNELS = 3
+ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
+
+
+class Piece(Record, family="protocol piece"):
+    """Base of the pieces of a protocol: something that happens to one channel at some time.
+
+    A subclass is registered under a name, says which `channel` it acts on (load-point velocity,
+    disturbance stress or normal stress), and returns what it consists of from one of the methods.
+    Fields may be plain numbers or 1-D arrays with one value for each lane.
+    """
+
+    channel: ClassVar[int] = LOAD_POINT
+
+    def curve(self, before: Any) -> Curve | None:
+        """The part that is linear between knots.
+
+        For the load point this is the velocity itself, which is `before` (m/s) until then. For the other
+        channels it is what the piece adds, and `before` has no meaning.
+        """
+        return None
+
+    def wave(self) -> Wave | None:
+        """The sine wave that the piece adds to its channel."""
+        return None
+
+    def jump(self) -> Jump | None:
+        """A sudden displacement of the load point."""
+        return None
+
+    def __add__(self, other: Piece | Protocol) -> Protocol:
+        return _joined(self, other)
+
+
+class Protocol(Record):
+    """What is done to a rig in an experiment: its pieces, and when it ends.
+
+    Pieces that set the load-point velocity (steps, ramps, holds, a measured table) are given in the order of
+    time and do not overlap; all others add up in any order. ``a + b`` of pieces or protocols joins them, and the
+    later end of the two is kept.
+
+    Examples
+    --------
+    >>> from steadyslip.protocol import Hold, Protocol, VelocityStep
+    >>> Hold(at=10.0, duration=100.0) + VelocityStep(at=200.0, to="2 um/s")
+    Protocol(pieces=(Hold(at=10.0, duration=100.0), VelocityStep(at=200.0, to=2e-06)))
+    """
+
+    until: float | None = parameter("s", positive, "end of the experiment", default=None)
+    pieces: tuple[Piece, ...] = parts(Piece, "what happens, one table each", default=())
+
+    @classmethod
+    def of(cls, given: Any) -> Protocol:
+        """A protocol from what a caller may give: None, a piece, a sequence of pieces or a protocol.
+
+        Raises
+        ------
+        ParameterError
+            If `given` is none of these, or pieces overlap.
+        """
+        if given is None:
+            return cls()
+        if isinstance(given, Protocol):
+            return given
+        if isinstance(given, Piece):
+            return cls(pieces=(given,))
+        if isinstance(given, (list, tuple)):
+            return cls(pieces=tuple(given))
+        message = f"got {given!r}; allowed: None, a piece such as VelocityStep(at=10, to=2e-6), a list or a Protocol"
+        raise ParameterError([Problem("protocol", message)])
+
+    def __add__(self, other: Piece | Protocol) -> Protocol:
+        return _joined(self, other)
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        earlier, last_end = "", -np.inf
+        for number, piece in enumerate(self.pieces, start=1):
+            curve = piece.curve(0.0) if piece.channel == LOAD_POINT else None
+            if curve is None:
+                continue
+            start, end = float(curve.times[0, 0]), float(curve.times[0, -1])
+            if start < last_end - ROUNDING * abs(last_end):
+                yield Problem(
+                    f"pieces.{number}",
+                    f"{piece.name or type(piece).__name__} starts at {shown(start, 's')}, before {earlier} ends at "
+                    f"{shown(last_end, 's')}; give the pieces that set the velocity in the order of time, "
+                    "without overlap",
+                )
+            earlier, last_end = f"piece {number} ({piece.name or type(piece).__name__})", max(end, last_end)
+
+
+def _joined(first: Piece | Protocol, second: Piece | Protocol) -> Protocol:
+    if not isinstance(second, (Piece, Protocol)):
+        return NotImplemented
+    one, two = Protocol.of(first), Protocol.of(second)
+    ends = [end for end in (one.until, two.until) if end is not None]
+    return Protocol(pieces=one.pieces + two.pieces, until=max(ends, default=None))

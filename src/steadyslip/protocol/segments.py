@@ -1,0 +1,201 @@
+"""A protocol cut into segments, on each of which every channel is a line plus sine waves; for the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.errors import ParameterError, Problem
+from steadyslip.protocol.curves import Array, Curve, Jump, Wave, chain, column, knots, side_by_side
+from steadyslip.protocol.protocol import CHANNELS, LOAD_POINT, ROUNDING, Protocol
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Consecutive spans of time for each lane, and the channels on them.
+
+    The channels are, in this order, the load-point velocity (m/s), the disturbance stress q (Pa) and the
+    added normal stress p (Pa). On a segment a channel is ``value + slope (t - start)`` plus the sum of
+    ``amplitude sin(angular_frequency (t - start) + phase)`` over the last axis.
+
+    Parameters
+    ----------
+    start, end : ndarray (lanes, n)
+        s; the first segment starts at 0. A lane with fewer segments than others is filled up with
+        empty ones at its end.
+    jump : ndarray (lanes, n)
+        Displacement step of the load point at the start of the segment, m.
+    value, slope : ndarray (lanes, n, 3)
+        Lines.
+    amplitude, angular_frequency, phase : ndarray (lanes, n, 3, h)
+        Sine waves, as many as are present at once at most; the rest are zero.
+    """
+
+    start: Array
+    end: Array
+    jump: Array
+    value: Array
+    slope: Array
+    amplitude: Array
+    angular_frequency: Array
+    phase: Array
+
+    def level(self) -> str:
+        """The least that a kernel has to know: ``"constant"``, ``"linear"`` or ``"harmonic"``."""
+        if self.amplitude.shape[-1]:
+            return "harmonic"
+        return "linear" if np.any(self.slope) else "constant"
+
+
+@dataclass
+class _Terms:
+    """What the pieces consist of, by kind."""
+
+    curves: list[tuple[int, Curve]] = field(default_factory=list)
+    waves: list[tuple[int, Wave]] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
+
+    def breakpoints(self) -> Iterator[Array]:
+        for _, curve in self.curves:
+            yield curve.times
+        for _, wave in self.waves:
+            yield from (wave.start, wave.stop)
+        for jump in self.jumps:
+            yield jump.time
+
+    def lanes(self, *others: Array) -> int:
+        """Number of lanes that all arrays agree on."""
+        lengths = {len(part) for part in (*others, *self.breakpoints())}
+        lengths |= {len(part) for _, curve in self.curves for part in (curve.left, curve.right)}
+        lengths |= {len(part) for _, w in self.waves for part in (w.amplitude, w.angular_frequency, w.phase)}
+        lengths |= {len(jump.by) for jump in self.jumps}
+        if len(lengths - {1}) > 1:
+            raise ParameterError([Problem("protocol", f"arrays of different lengths {sorted(lengths - {1})}")])
+        return max(lengths)
+
+
+def pack(protocol: Protocol, velocity: Any, until: Any) -> Segments:
+    """Cut a protocol into segments.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        Its numbers may be 1-D arrays with one value for each lane, see `records.twin`.
+    velocity : float or 1-D array
+        Velocity of the rig's drive, m/s.
+    until : float or 1-D array
+        End of each lane, s; what comes later, or at this very time, is cut.
+
+    Returns
+    -------
+    Segments
+
+    Raises
+    ------
+    ParameterError
+        If arrays differ in length, `until` is not positive, or the pieces that set the velocity overlap in a lane.
+    """
+    final = column(until)
+    if not np.all((final > 0) & np.isfinite(final)):
+        raise ParameterError([Problem("until", f"got {until!r}; allowed: a finite number > 0 in s")])
+    terms = _terms(protocol, velocity)
+    lanes = terms.lanes(final, column(velocity))
+    start, end = _grid([*terms.breakpoints()], final)
+    shape = (lanes, start.shape[1])
+    jump, value, slope = np.zeros(shape), np.zeros((*shape, CHANNELS)), np.zeros((*shape, CHANNELS))
+    for step in terms.jumps:
+        jump += np.where((start == step.time) & (start < end), step.by, 0.0)
+    for channel, curve in terms.curves:
+        level, rate = curve.on(start)
+        value[:, :, channel] += level
+        slope[:, :, channel] += rate
+    waves = _waves(terms.waves, start, end, shape)
+    return Segments(_full(start, shape), _full(end, shape), jump, value, slope, *waves)
+
+
+def _terms(protocol: Protocol, velocity: Any) -> _Terms:
+    terms = _Terms()
+    drive: list[Curve] = []
+    present: Any = velocity
+    for piece in protocol.pieces:
+        if (curve := piece.curve(present)) is not None:
+            if piece.channel == LOAD_POINT:
+                drive.append(curve)
+                present = curve.right[:, -1]
+            else:
+                terms.curves.append((piece.channel, curve))
+        if (wave := piece.wave()) is not None:
+            terms.waves.append((piece.channel, wave))
+        if (jump := piece.jump()) is not None:
+            terms.jumps.append(jump)
+    for earlier, later in pairwise(drive):
+        last, first = earlier.times[:, -1], later.times[:, 0]
+        if np.any(first < last - ROUNDING * np.abs(last)):
+            message = "the pieces that set the velocity overlap, or are not in the order of time, in some lanes"
+            raise ParameterError([Problem("protocol.pieces", message)])
+    terms.curves.append((LOAD_POINT, chain(drive) if drive else knots((0, velocity, velocity))))
+    return terms
+
+
+def _grid(breakpoints: list[Array], final: Array) -> tuple[Array, Array]:
+    """Start and end of the segments between breakpoints; empty ones last, and only where a lane needs them."""
+    points = np.clip(side_by_side([np.zeros((1, 1)), *breakpoints, final]), 0, final)
+    points.sort(axis=1)
+    repeated = points[:, 1:] == points[:, :-1]
+    points[:, 1:] = np.where(repeated, final, points[:, 1:])
+    points.sort(axis=1)
+    count = int(np.max(np.sum(points < final, axis=1)))
+    return points[:, :count], points[:, 1 : count + 1]
+
+
+def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, shape: tuple[int, ...]) -> tuple[Array, ...]:
+    """Amplitude, angular frequency and phase of the waves on each segment, each channel's own from the first place."""
+    if not terms:
+        return tuple(np.zeros((*shape, CHANNELS, 0)) for _ in range(3))
+    active = [(start >= w.start) & (start < w.stop) & (start < end) for _, w in terms]
+    taken = np.zeros((CHANNELS, *shape), dtype=np.intp)
+    places: list[NDArray[np.intp]] = []
+    for (channel, _), present in zip(terms, active, strict=True):
+        places.append(taken[channel].copy())
+        taken[channel] += present
+    found = tuple(np.zeros((*shape, CHANNELS, int(taken.max(initial=0)))) for _ in range(3))
+    for (channel, wave), present, place in zip(terms, active, places, strict=True):
+        lane, segment = np.nonzero(_full(present, shape))
+        slot = place[lane, segment]
+        phase = wave.angular_frequency * (start - wave.start) + wave.phase
+        for array, numbers in zip(found, (wave.amplitude, wave.angular_frequency, phase), strict=True):
+            array[lane, segment, channel, slot] = np.broadcast_to(numbers, shape)[lane, segment]
+    return found
+
+
+def _full(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    return np.ascontiguousarray(np.broadcast_to(array, shape))
+
+
+def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
+    """Load-point velocity (m/s), disturbance stress (Pa) and added normal stress (Pa) of the first lane at times `t`.
+
+    Just after a jump where `t` is that of a jump; at the end, just before.
+
+    Raises
+    ------
+    ParameterError
+        If a time lies outside the protocol.
+    """
+    times = np.asarray(t, dtype=float)
+    count = int(np.sum(segments.start[0] < segments.end[0]))
+    if not np.all((times >= 0) & (times <= segments.end[0, count - 1])):
+        last = float(segments.end[0, count - 1])
+        raise ParameterError([Problem("t", f"got {t!r}; allowed: times between 0 and {last!r} s")])
+    index = np.searchsorted(segments.start[0, :count], times, side="right") - 1
+    since = (times - segments.start[0, index])[..., None]
+    waves = segments.amplitude[0, index] * np.sin(
+        segments.angular_frequency[0, index] * since[..., None] + segments.phase[0, index]
+    )
+    found = segments.value[0, index] + segments.slope[0, index] * since + waves.sum(axis=-1)
+    return found[..., 0], found[..., 1], found[..., 2]

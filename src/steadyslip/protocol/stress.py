@@ -1,0 +1,60 @@
+"""Pieces that act on the block: the disturbance stress q, and the normal stress added to the contact law's."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS, Piece
+from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
+
+
+class OnNormalStress(Piece):
+    """Base of what is added to the normal stress of the contact law."""
+
+    channel: ClassVar[int] = NORMAL_STRESS
+
+
+class OnBlock(Piece):
+    """Base of the disturbance stress q, which pushes the block forward."""
+
+    channel: ClassVar[int] = DISTURBANCE
+
+
+class NormalStressStep(StressStep, OnNormalStress, name="normal-stress-step"):
+    """The normal stress changes at once and stays so."""
+
+
+class NormalStressPulse(StressPulse, OnNormalStress, name="normal-stress-pulse"):
+    """The normal stress changes at once, and back after some time."""
+
+
+class NormalStressRamp(StressRamp, OnNormalStress, name="normal-stress-ramp"):
+    """The normal stress changes at a constant rate for some time and stays so."""
+
+
+class NormalStressHarmonic(Harmonic, OnNormalStress, name="normal-stress-harmonic"):
+    """The normal stress oscillates: amplitude · sin(2π (t − at)/period + phase) is added between `at` and `until`."""
+
+
+class NormalStressTable(StressTable, OnNormalStress, name="normal-stress-table"):
+    """A measured change of the normal stress: linear between samples, constant before the first and after the last."""
+
+
+class DisturbanceStep(StressStep, OnBlock, name="disturbance-step"):
+    """A stress begins to push the block."""
+
+
+class DisturbancePulse(StressPulse, OnBlock, name="disturbance-pulse"):
+    """A stress pushes the block for some time."""
+
+
+class DisturbanceRamp(StressRamp, OnBlock, name="disturbance-ramp"):
+    """A stress that pushes the block grows at a constant rate for some time and stays so."""
+
+
+class DisturbanceHarmonic(Harmonic, OnBlock, name="disturbance-harmonic"):
+    """An oscillating stress on the block: amplitude · sin(2π (t − at)/period + phase) between `at` and `until`."""
+
+
+class DisturbanceTable(StressTable, OnBlock, name="disturbance-table"):
+    """A measured stress on the block: linear between samples, constant before the first and after the last."""

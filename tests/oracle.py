@@ -1,0 +1,112 @@
+"""An independent integrator of a rig's motion: SciPy on the Model's own equations, root finding included.
+
+It shares nothing with the kernels but the Model: the balance is solved by bracketing at every evaluation, in
+the plain variables x, ln v, memory.
+"""
+
+import numpy as np
+import sympy as sp
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from steadyslip.expressions import array_function
+from steadyslip.steady import steady_stress
+from steadyslip.values import model_values
+
+
+class Oracle:
+    """A rig with inputs v_lp(t), q(t), p(t) as plain functions."""
+
+    def __init__(self, rig, velocity=None, disturbance=None, pressure=None, plain=False):
+        """`plain`: integrate and search for v itself, which may pass through zero, instead of ln v."""
+        self.plain = plain
+        values = model_values(rig)
+        self.model = model = values.model
+        sigma = float(steady_stress(values))
+        self.drive = rig.drive.velocity
+        v_lp = velocity or (lambda t: self.drive)
+        self.inputs = lambda t: (v_lp(t), (disturbance or zero)(t), (pressure or zero)(t), t)
+        numbers = dict(zip(model.parameters.values(), values.arguments, strict=True)) | {model.sigma_ss: sigma}
+        self.memory = [m.symbol for m in model.variables if m.name not in ("x", "v", "integral")]
+        self.others = [*self.memory, *([model.symbols["integral"]] if "integral" in model.symbols else [])]
+        symbols = [model.symbols["x"], model.symbols["v"], model.symbols["acceleration"], *self.others]
+        symbols += [model.inputs[n] for n in ("load_velocity", "disturbance", "normal_disturbance", "time")]
+
+        def inlined(expression):
+            pressure = model.inputs["normal_disturbance"]
+            imposed = model.imposed.xreplace({model.inputs["time"]: model.inputs["time"]})
+            definitions = {s: d.xreplace({pressure: pressure + imposed}) for s, d in model.definitions.items()}
+            for symbol, definition in reversed(definitions.items()):
+                expression = expression.xreplace({symbol: definition})
+            return expression.xreplace(numbers)
+
+        self.balance = array_function(symbols, [inlined(model.balance)])
+        rates = {m.symbol: r for m, r in zip(model.variables, model.rates, strict=True)}
+        self.rates = array_function(symbols, [inlined(rates[s]) for s in self.others])
+        self.stresses = array_function(symbols, [inlined(model.symbols[n]) for n in ("sigma", "tau", "spring")])
+        self.start = [float(sp.sympify(model.steady[s]).xreplace(numbers)) for s in self.memory]
+        self.start += [0.0] * (len(self.others) - len(self.memory))
+
+    def unknown(self, t, x, v, rest):
+        """Acceleration, or without inertia the velocity, that balances forces."""
+        if self.model.inertial:
+            return bracketed(lambda a: float(self.balance(x, v, a, *rest, *self.inputs(t))[0]), 0.0, self.drive)
+        if self.plain:
+            return bracketed(lambda v: float(self.balance(x, v, 0.0, *rest, *self.inputs(t))[0]), 0.0, self.drive)
+        u = bracketed(
+            lambda u: float(self.balance(x, self.drive * np.exp(u), 0.0, *rest, *self.inputs(t))[0]), 0.0, 0.5
+        )
+        return self.drive * np.exp(u)
+
+    def slope(self, t, y):
+        x, rest = y[0], y[2:] if self.model.inertial else y[1:]
+        if self.model.inertial:
+            v = y[1] if self.plain else self.drive * np.exp(y[1])
+            a = self.unknown(t, x, v, rest)
+            return [
+                v - self.inputs(t)[0],
+                a if self.plain else a / v,
+                *map(float, self.rates(x, v, a, *rest, *self.inputs(t))),
+            ]
+        v = self.unknown(t, x, None, rest)
+        return [v - self.inputs(t)[0], *map(float, self.rates(x, v, 0.0, *rest, *self.inputs(t)))]
+
+    def run(self, until, x=0.0, v=None, memory=None, method="Radau", rtol=1e-10, times=None, start=0.0):
+        """Final x, v and memory (and integral)."""
+        memory = self.start if memory is None else memory
+        v = self.drive if v is None else v
+        y = [x, *([v if self.plain else np.log(v / self.drive)] if self.model.inertial else []), *memory]
+        size = [self.drive if self.plain else 1.0] if self.model.inertial else []
+        scale = np.array([1e-6, *size, *np.maximum(np.abs(memory), 0 if self.plain else 1e-3)])
+        solution = solve_ivp(
+            self.slope, (start, until), y, method=method, rtol=rtol, atol=rtol * scale * 0.1, t_eval=times
+        )
+        assert solution.success, solution.message
+        y = solution.y[:, -1]
+        rest = y[2:] if self.model.inertial else y[1:]
+        if not self.model.inertial:
+            return np.array([y[0], self.unknown(until, y[0], None, rest), *rest])
+        return np.array([y[0], y[1] if self.plain else self.drive * np.exp(y[1]), *rest])
+
+
+def zero(t):
+    return 0.0
+
+
+def bracketed(function, guess, step):
+    """A root of an increasing function, bracketed outwards from the guess."""
+    at = function(guess)
+    if at == 0:
+        return guess
+    direction = -1 if at > 0 else 1
+    low = guess
+    for _ in range(200):
+        high = low + direction * step
+        value = function(high)
+        if np.isfinite(value) and (value > 0) != (at > 0):
+            return brentq(function, *sorted((low, high)), xtol=1e-300, rtol=1e-15)
+        if np.isfinite(value):
+            low, step = high, 2 * step
+        else:
+            step /= 4
+    raise AssertionError("no root")

@@ -176,6 +176,7 @@ def start_job(R, j, cursor, log, arrays, y, out):
     R[ROW_ACCEPTED] = 0.0
     R[ROW_REJECTED] = 0.0
     R[ROW_FAILURES] = 0.0
+    R[ROW_ERROR] = 1.0
     R[ROW_GOOD] = 0.0
     R[ROW_FLAG] = 0.0
     R[ROW_NEXT] = times[0] if times.shape[0] > 0 else math.inf
@@ -213,9 +214,9 @@ def end_event(R, tau, out, y):
     """It has fallen back to the load point's velocity: the event is complete."""
     time = R[ROW_START] + tau
     begin = R[ROW_TALLY + NOW_BEGIN]
-    if R[ROW_TALLY + ANY_BEGIN] > 0.0:
+    if R[ROW_TALLY + ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
         R[ROW_TALLY + RECURRENCE] = begin - R[ROW_TALLY + LAST_BEGIN]
-    R[ROW_TALLY + ANY_BEGIN] = 1.0
+    R[ROW_TALLY + ANY_BEGIN] = 1.0 if begin > 0.0 else 0.0
     R[ROW_TALLY + EVENTS] += 1.0
     R[ROW_TALLY + LAST_BEGIN] = begin
     R[ROW_TALLY + LAST_DURATION] = time - begin
@@ -291,7 +292,7 @@ def located(R, kind, y, out):
             if side == -1:
                 at_low = 0.5 * at_low
             side = -1
-        if high - low < 1e-14 or value == 0.0:
+        if high - low < 1e-13 or value == 0.0:
             break
     return high
 

@@ -24,6 +24,7 @@ OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 _SLOPE_NAMES = {s: f"slope_{c}" for s, c in zip(SLOPES[:3], CHANNELS, strict=True)}
 _INPUT_NAMES = {s: f"in_{c}" for s, c in zip(INPUTS[:3], CHANNELS, strict=True)} | {TIME: "time"}
 NEWTON_STEPS = 6
+PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson: few rejections, even error
 Where = Callable[[str, int], str]
 
 
@@ -132,7 +133,7 @@ class KernelText:
             "TAU": 1, "H": 1, "END": 1, "START": 1, "SEGMENT": 1, "ATOL": n, "RTOL": 1,
             "INPUT": 3, "SLOPE": 3, "AMPLITUDE": 3 * choice.harmonics, "OMEGA": 3 * choice.harmonics,
             "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
-            "FAILURES": 1, "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
+            "FAILURES": 1, "ERROR": 1, "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
             "SLIPPING": 1, "RESTING": 1, "TALLY": 24, "CONSTANT": len(self.constants.symbols),
         }  # fmt: skip
         if choice.dense:
@@ -215,8 +216,14 @@ class KernelText:
         lines += [
             f"error = error*{1 / n!r}",
             "good = error <= 1.0",
-            f"factor = min(max(0.9*power(max(error, 1e-20), {-0.5 / self.method.order!r}), 0.2), 6.0)",
+            "bounded = max(error, 1e-10)",
+            f"earlier = {self.cell('ERROR')}",
+            f"gain = power(bounded, {-0.5 * PROPORTIONAL / self.method.order!r})",
+            f"memory = power(earlier, {0.5 * INTEGRAL / self.method.order!r})",
+            f"plain = power(bounded, {-0.5 / self.method.order!r})",
+            "factor = min(max(0.9*gain*memory if good else 0.9*plain, 0.2), 6.0)",
             "factor = factor if error < 1e60 else 0.2",
+            f"{self.cell('ERROR')} = bounded if good else earlier",
             "after = end if last else tau + h",
             "next_h = h*factor",
             "next_h = max(proposed, next_h) if last and good else next_h",

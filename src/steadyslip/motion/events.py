@@ -52,7 +52,7 @@ class SlipEvent:
     peak_velocity, peak_time : float
         m/s and s.
     recurrence : float
-        Time since the event before began, s; NaN for the first.
+        Time since the event before began, s; NaN for the first, and after one that was going on at the start.
     """
 
     begin: float
@@ -90,7 +90,7 @@ def slip_events(events: tuple[Event, ...]) -> tuple[SlipEvent, ...]:
                     stress_drop=begin.spring_stress - event.spring_stress,
                     peak_velocity=peak.velocity,
                     peak_time=peak.time,
-                    recurrence=begin.time - found[-1].begin if found else float("nan"),
+                    recurrence=begin.time - found[-1].begin if found and found[-1].begin > 0 else float("nan"),
                 )
             )
             begin = None

@@ -22,7 +22,7 @@ from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
 from steadyslip.values import Values, model_values
 
-METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas5p", "tsit5": "tsit5", "rodas4": "rodas4",
+METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4", "tsit5": "tsit5", "rodas4": "rodas4",
            "rodas5p": "rodas5p"}  # fmt: skip
 LEAST_WEIGHT = 1e-5  # db/da below which a memory variable is not eliminated: rounding is amplified by its inverse
 BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
@@ -98,8 +98,6 @@ class Jobs:
     def choice(self, lanes: int, dense: bool) -> Choice:
         """The kernel that these jobs need."""
         method = METHODS[self.options.method] or automatic_method(self.reduction)
-        if method == "tsit5" and self.reduction.model.inertial and self.options.method == "auto":
-            method = "rodas5p"
         harmonics = self.segments.amplitude.shape[-1]
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
 
@@ -144,7 +142,7 @@ def automatic_method(reduction: Reduction) -> str:
     Mass makes the stick phase stiff (rate a/m*), bristles the whole motion.
     """
     stiff = reduction.model.inertial or reduction.velocity == "linear"
-    return "rodas5p" if stiff else "tsit5"
+    return "rodas4" if stiff else "tsit5"
 
 
 def segment_rows(segments: Segments, start: int, stop: int) -> np.ndarray:

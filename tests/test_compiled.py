@@ -1,0 +1,323 @@
+"""The compiled core: primitives, tableaus, convergence, the cache, and that machine code is what the text says."""
+
+import os
+import pickle
+import stat
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+import steadyslip as ss
+from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
+from steadyslip.compiled import build
+from steadyslip.compiled.methods import METHODS, Method, explicit, order_defect, rodas4, rooted_trees
+from steadyslip.compiled.program import Program
+from steadyslip.compiled.source import Constants, UnknownFunction, statements
+from steadyslip.motion.engine import run_single
+from steadyslip.motion.setup import Options, prepare
+
+mpmath.mp.dps = 50
+KERNEL = build.interpreted("")
+
+
+def ulps(name, x):
+    """Error of a primitive in units of the last place."""
+    exact = getattr(mpmath, name)(mpmath.mpf(x))
+    return 0.0 if exact == 0 else float(abs(mpmath.mpf(float(getattr(KERNEL, name)(x))) - exact) / abs(exact)) / 2**-52
+
+
+wide = st.floats(-1e-12, 1e-12) | st.floats(-1.5, 1.5) | st.floats(-300, 300)
+
+
+@given(wide)
+def test_exp_and_its_kin(x):
+    assert ulps("exp", x) < 2
+    for name in ("expm1", "sinh", "cosh", "tanh", "asinh"):
+        if abs(x) > 1e-290:
+            assert ulps(name, x) < 5, name
+
+
+@given(st.floats(1e-300, 1e300) | st.floats(0.5, 2))
+def test_log(x):
+    assert ulps("log", x) < 2
+
+
+@given(st.floats(-1.5, 1.5).filter(lambda x: abs(x) > 1e-290))
+def test_sine(x):
+    assert ulps("sin", x) < 3
+    assert ulps("cos", x) < 5 or abs(x) > 1.4  # relative to 1 near its zero
+
+
+@given(st.floats(-1e6, 1e6))
+def test_sine_of_large_angles(x):
+    assert abs(KERNEL.sin(x) - float(mpmath.sin(mpmath.mpf(x)))) < 4e-16
+    assert abs(KERNEL.cos(x) - float(mpmath.cos(mpmath.mpf(x)))) < 2e-10  # x + pi/2 is rounded
+
+
+def test_primitives_at_the_ends():
+    assert KERNEL.exp(-1e9) > 0
+    assert np.isfinite(KERNEL.exp(1e9))
+    assert np.isnan(KERNEL.log(-1.0))
+    assert 0.0 * KERNEL.log(0.0) == 0.0
+    assert KERNEL.asinh_exp(0.5, 800.0) == pytest.approx(800.0, abs=1e-12)
+    assert KERNEL.asinh_exp(-1e-30, 3.0) == pytest.approx(-1e-30 * np.exp(3.0), rel=1e-14)
+
+
+# -- tableaus
+
+
+def test_numbers_of_rooted_trees():
+    assert [len(rooted_trees(n)) for n in range(1, 8)] == [1, 1, 2, 4, 9, 20, 48]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_order_is_exactly_what_is_claimed(name):
+    method = METHODS[name]()
+    b, embedded, alpha, beta = method._canonical()
+    assert order_defect(b, alpha, beta, method.order) < 1e-12
+    assert order_defect(b, alpha, beta, method.order + 1) > 1e-5
+    assert order_defect(embedded, alpha, beta, method.error_order + 1) > 1e-5
+    for theta in (0.1, 0.5, 0.9):
+        assert order_defect(method.dense_weights(theta), alpha, beta, method.dense_order, theta) < 1e-12
+    assert np.allclose(method.dense_weights(1.0), b, atol=1e-12)
+
+
+@pytest.mark.parametrize("make", [explicit, rodas4])
+def test_a_wrong_digit_in_a_tableau_is_refused(make):
+    good = make()
+    a = [list(row) for row in good.a]
+    a[3][1] += 1e-6
+    with pytest.raises(ValueError, match="order condition"):
+        Method(good.name, good.order, good.error_order, good.dense_order, tuple(map(tuple, a)), good.c, good.error,
+               good.dense, good.gamma)  # fmt: skip
+
+
+def fixed_step(a_rig, method, protocol, until, steps, initial):
+    """End state with a given number of equal steps: the text's step with an infinite tolerance."""
+    jobs = prepare(a_rig, protocol, until, {}, initial, Options(method=method))
+    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
+    text, kernel = machine.text, machine.module
+    constants, start, settings, segments = jobs.tables(machine, 0, 1, False, False)
+    work, cursor = np.zeros(text.row_count), np.zeros(8, dtype=np.int64)
+    arrays = (constants, start, settings, segments, np.empty(0))
+    with np.errstate(all="ignore"):
+        kernel.start_job(work, 0, cursor, np.zeros((0, 8)), arrays, np.empty(text.size), np.empty(6))
+        work[text.rows["RTOL"]] = 1e30
+        for _ in range(steps):
+            work[text.rows["H"]] = until / steps
+            kernel.step_lanes(work)
+    return work[text.rows["Y"] : text.rows["Y"] + text.size].copy()
+
+
+ORDERS = {
+    # method, order, inputs vary, rig, counts of steps over 4 (3) units of time
+    "tsit5": ("tsit5", 5, False, {"stiffness": 1e10, "radiation_damping": 2e10}, (20, 40)),
+    "tsit5 with waves": ("tsit5", 5, True, {"stiffness": 2e10}, (40, 80)),
+    "rodas4": ("rodas4", 4, False, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (48, 96)),
+    "rodas4 with waves": ("rodas4", 4, True, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (48, 96)),
+    "rodas5p": ("rodas5p", 5, False, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (24, 48)),
+    "rodas5p with waves": ("rodas5p", 5, True, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (24, 48)),
+}
+
+
+@pytest.mark.parametrize("case", ORDERS, ids=str)
+def test_measured_order(case):
+    """Halving the step divides the error, summed over several kicks, by 2^order; also if inputs vary within it."""
+    method, order, varying, changes, counts = ORDERS[case]
+    a_rig = rig(contact=CONTACTS[1], friction=ONE_MEMORY[1], **changes)
+    waves = [
+        ss.VelocityHarmonic(amplitude=1e-7, period=7.0),
+        ss.NormalStressHarmonic(amplitude=1e4, period=6.0, phase=0.5),
+        ss.DisturbanceRamp(at=0.0, by=3e3, duration=90.0),
+    ]
+    squares = np.zeros(2)
+    for kick in (-2e-6, -1e-6, 1e-6, 2e-6):
+        until = 4.0 if method == "tsit5" else 3.0
+        ends = [fixed_step(a_rig, method, waves if varying else None, until, n, {"x": kick}) for n in (*counts, 1500)]
+        scale = np.array([1e-6, *[1.0] * (len(ends[0]) - 1)])
+        squares += [np.sum(((end - ends[-1]) / scale) ** 2) for end in ends[:2]]
+    assert np.log2(squares[0] / squares[1]) / 2 == pytest.approx(order, abs=0.15), squares
+
+
+# -- text and constants
+
+
+def test_parameters_are_lifted_out():
+    import sympy as sp
+
+    a, b, x = sp.symbols("a b x", real=True)
+    constants = Constants([x])
+    text = statements([("y", constants.lifted(sp.tan(a) * b * x + sp.log(a) + x**3))], {x: "x"})
+    assert len(constants.symbols) == 2
+    assert not any("tan" in line or "log" in line for line in text)
+    values = constants.function([a, b])(0.3, 2.0)
+    scope = {str(s): v for s, v in zip(constants.symbols.values(), values, strict=True)} | {"x": 1.7}
+    exec("\n".join(text), scope)
+    assert scope["y"] == pytest.approx(np.tan(0.3) * 2 * 1.7 + np.log(0.3) + 1.7**3, rel=1e-14)
+
+
+def test_unknown_function_is_named():
+    import sympy as sp
+
+    x = sp.Symbol("x", real=True)
+    with pytest.raises(UnknownFunction, match="zeta"):
+        statements([("y", sp.zeta(x))], {x: "x"})
+
+
+# -- machine code is what the text says, for every structural branch
+
+BRANCHES = {
+    "eliminated": {},
+    "explicit massless": {"friction": rate_state(b=0.0), "radiation_damping": 0.0},
+    "implicit massless": {"friction": ONE_MEMORY[4]},
+    "explicit mass": {"mass": 1e9, "contact": CONTACTS[1]},
+    "implicit mass": {"contact": CONTACTS[-1], "friction": ONE_MEMORY[1]},
+    "integral": {"drive": ss.PID(1e-6, kp=2e10, kd=1e9, ki=1e9), "stiffness": None, "mass": 1e9},
+    "bristles": {"friction": ONE_MEMORY[5], "mass": 1e9, "radiation_damping": 0.0},
+    "imposed": {"contact": ss.Prescribed(preload=5e6, amplitude=1e5, period=0.9)},
+}
+
+
+@pytest.mark.parametrize("branch", BRANCHES, ids=str)
+@pytest.mark.slow
+def test_machine_code_equals_the_text(branch):
+    a_rig = rig(**({"stiffness": 2e10, "radiation_damping": 2e10} | BRANCHES[branch]))
+    kick = {"x": 1e-10 if branch == "bristles" else 2e-7}
+    protocol = [ss.VelocityHarmonic(amplitude=1e-7, period=1.0), ss.NormalStressStep(at=0.1, by=1e4)]
+    jobs = prepare(a_rig, protocol, 0.3, {}, kick, Options())
+    ends = []
+    for plain in (False, True):
+        machine = Program(jobs.reduction, jobs.choice(1, True), plain=plain)
+        with np.errstate(all="ignore"):
+            ends.append(run_single(jobs, machine, np.empty(0), True, False).final[0])
+    assert ends[0][:4] == pytest.approx(ends[1][:4], abs=1.5)  # a step more or less after contraction to fma
+    assert ends[0][4:] == pytest.approx(ends[1][4:], rel=1e-6, abs=1e-12)
+
+
+# -- the cache
+
+TINY = """
+@njit(**ENTRY)
+def advance(S, ids, cursor, constants, initial, settings, segments, times, statuses, final, tally, samples, log,
+            recorded, quota):
+    return int(S[0] * %d)
+
+
+@njit(**ENTRY)
+def observe(constants, settings, states, inputs, own, values):
+    values[0, 0] = exp(1.0)
+"""
+
+
+def ask(text):
+    """Value of the little kernel, from a module made anew."""
+    build._loaded.clear()
+    module = build.compiled(text)
+    one, two, three = np.ones(1), np.zeros((1, 1)), np.zeros((1, 1, 1))
+    index = np.zeros(1, dtype=np.int64)
+    return module.advance(one, index, index, two, two, two, three, one, index, two, two, three, two, two, 1)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("STEADYSLIP_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_cache_is_written_and_read(folder, monkeypatch):
+    assert ask(TINY % 3) == 3
+    files = sorted(folder.iterdir())
+    assert len(files) == 2
+    before = [file.stat().st_mtime_ns for file in files]
+    calls = []
+    real = build._FileCache.save_overload
+    monkeypatch.setattr(build._FileCache, "save_overload", lambda *a: calls.append(a) or real(*a))
+    assert ask(TINY % 3) == 3
+    assert not calls, "compiled again although it was cached"
+    assert [file.stat().st_mtime_ns for file in files] == before
+    assert ask(TINY % 4) == 4
+    assert len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "text", "pickle", "folder"])
+def test_damaged_cache_is_compiled_again(folder, damage):
+    assert ask(TINY % 5) == 5
+    for file in folder.iterdir():
+        content = bytearray(file.read_bytes())
+        if damage == "flipped":
+            content[len(content) // 2] ^= 1
+        new = {"empty": b"", "cut": content[:-100], "flipped": content, "text": b"hello",
+               "pickle": build._MAGIC + pickle.dumps(7)}.get(damage)  # fmt: skip
+        file.unlink()
+        if new is None:
+            file.mkdir()
+        else:
+            file.write_bytes(bytes(new))
+    assert ask(TINY % 5) == 5
+    assert ask(TINY % 5) == 5
+
+
+def test_sound_file_of_another_kind_is_compiled_again(folder):
+    """A checksum that is right around content that is wrong."""
+    import hashlib
+
+    assert ask(TINY % 6) == 6
+    content = pickle.dumps(("not", "a", "kernel"))
+    for file in folder.iterdir():
+        file.write_bytes(build._MAGIC + hashlib.sha256(content).digest() + content)
+    assert ask(TINY % 6) == 6
+
+
+def test_stale_cache_is_not_used(folder, monkeypatch):
+    """Other versions or another processor mean another file."""
+    assert ask(TINY % 7) == 7
+    monkeypatch.setattr(build, "_surroundings", lambda: "numba 99")
+    assert ask(TINY % 7) == 7
+    assert len(list(folder.iterdir())) == 4
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="owners are a matter of POSIX")
+def test_foreign_cache_is_not_opened(folder, monkeypatch):
+    assert ask(TINY % 8) == 8
+    monkeypatch.setattr(os, "getuid", lambda: 12345)
+    opened = []
+    monkeypatch.setattr(build.pickle, "loads", lambda content: opened.append(content))
+    assert ask(TINY % 8) == 8
+    assert not opened
+
+
+def test_cache_that_cannot_be_written(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    monkeypatch.setenv("STEADYSLIP_CACHE", str(blocked / "cache"))
+    assert ask(TINY % 9) == 9
+    read_only = tmp_path / "read-only"
+    read_only.mkdir()
+    read_only.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    monkeypatch.setenv("STEADYSLIP_CACHE", str(read_only))
+    assert ask(TINY % 9) == 9
+    read_only.chmod(stat.S_IRWXU)
+    monkeypatch.setenv("STEADYSLIP_CACHE", "")
+    assert ask(TINY % 9) == 9
+
+
+@pytest.mark.slow
+def test_concurrent_writers(folder):
+    """Several processes compile the same kernel at once; all are right, and one sound file remains."""
+    script = "from test_compiled import ask, TINY; print(ask(TINY % 11), ask(TINY % 12))"
+    environment = os.environ | {"PYTHONPATH": os.path.dirname(__file__)}
+
+    def process(_):
+        done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
+        return done.stdout.strip(), done.stderr
+
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(process, range(4)))
+    assert all(out == "11 12" for out, _ in results), results
+    assert len(list(folder.iterdir())) == 4
+    assert ask(TINY % 11) == 11

@@ -133,7 +133,8 @@ class KernelText:
             "TAU": 1, "H": 1, "END": 1, "START": 1, "SEGMENT": 1, "ATOL": n, "RTOL": 1,
             "INPUT": 3, "SLOPE": 3, "AMPLITUDE": 3 * choice.harmonics, "OMEGA": 3 * choice.harmonics,
             "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
-            "FAILURES": 1, "ERROR": 1, "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
+            "FAILURES": 1, "ERROR": 1,
+            "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
             "SLIPPING": 1, "RESTING": 1, "TALLY": 24, "CONSTANT": len(self.constants.symbols),
         }  # fmt: skip
         if choice.dense:

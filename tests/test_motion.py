@@ -1,0 +1,468 @@
+"""Simulated motion against laws of nature, closed forms and independent numbers."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from scipy.special import lambertw
+
+import steadyslip as ss
+from dimensionless import MU, A, phi_of, unit_rig, y_of
+from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
+from steadyslip.compiled.program import Program
+from steadyslip.motion.engine import run_single
+from steadyslip.motion.setup import Options, prepare
+from test_motion_oracle import LAWS
+
+REFERENCE = Path(__file__).parent / "reference"
+
+
+def table(name):
+    return list(csv.DictReader((REFERENCE / name).read_text("utf-8").splitlines()))
+
+
+# -- conservation
+
+
+@pytest.mark.parametrize(("lam", "kick"), [(0.1, 0.5), (0.1, 2.3), (0.5, 1.3), (0.5, -0.9), (1.5, 0.8)])
+def test_slip_law_at_the_edge_conserves_the_invariant_of_gu(lam, kick):
+    """Theory 7: C = e^y [y − 1 + λ(e^−φ − 1 + φ)] on every orbit at k = k_cr."""
+    run = ss.simulate(unit_rig("slip", lam, lam), until=100.0, initial={"v": np.exp(kick)}, rtol=1e-9)
+    y, phi = y_of(run), phi_of(run)
+    invariant = np.exp(y) * (y - 1 + lam * (np.exp(-phi) - 1 + phi))
+    assert run.status == "done"
+    assert np.ptp(invariant) < 1e-7 * np.exp(y.max()) * (1 + lam * np.exp(-phi.min()))
+
+
+@pytest.mark.parametrize("lam", [0.1, 0.5])
+@pytest.mark.parametrize("size", [0.5, 2.0])
+def test_aging_law_at_the_edge_conserves_the_lotka_volterra_function(lam, size):
+    """Theory 7: W = κ'(w − ln w) + Ω − ln Ω with w = v0θ/d_c, Ω = vθ/d_c."""
+    run = ss.simulate(unit_rig("aging", lam, lam), until=100.0, initial={"x": -size / lam}, rtol=1e-9)
+    w, omega = run["theta"], run["v"] * run["theta"]
+    conserved = lam * (w - np.log(w)) + omega - np.log(omega)
+    assert np.ptp(conserved) < 2e-7 * conserved.max()
+
+
+@pytest.mark.parametrize("law", ["slip", "aging"])
+def test_energy_is_accounted_for(law):
+    """What the load point puts in is stored in spring and motion, or spent in friction and damping."""
+    mass, damping = 0.5, 0.3
+    a_rig = unit_rig(law, 0.5, 0.8, damping, mass)
+    run = ss.simulate(a_rig, ss.VelocityStep(at=2.0, to=2.0), until=30.0, times=np.linspace(0, 30, 30001), rtol=1e-10)
+    v, t = run["v"], run["t"]
+
+    def work(stress, velocity):
+        return np.concatenate([[0], np.cumsum(np.diff(t) * 0.5 * ((stress * velocity)[1:] + (stress * velocity)[:-1]))])
+
+    put_in = work(run["spring_stress"], run["load_velocity"])
+    spent = work(run["shear_stress"] + damping * A * v, v)
+    stored = 0.5 * mass * A * v**2 + run["spring_stress"] ** 2 / (2 * 0.8 * A)
+    balance = put_in - spent - (stored - stored[0])
+    assert np.max(np.abs(balance)) < 2e-5 * put_in[-1]  # the trapezoidal sums are good to 1e-6; one kink at the step
+
+
+# -- independent numbers
+
+
+@pytest.mark.parametrize("row", table("orbits.csv"), ids=lambda row: f"{row['lam']} {row['start']}")
+def test_orbits(row):
+    lam, phi = float(row["lam"]), float(row["start"].split("=")[-1])
+    run = ss.simulate(unit_rig(row["law"], lam, lam), until=80.0, initial={"v": np.exp(phi)}, rtol=1e-10)
+    slips = run.slip_events
+    assert slips[-1].recurrence == pytest.approx(float(row["period_DOP853"]), rel=1e-9)
+    assert np.log(slips[-1].peak_velocity) == pytest.approx(float(row["phi_max"]), rel=1e-9)
+    assert slips[-1].stress_drop / A == pytest.approx(float(row["f_max"]) - float(row["f_min"]), rel=1e-8)
+
+
+@pytest.mark.parametrize("row", table("aging_periods.csv"), ids=lambda row: f"{row['lam']} {row['ln_Omega0']}")
+def test_aging_periods(row):
+    lam, size = float(row["lam"]), float(row["ln_Omega0"])
+    run = ss.simulate(unit_rig("aging", lam, lam), until=260.0, initial={"x": -size / lam}, rtol=1e-10)
+    assert run.slip_events[-1].recurrence == pytest.approx(float(row["period"]), rel=1e-9)
+
+
+@pytest.mark.parametrize("row", table("stickslip.csv"), ids=lambda row: f"{row['law']} {row['H']}")
+def test_stick_slip_cycles(row):
+    a_rig = unit_rig(row["law"], float(row["lam"]), float(row["kappa"]), float(row["H"]))
+    last = ss.simulate(a_rig, until=1000.0, initial={"v": 1.1}, rtol=1e-10).slip_events[-1]
+    assert last.recurrence == pytest.approx(float(row["period_DOP853"]), rel=3e-11)
+    assert last.stress_drop / A == pytest.approx(float(row["dtau_DOP853"]), rel=1e-10)
+    assert np.log(last.peak_velocity) == pytest.approx(float(row["phimax_DOP853"]), rel=1e-9)
+
+
+def test_error_of_default_settings():
+    """What rtol = 1e-7 gives: 1e-7 to 1e-5 in ln v after six spirals, and after thirty cycles of stick-slip."""
+    for a_rig, until, kick, most in (
+        (rig(contact=CONTACTS[1], stiffness=9.5e9, friction=ONE_MEMORY[1]), 200.0, {"v": 1.01e-6}, 1e-6),
+        (unit_rig("aging", 0.5, 0.4, 1e-6), 600.0, {"v": 1.1}, 2e-5),
+        (unit_rig("slip", 0.5, 0.4, 0.0, 1e-6 / A), 460.0, {"x": 1.0}, 2e-5),
+    ):
+        ends = [ss.simulate(a_rig, until=until, initial=kick, rtol=rtol)["v"][-1] for rtol in (1e-7, 1e-11)]
+        assert abs(np.log(ends[0] / ends[1])) < most
+
+
+# -- small motions
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e9], ids=["massless", "mass"])
+@pytest.mark.parametrize("contact", CONTACTS, ids=lambda law: law.name)
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_small_kicks_grow_as_the_eigenvalues_say(law, contact, mass):
+    """A small kick is a sum of exponentials with the rates that linear stability gives, and nothing else is left.
+
+    The kick is a millionth of a slip distance and grows to e^4 times that, so that squares of it are not seen.
+    """
+    if isinstance(contact, ss.Lift):
+        contact = ss.Lift(preload=5e6, lift=2e10, v_ref=1e-6)  # far enough from ill-posed for a kick to stay small
+    random = np.random.default_rng(31 * len(law) + len(contact.name))
+    a_rig = rig(friction=LAWS[law], contact=contact, mass=mass, stiffness=float(random.uniform(3e9, 3e10)))
+    if law == "prakash-clifton" and contact.name == "linear" and not mass:
+        pytest.skip("ill-posed")
+    if law == "lugre" and isinstance(contact, ss.Lift):
+        pytest.skip("bristles give way to any lift at this velocity")
+    rates = np.atleast_1d(ss.eigenvalues(a_rig)).astype(complex)
+    slow = np.abs(rates)[np.abs(rates) < 50 * np.abs(rates).min()]
+    until = min(4.0 / slow.max(), 4.0 / max(rates.real.max(), 1e-300))
+    times = np.linspace(0.2 * until, until, 40)
+    kick, rtol = (1e-9, 1e-9) if law == "lugre" else (1e-12, 1e-11)  # stiff bristles need more to stand out of rounding
+    jobs = prepare(a_rig, None, until, {}, {"x": kick}, Options(rtol=rtol))
+    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
+    with np.errstate(all="ignore"):
+        outcome = run_single(jobs, machine, times, False, False)
+    assert outcome.status[0] == 1
+    x = outcome.samples[0][:, 0]
+    right = misfit(times, rates, x)
+    assert right < (1e-3 if law == "lugre" else 1e-4)
+    if len(rates) < 4:  # with more modes than that, wrong ones can fit forty points of a short record
+        assert misfit(times, rates + 0.1 * slow.min(), x) > 3 * right
+
+
+def misfit(times, rates, x):
+    """What is left of x after the best sum of exponentials with given rates, relative to its size."""
+    modes = np.exp(np.outer(times, rates))
+    size = np.abs(modes).max(axis=0)
+    modes = modes[:, size > 1e-30] / size[size > 1e-30]  # others have died out
+    weights, *_ = np.linalg.lstsq(modes, x.astype(complex), rcond=1e-12)
+    return np.max(np.abs(modes @ weights - x)) / np.max(np.abs(x))
+
+
+# -- blow-up
+
+
+def time_of_blow_up(law, lam, kappa, step):
+    """By SciPy in slip-like time (ds = (1 + v) dt) up to φ = 30; what is left of t is below 1e-12."""
+
+    def slope(s, state):
+        phi, x, _ = state
+        v = np.exp(phi)
+        y = -kappa * x
+        theta = (y - phi) / (1 + lam)
+        rate = {
+            "slip": -v * (phi + theta),
+            "aging": np.exp(-theta) - v,
+            "prz": 0.5 * (np.exp(-theta) - v**2 * np.exp(theta)),
+        }[law]
+        phi_rate = -kappa * (v - step) - (1 + lam) * rate
+        return np.array([phi_rate, v - step, 1.0]) / (1 + v)
+
+    def far(s, state):
+        return state[0] - 30.0
+
+    far.terminal = True
+    done = solve_ivp(slope, (0, 1e4), [0.0, 0.0, 0.0], "DOP853", rtol=1e-13, atol=1e-14, events=far)
+    assert done.t_events[0].size
+    return done.y[2, -1]
+
+
+@pytest.mark.parametrize("step", [10.0, 3.0])
+@pytest.mark.parametrize("share", [0.5, 0.8])
+@pytest.mark.parametrize("law", ["slip", "aging", "prz"])
+def test_time_of_blow_up(law, share, step):
+    """Below k_cr a step in rate ends in infinite velocity; the time is a number, good to 1e-6."""
+    lam = 0.5
+    run = ss.simulate(unit_rig(law, lam, share * lam), ss.VelocityStep(at=0.0, to=step), until=1000.0)
+    assert run.status == "blow-up"
+    assert run.events[-1].kind == "blow-up"
+    assert run.end == pytest.approx(time_of_blow_up(law, lam, share * lam, step), rel=1e-6)
+    assert np.all(np.isfinite(run["v"]))
+    assert "mass" in run.message
+
+
+def survives(a_rig, protocol, until=3000.0):
+    return ss.simulate(a_rig, protocol, until=until, rtol=1e-9, events=False).status == "done"
+
+
+def test_thresholds_in_closed_form():
+    """Theory 7, the slip law at k_cr: velocity step ln(b/(b−a)), displacement [1 + W(−λ/(e(1+λ)))]/λ both ways."""
+    a, b = 0.0145, 0.0160
+    lam = (b - a) / a
+    a_rig = unit_rig("slip", lam, lam)
+    velocity = b / (b - a)
+    scale = velocity  # the edge is that of the new rate, the same for the quasistatic law
+    assert survives(a_rig, ss.VelocityStep(at=0.0, to=velocity * (1 - 1e-5)), 3000 / scale)
+    assert not survives(a_rig, ss.VelocityStep(at=0.0, to=velocity * (1 + 1e-5)), 3000 / scale)
+    for branch in (0, -1):
+        step = (1 + lambertw(-lam / (np.e * (1 + lam)), branch).real) / lam
+        assert survives(a_rig, ss.DisplacementStep(at=0.0, by=step * (1 - 1e-5)))
+        assert not survives(a_rig, ss.DisplacementStep(at=0.0, by=step * (1 + 1e-5)))
+
+
+# -- normal stress that changes
+
+
+@pytest.mark.parametrize(("evolution", "shift"), [("aging", -0.0034235), ("slip", -0.0075895), ("prz", None)])
+def test_fast_modulation_lowers_friction(evolution, shift):
+    """Theory 4: the mean shear stress under fast oscillation of the normal stress, a = .01, b = .015, μ = .6, ε = .02."""
+    a, b, mu, eps = A, 0.015, MU, 0.02
+
+    def mean(function):
+        return quad(lambda c: function((t_of[0] / (1 + eps * np.cos(c)) - mu) / a), 0, np.pi)[0] / np.pi
+
+    t_of = [mu]
+    if evolution == "prz":
+
+        def closure(t):
+            t_of[0] = t
+            # φ = [T/(1+ε cos) − μ − bϑ]/a with <e^φ> = 1 and ϑ = −½ ln <e^2φ>
+            first, second = mean(np.exp), mean(lambda z: np.exp(2 * z))
+            theta = a / b * np.log(first)
+            return theta + 0.5 * np.log(second / first**2)
+
+        shift = brentq(closure, mu - 0.02, mu) - mu
+    a_rig = unit_rig(evolution, b / a - 1, 3.0)
+    period = 2e-3
+    wave = ss.NormalStressHarmonic(amplitude=eps, period=period, phase=np.pi / 2)
+    run = ss.simulate(a_rig, wave, until=30.0, times=np.linspace(30 - period, 30, 9), events=False)
+    assert run["spring_stress"].mean() - mu == pytest.approx(shift, abs=2e-6)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.3])
+def test_response_to_a_small_oscillation_of_normal_stress(memory):
+    """Theory 4 (Perfettini et al. 2001): amplitude and phase of ln v, at and off resonance."""
+    lam, kappa, eps = 0.5, 0.012, 1e-5
+    friction = {"normal_memory": ss.LinkerDieterich(alpha=memory)} if memory else {}
+    a_rig = unit_rig("slip", lam, kappa / A, **friction)
+    for period in (2 * np.pi * np.sqrt(A / kappa), 3.0):
+        s = 2j * np.pi / period
+        gain = -s * ((MU - memory) * s + MU) / (A * s**2 + (kappa - lam * A) * s + kappa)
+        wave = ss.NormalStressHarmonic(amplitude=eps, period=period)
+        times = 60 * period + np.linspace(0, period, 33)[:-1]
+        run = ss.simulate(a_rig, wave, until=61 * period, times=times, events=False, rtol=1e-10)
+        angle = 2 * np.pi * times / period
+        amplitude = 2 * np.mean(phi_of(run) * np.exp(-1j * (angle - np.pi / 2)))
+        assert amplitude / eps == pytest.approx(gain, rel=2e-3)
+
+
+def test_step_of_normal_stress_is_exact():
+    """A jump moves Θ by −(α/b) ln(σ2/σ1), leaves x, and τ = T at the new velocity."""
+    a_rig = rig(friction=ONE_MEMORY[1], stiffness=2e10)
+    run = ss.simulate(a_rig, ss.NormalStressStep(at=1.0, by=5e5), until=2.0)
+    before, after = np.flatnonzero(run["t"] == 1.0)
+    change = run["Theta"][after] - run["Theta"][before]
+    assert change == pytest.approx(-0.4 / 0.016 * np.log(5.5 / 5), rel=1e-12)
+    assert run["x"][after] == run["x"][before]
+    assert run["Psi"][after] == pytest.approx(run["Psi"][before], rel=1e-14)
+    assert run["shear_stress"][after] == run["spring_stress"][after]
+    assert run["normal_stress"][after] - run["normal_stress"][before] == pytest.approx(5e5)
+
+
+# -- protocols
+
+
+def test_every_breakpoint_is_a_step_of_the_solver():
+    protocol = [
+        ss.Hold(at=1.0, duration=2.0),
+        ss.VelocityRamp(at=4.0, to=3e-6, duration=0.5),
+        ss.DisplacementStep(at=5.25, by=1e-8),
+        ss.NormalStressPulse(at=6.0, by=1e5, duration=0.125),
+        ss.DisturbancePulse(at=7.0, by=1e4, duration=0.3),
+    ]
+    run = ss.simulate(rig(stiffness=2e10), protocol, until=8.0)
+    for moment in (1.0, 3.0, 4.0, 4.5, 5.25, 6.0, 6.125, 7.0, 7.3):
+        assert np.sum(np.abs(run["t"] - moment) < 1e-12) == 2, moment
+    assert np.all(np.diff(run["t"]) >= 0)
+    held = (run["t"] > 1.0) & (run["t"] < 3.0)
+    assert np.all(run["load_velocity"][held] == 0)
+    assert np.all(np.diff(run["v"][held]) < 0)
+
+
+def test_breakpoints_where_nothing_happens_change_nothing():
+    a_rig = rig(stiffness=9e9)
+    plain = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=20.0, rtol=1e-10)
+    idle = [ss.DisturbancePulse(at=t, by=0.0, duration=0.01) for t in (0.5, 3.3, 7.7, 12.0)]
+    split = ss.simulate(a_rig, [ss.VelocityStep(at=1.0, to=2e-6), *idle], until=20.0, rtol=1e-10)
+    assert split["v"][-1] == pytest.approx(plain["v"][-1], rel=1e-8)
+
+
+def test_a_table_of_the_load_point_is_followed_exactly():
+    """A sampled ramp is the same motion as the ramp of displacement it samples, however it is sampled."""
+    random = np.random.default_rng(3)
+    time = np.unique(np.concatenate([[0.0, 1.0], random.uniform(0, 6, 200), [6.0]]))
+    displacement = 1e-6 * time + 2e-6 * np.maximum(time - 1.0, 0.0)
+    a_rig = rig(stiffness=1.2e10)
+    table = ss.simulate(a_rig, ss.LoadPointTable(time=time, displacement=displacement), until=6.0, rtol=1e-10)
+    step = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=3e-6), until=6.0, rtol=1e-10)
+    assert table["v"][-1] == pytest.approx(step["v"][-1], rel=1e-7)
+    assert table["load_displacement"][-1] == pytest.approx(displacement[-1], rel=1e-12)
+
+
+def test_slip_is_that_of_the_load_point_plus_x():
+    protocol = [ss.DisplacementStep(at=1.0, by=2e-7), ss.VelocityHarmonic(amplitude=5e-7, period=1.7, at=0.4)]
+    run = ss.simulate(rig(stiffness=2e10), protocol, until=5.0, times=np.linspace(0, 5, 4001), rtol=1e-10)
+    velocity = 0.5 * (run["v"][1:] + run["v"][:-1])
+    slip = np.concatenate([[0], np.cumsum(np.diff(run["t"]) * velocity)])
+    assert np.max(np.abs(slip - run["slip"])) < 2e-5 * run["slip"][-1]
+    assert run["spring_stress"] == pytest.approx(run["spring_stress"][0] - 2e10 * run["x"], rel=1e-12)
+
+
+def test_requested_times_agree_with_the_solver_s_own():
+    a_rig = rig(stiffness=9e9)
+    own = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-9)
+    asked = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-9, times=np.unique(own["t"]))
+    last = {t: v for t, v in zip(own["t"], own["v"], strict=True)}  # after a jump
+    assert asked["v"] == pytest.approx(np.array([last[t] for t in asked["t"]]), rel=1e-9)
+    between = np.linspace(0, 10, 777)
+    dense = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-9, times=between)
+    tight = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-12, times=between)
+    assert dense["v"] == pytest.approx(tight["v"], rel=1e-6)
+
+
+# -- rest and reversal
+
+
+def test_regularised_friction_reverses():
+    """Pulled back, the block comes to rest, turns, and slides the other way under the same friction."""
+    a_rig = rig(friction=rate_state(regularised=True), stiffness=2e10)
+    run = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=-1e-6), until=900.0)
+    assert run.status == "done"
+    assert run["v"][-1] == pytest.approx(-1e-6, rel=1e-4)
+    assert run["friction"][-1] == pytest.approx(-run["friction"][0], rel=1e-5)
+    kinds = [event.kind for event in run.events]
+    assert "arrest" in kinds
+    assert "restart" in kinds
+
+
+def test_friction_heals_with_the_logarithm_of_the_hold():
+    """After a hold the aging law's peak friction is higher by nearly b for each e-fold of the hold (stiff machine)."""
+    a_rig = rig(friction=rate_state(evolution=ss.Aging()), stiffness=5e12)
+    peaks = []
+    for hold in (1e3, 1e4, 1e5):
+        run = ss.simulate(a_rig, ss.Hold(at=1.0, duration=hold), until=hold + 20.0)
+        held = (run["t"] > 2.0) & (run["t"] < hold)
+        assert np.all(np.diff(run["v"][held]) < 0)
+        peaks.append(run["friction"].max())
+    growth = np.diff(peaks) / np.log(10)
+    assert growth == pytest.approx([0.016, 0.016], rel=0.1)
+    assert growth[1] > growth[0]
+
+
+# -- how runs end
+
+
+def test_contact_is_lost_when_the_load_is_gone():
+    """A ramp takes the normal stress away; with mass the moment is that of the ramp itself."""
+    a_rig = rig(mass=1e9, radiation_damping=1e12)
+    run = ss.simulate(a_rig, ss.NormalStressRamp(at=0.5, by=-6e6, duration=1.2), until=5.0)
+    assert run.status == "contact lost"
+    assert run.end == pytest.approx(0.5 + 1.2 * 5 / 6, rel=1e-9)
+    assert run.events[-1].kind == "contact lost"
+    assert np.all(run["normal_stress"] > 0)
+
+
+def test_a_run_out_of_steps_says_so():
+    run = ss.simulate(rig(stiffness=9e9), ss.VelocityStep(at=1.0, to=2e-6), until=1e4, most_steps=50)
+    assert run.status == "too many steps"
+    assert "most_steps" in run.message
+    assert 0 < run.end < 1e4
+
+
+def test_ill_posed_and_absent_steady_sliding_are_refused():
+    with pytest.raises(ss.NotAvailable, match="ill-posed"):
+        ss.simulate(rig(contact=ss.Lift(preload=5e6, lift=1e13, v_ref=1e-6)), until=1.0)
+    with pytest.raises(ss.NoSteadySliding):
+        ss.simulate(rig(contact=ss.InclinedSpring(preload=5e6, angle=-1.2)), until=1.0)
+    with pytest.raises(ss.NotAvailable, match="divides by b"):
+        ss.simulate(
+            rig(friction=rate_state(b=0.0, evolution=ss.Aging(), normal_memory=ss.LinkerDieterich(alpha=0.2))),
+            until=1.0,
+        )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"until": -1.0}, "until"),
+        ({}, "until"),
+        ({"until": 1.0, "rtol": 0.0}, "rtol"),
+        ({"until": 1.0, "method": "euler"}, "method"),
+        ({"until": 1.0, "initial": {"u": 1.0}}, "initial.u"),
+        ({"until": 1.0, "initial": {"v": -1.0}}, "initial.v"),
+        ({"until": 1.0, "initial": {"v": 1e-6, "Theta": 0.0}}, "initial.v"),
+        ({"until": 1.0, "times": [0.5, 0.2]}, "times"),
+        ({"until": 1.0, "times": [0.5, 2.0]}, "times"),
+        ({"until": 1.0, "times": ["soon"]}, "times"),
+        ({"until": 1.0, "protocol": "step"}, "protocol"),
+        ({"until": 1.0, "most_steps": 0}, "most_steps"),
+        ({"until": 1.0, "arrest": -1}, "arrest"),
+    ],
+)
+def test_what_is_wrong_is_named(arguments, name):
+    with pytest.raises(ss.ParameterError) as caught:
+        ss.simulate(rig(), **arguments)
+    assert any(problem.name == name for problem in caught.value.problems), caught.value
+
+
+def test_displacement_step_through_a_dashpot_is_refused():
+    with pytest.raises(ss.ParameterError, match="dashpot"):
+        ss.simulate(rig(damping=1e9), ss.DisplacementStep(at=1.0, by=1e-7), until=2.0)
+
+
+# -- what comes back
+
+
+def test_history_survives_its_file(tmp_path):
+    run = ss.simulate(unit_rig("aging", 0.5, 0.25, 1e-4), ss.VelocityStep(at=5.0, to=1.5), until=100.0)
+    run.save(tmp_path / "run.nc")
+    again = ss.load_history(tmp_path / "run.nc")
+    assert again.rig == run.rig
+    assert again.protocol == run.protocol
+    assert again.events == run.events
+    assert (again.status, again.end, again.method, again.steps) == (run.status, run.end, run.method, run.steps)
+    assert again.units == run.units
+    for name in run:
+        np.testing.assert_array_equal(again[name], run[name])
+    assert str(again) == str(run)
+
+
+def test_history_as_columns(tmp_path):
+    run = ss.simulate(rig(), until=1.0)
+    run.to_csv(tmp_path / "run.csv")
+    head, *rows = (tmp_path / "run.csv").read_text().splitlines()
+    assert head.split(",")[0] == "t (s)"
+    assert len(rows) == len(run["t"])
+    assert float(rows[-1].split(",")[1]) == pytest.approx(run[list(run)[1]][-1])
+
+
+def test_files_that_cannot_be(tmp_path):
+    run = ss.simulate(rig(), until=1.0)
+    for act in (run.save, run.to_csv):
+        with pytest.raises(ss.NotAvailable, match="cannot write"):
+            act(tmp_path / "no" / "such" / "folder.nc")
+    (tmp_path / "text.nc").write_text("hello")
+    for path in ("text.nc", "absent.nc"):
+        with pytest.raises(ss.NotAvailable, match="cannot read"):
+            ss.load_history(tmp_path / path)
+
+
+def test_history_tells_what_it_has():
+    run = ss.simulate(rig(), until=1.0)
+    with pytest.raises(KeyError, match="did you mean 'friction'"):
+        run["fricton"]
+    data = run.to_xarray()
+    assert data["v"].attrs["units"] == "m/s"
+    assert data.attrs["status"] == "done"
+    assert "rate-state" in data.attrs["rig"]

@@ -216,7 +216,7 @@ def test_thresholds_in_closed_form():
 
 @pytest.mark.parametrize(("evolution", "shift"), [("aging", -0.0034235), ("slip", -0.0075895), ("prz", None)])
 def test_fast_modulation_lowers_friction(evolution, shift):
-    """Theory 4: the mean shear stress under fast oscillation of the normal stress, a = .01, b = .015, μ = .6, ε = .02."""
+    """Theory 4: mean shear stress under fast oscillation of normal stress; a = .01, b = .015, μ = .6, ε = .02."""
     a, b, mu, eps = A, 0.015, MU, 0.02
 
     def mean(function):
@@ -323,7 +323,7 @@ def test_requested_times_agree_with_the_solver_s_own():
     a_rig = rig(stiffness=9e9)
     own = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-9)
     asked = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-9, times=np.unique(own["t"]))
-    last = {t: v for t, v in zip(own["t"], own["v"], strict=True)}  # after a jump
+    last = dict(zip(own["t"], own["v"], strict=True))  # after a jump
     assert asked["v"] == pytest.approx(np.array([last[t] for t in asked["t"]]), rel=1e-9)
     between = np.linspace(0, 10, 777)
     dense = ss.simulate(a_rig, ss.VelocityStep(at=1.0, to=2e-6), until=10.0, rtol=1e-9, times=between)

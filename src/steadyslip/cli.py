@@ -75,10 +75,50 @@ def analyze(
 
 
 @app.command()
+def simulate(
+    rig: RigFile,
+    changes: Changes = None,
+    until: Annotated[str | None, typer.Option(help="end of the run, such as '200 s'")] = None,
+    pieces: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--protocol", metavar="PIECE", help="add a piece, such as \"velocity-step at=10s to='2 um/s'\"; repeatable"
+        ),
+    ] = None,
+    start: Annotated[
+        list[str] | None,
+        typer.Option("--initial", metavar="NAME=VALUE", help="start elsewhere than in steady sliding; SI; repeatable"),
+    ] = None,
+    output: Annotated[
+        list[Path] | None, typer.Option("-o", "--output", help="write a file: .nc, .csv, .png, .svg or .pdf; repeatable")
+    ] = None,
+    samples: Annotated[int | None, typer.Option(min=2, help="report at this many even times")] = None,
+    phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,
+    method: Annotated[str, typer.Option(help="auto, explicit or rosenbrock")] = "auto",
+    rtol: Annotated[float, typer.Option(help="error allowed per step")] = 1e-7,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+) -> None:
+    """What does this rig do, under the protocol of its file and of the command line?"""
+    from steadyslip.motion.commands import run_file, write_history
+
+    history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol)
+    for path in output or ():
+        write_history(history, path, "phase" if phase else "history")
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(history.to_dict(), indent=2, allow_nan=False))
+        return
+    typer.echo(history.summary())
+    for path in output or ():
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
 def reproduce(
     folder: Annotated[Path, typer.Argument(help="where to write; created if missing")] = Path("paper-figures"),
 ) -> None:
-    """Draw the paper's Fig. 7 and put its numbers next to ours."""
+    """Draw the paper's figures and put its numbers next to ours."""
     from steadyslip.reproduce import paper_table, reproduce as run
 
     written = run(folder)

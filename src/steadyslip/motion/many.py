@@ -275,7 +275,8 @@ class _Store:
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
         self.code[where] = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
         self.end[where] = outcome.final[:, 0]
-        self.steps[where], self.rejected[where] = outcome.final[:, 2], outcome.final[:, 3]
+        counts = np.nan_to_num(outcome.final[:, 2:4])  # NaN where a run was never finished
+        self.steps[where], self.rejected[where] = counts.T
         for i, name in enumerate(TALLY if self.watch else ()):
             self.events[name][where] = outcome.tally[:, i]
         if not self.final:
@@ -297,7 +298,7 @@ class _Store:
 
     def result(self, shape: tuple[int, ...], dims: tuple[str, ...], coords: Any) -> Ensemble:
         def shaped(array: np.ndarray) -> np.ndarray:
-            return array.reshape(*shape, *array.shape[1:])
+            return array.reshape(shape + array.shape[1:])
 
         return Ensemble(
             shaped(self.code), shaped(self.end), shaped(self.steps), shaped(self.rejected),

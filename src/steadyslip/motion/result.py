@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -108,6 +108,23 @@ class History(Mapping[str, np.ndarray]):
     def __str__(self) -> str:
         return self.summary()
 
+    def to_dict(self) -> dict[str, Any]:
+        """Status and events as plain numbers and words, for JSON; samples are in the files."""
+        last = {name: float(values[-1]) for name, values in self.data.items() if len(values)}
+        return {
+            "status": self.status,
+            "end": self.end,
+            "message": self.message,
+            "method": self.method,
+            "rtol": self.rtol,
+            "steps": self.steps,
+            "rejected": self.rejected,
+            "final": {name: value if np.isfinite(value) else None for name, value in last.items()},
+            "slip_events": [_plain(event) for event in self.slip_events],
+            "events": [_plain(event) for event in self.events],
+            "units": self.units,
+        }
+
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions in its attributes."""
         from steadyslip.motion.store import to_dataset
@@ -125,3 +142,9 @@ class History(Mapping[str, np.ndarray]):
         from steadyslip.motion.store import to_csv
 
         to_csv(self, path)
+
+
+def _plain(record: Any) -> dict[str, Any]:
+    """Fields of an event, NaN as None."""
+    fields = asdict(record)
+    return {n: None if isinstance(v, float) and not np.isfinite(v) else v for n, v in fields.items()}

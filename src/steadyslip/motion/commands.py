@@ -1,0 +1,118 @@
+"""A run from a rig file and the words of a command line, and the files that it is written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from steadyslip.config import piece_from_text, read_protocol, read_rig
+from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.motion.result import History
+from steadyslip.motion.single import simulate
+from steadyslip.protocol import Protocol
+from steadyslip.records import Parameter, checked_number, positive
+
+FIGURES = (".png", ".svg", ".pdf")
+
+
+def run_file(
+    path: str | os.PathLike[str],
+    changes: Iterable[str] = (),
+    pieces: Iterable[str] = (),
+    start: Iterable[str] = (),
+    until: str | None = None,
+    samples: int | None = None,
+    method: str = "auto",
+    rtol: float = 1e-7,
+) -> History:
+    """Simulate the rig of a file under its ``[protocol]`` and further pieces.
+
+    Parameters
+    ----------
+    path : path
+    changes : iterable of str
+        As for `read_rig`.
+    pieces : iterable of str
+        Pieces in words, as for `piece_from_text`, after those of the file.
+    start : iterable of str
+        Starting values as ``name=number`` in SI units.
+    until : str, optional
+        End with its unit; that of the file unless given.
+    samples : int, optional
+        Number of evenly spaced times to report at; the solver's own steps unless given.
+    method, rtol
+        As in `simulate`.
+
+    Raises
+    ------
+    ParameterError
+        If anything is wrong; everything is listed.
+    """
+    rig = read_rig(path, changes)
+    protocol = read_protocol(path, changes) or Protocol()
+    added = [piece_from_text(text, rig.area) for text in pieces]
+    for piece in added:
+        protocol = protocol + piece
+    end = protocol.until if until is None else _seconds(until)
+    if end is None:
+        raise ParameterError(
+            [Problem("until", "missing; give the end as --until '200 s', or write [protocol] with until in the file")]
+        )
+    times = None if samples is None else np.linspace(0.0, end, samples)
+    return simulate(
+        rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol
+    )
+
+
+def _seconds(text: str) -> float:
+    """A time in words or a number of seconds."""
+    try:
+        number: float | str = float(text)
+    except ValueError:
+        number = text
+    try:
+        return checked_number(Parameter("s", positive, "end of the run"), number)
+    except ParameterError as error:
+        raise ParameterError([problem.under("until") for problem in error.problems]) from error
+
+
+def _starting_values(texts: Iterable[str]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    problems = []
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        try:
+            if not equals:
+                raise ValueError
+            found[name] = float(value)
+        except ValueError:
+            problems.append(Problem("initial", f"got {text!r}; write NAME=NUMBER in SI units, such as v=1.1e-6"))
+    if problems:
+        raise ParameterError(problems)
+    return found
+
+
+def write_history(history: History, path: Path, kind: str = "history") -> None:
+    """Write a run as netCDF, as columns or as a figure, by the ending of the name.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is none of these, or the file cannot be written.
+    """
+    ending = path.suffix.lower()
+    if ending == ".nc":
+        history.save(path)
+    elif ending == ".csv":
+        history.to_csv(path)
+    elif ending in FIGURES:
+        axes = np.atleast_1d(np.asarray(history.plot(kind), dtype=object))
+        try:
+            axes[0].figure.savefig(path, dpi=150)
+        except OSError as error:
+            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    else:
+        raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are .nc, .csv, {', '.join(FIGURES)}")

@@ -1,0 +1,178 @@
+"""Many runs in lanes: equal to single runs, independent of each other, of threads and order; honest about failures."""
+
+import _thread
+import threading
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+from dimensionless import A, unit_rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
+
+import steadyslip as ss
+from steadyslip.motion import engine
+
+STEP = ss.VelocityStep(at=5.0, to=1.5)
+
+
+def kappas(n, low=0.3, high=0.6, seed=0):
+    return np.random.default_rng(seed).uniform(low, high, n) * A
+
+
+def many(k, **options):
+    arguments = {"until": 60.0, "initial": {"v": 1.2}} | options
+    return ss.simulate_many(unit_rig("aging", 0.5, 0.4, 1e-3), {"stiffness": k}, STEP, **arguments)
+
+
+def test_lanes_equal_single_runs():
+    k = kappas(40)
+    ensemble = many(k)
+    for i in (0, 7, 17, 39):
+        single = ss.simulate(unit_rig("aging", 0.5, k[i] / A, 1e-3), STEP, until=60.0, initial={"v": 1.2})
+        assert ensemble.steps[i] == single.steps
+        for name in ("x", "v", "theta", "friction", "spring_stress", "slip", "acceleration"):
+            assert ensemble.final[name][i] == pytest.approx(single[name][-1], rel=1e-9), name
+        last = single.slip_events[-1]
+        assert ensemble.events["events"][i] == len(single.slip_events)
+        assert ensemble.events["event_stress_drop"][i] == pytest.approx(last.stress_drop, rel=1e-9)
+        assert ensemble.events["event_slip"][i] == pytest.approx(last.slip, rel=1e-9)
+        assert ensemble.events["event_duration"][i] == pytest.approx(last.duration, rel=1e-9)
+        assert ensemble.events["event_peak_velocity"][i] == pytest.approx(last.peak_velocity, rel=1e-9)
+        assert ensemble.events["recurrence"][i] == pytest.approx(last.recurrence, rel=1e-9)
+        peaks = [e for e in single.events if e.kind == "velocity peak"]
+        assert ensemble.events["velocity_peaks"][i] == len(peaks)
+        assert ensemble.events["peak_period"][i] == pytest.approx(peaks[-1].time - peaks[-2].time, rel=1e-9)
+        assert ensemble.events["peak_velocity"][i] == pytest.approx(max(e.velocity for e in peaks), rel=1e-9)
+
+
+def test_samples_equal_single_runs():
+    k, times = kappas(20), np.linspace(0, 60, 31)
+    ensemble = many(k, times=times, observables=["v", "x", "friction"])
+    single = ss.simulate(unit_rig("aging", 0.5, k[3] / A, 1e-3), STEP, until=60.0, initial={"v": 1.2}, times=times)
+    assert set(ensemble.samples) == {"v", "x", "friction"}
+    for name, values in ensemble.samples.items():
+        assert values.shape == (20, 31)
+        assert values[3] == pytest.approx(single[name], rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_threads_chunks_and_order_change_nothing(events, monkeypatch):
+    k = kappas(300)
+    first = many(k, threads=1, events=events)
+    second = many(k, threads=3, events=events)
+    order = np.random.default_rng(1).permutation(300)
+    shuffled = many(k[order], events=events)
+    monkeypatch.setattr(engine.run_many, "__defaults__", (None, 32, None))
+    small = many(k, threads=2, events=events)
+    for name, values in first.final.items():
+        np.testing.assert_array_equal(second.final[name], values)
+        np.testing.assert_array_equal(small.final[name], values)
+        np.testing.assert_array_equal(shuffled.final[name], values[order])
+    for name, values in first.events.items():
+        np.testing.assert_array_equal(second.events[name], values)
+        np.testing.assert_array_equal(shuffled.events[name], values[order])
+    np.testing.assert_array_equal(first.steps, second.steps)
+
+
+def test_failures_stay_alone():
+    """Rigs that blow up, lock up or lose contact say so; their neighbours do not notice."""
+    angle = np.where(np.arange(64) % 4 == 1, -1.2, -0.5)  # every fourth is locked
+    k = np.where(np.arange(64) % 4 == 2, 3e9, 2e10)  # and every fourth unstable
+    load = np.where(np.arange(64) % 4 == 3, -2e8, 0.0)  # and every fourth loses its load
+    a_rig = rig(contact=CONTACTS[1], radiation_damping=0.0)
+    vary = {"contact.angle": angle, "stiffness": k, "protocol.pieces.2.by": load}
+    protocol = [ss.VelocityStep(at=1.0, to=3e-6), ss.NormalStressRamp(at=2.0, by=0.0, duration=50.0)]
+    ensemble = ss.simulate_many(a_rig, vary, protocol, until=60.0)
+    assert list(np.unique(ensemble.status[0::4])) == ["done"]
+    assert list(np.unique(ensemble.status[1::4])) == ["no steady sliding"]
+    assert list(np.unique(ensemble.status[2::4])) == ["blow-up"]
+    assert set(np.unique(ensemble.status[3::4])) <= {"blow-up", "contact lost"}
+    assert np.all(np.isnan(ensemble.final["v"][1::4]))
+    alone = ss.simulate(a_rig.with_values({"contact.angle": -0.5, "stiffness": 2e10}), protocol, until=60.0)
+    assert ensemble.final["v"][0::4] == pytest.approx(alone["v"][-1], rel=1e-9)
+    assert "blow-up" in str(ensemble)
+
+
+def test_shapes_broadcast_and_names_are_kept():
+    k = xr.DataArray(np.array([0.003, 0.004, 0.006]), dims="k", coords={"k": [3, 4, 6]})
+    kick = xr.DataArray(np.array([1.01, 1.2]), dims="kick")
+    ensemble = ss.simulate_many(
+        unit_rig("aging", 0.5, 0.4, 1e-3), {"stiffness": k}, until=20.0, initial={"v": kick}, times=[0.0, 10.0]
+    )
+    assert ensemble.shape == (3, 2)
+    data = ensemble.to_xarray()
+    assert data["v"].dims == ("k", "kick", "time")
+    assert list(data["k"].values) == [3, 4, 6]
+    assert data["final_x"].attrs["units"] == "m"
+    assert ensemble.samples["v"][:, :, 0] == pytest.approx(np.broadcast_to([1.01, 1.2], (3, 2)), rel=1e-12)
+    plain = ss.simulate_many(unit_rig("aging", 0.5, 0.4, 1e-3), {"stiffness": 0.004}, until=20.0, initial={"v": 1.2})
+    assert plain.final["v"].shape == ()
+    assert float(plain.final["v"]) == ensemble.final["v"][1, 1]
+
+
+def test_protocol_parameters_can_vary():
+    at, to = np.array([1.0, 3.0, 5.0])[:, None], np.array([1.5, 2.0])
+    step = ss.VelocityStep(at=1.0, to=2.0)
+    vary = {"protocol.pieces.1.at": at, "to": to}
+    ensemble = ss.simulate_many(unit_rig("aging", 0.5, 0.4, 1e-3), vary, step, until=20.0)
+    assert ensemble.shape == (3, 2)
+    single = ss.simulate(unit_rig("aging", 0.5, 0.4, 1e-3), ss.VelocityStep(at=3.0, to=1.5), until=20.0)
+    assert ensemble.final["v"][1, 0] == pytest.approx(single["v"][-1], rel=1e-9)
+
+
+def test_regimes_mix():
+    """Mass zero is another model, not a small number: both in one call."""
+    mass = np.array([0.0, 1e9, 0.0, 2e9])
+    a_rig = rig(stiffness=2e10, friction=ONE_MEMORY[1])
+    ensemble = ss.simulate_many(a_rig, {"mass": mass}, ss.VelocityStep(at=1.0, to=2e-6), until=5.0)
+    for i, m in enumerate(mass):
+        single = ss.simulate(a_rig.with_values({"mass": float(m)}), ss.VelocityStep(at=1.0, to=2e-6), until=5.0)
+        assert ensemble.final["v"][i] == pytest.approx(single["v"][-1], rel=1e-9)
+
+
+def test_interruption_returns_what_is_done(monkeypatch):
+    k = kappas(4000)
+    many(k[:16])  # compiled before the clock runs
+    monkeypatch.setattr(engine.run_many, "__defaults__", (None, 64, None))
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    started = time.monotonic()
+    timer.start()
+    ensemble = many(k, until=30000.0)
+    assert time.monotonic() - started < 20
+    status = ensemble.status
+    assert np.any(status == "interrupted")
+    done = status == "done"
+    assert np.all(np.isfinite(ensemble.final["v"][done]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"vary": {"stifness": [1.0]}}, "stifness"),
+        ({"vary": {"stiffness": [-1.0]}}, "slider.stiffness"),
+        ({"vary": {"stiffness": []}}, "slider.stiffness"),
+        ({"vary": {"stiffness": [1.0, 2.0], "friction.a": [0.1, 0.1, 0.1]}}, "vary"),
+        ({"vary": {}, "observables": ["velocity"]}, "observables"),
+        ({"vary": {}, "initial": {"u": [1.0, 2.0]}}, "initial.u"),
+        ({"vary": {"protocol.pieces.1.to": [1.0]}}, "protocol.pieces.1.to"),
+    ],
+)
+def test_what_is_wrong_is_named(arguments, name):
+    with pytest.raises(ss.ParameterError) as caught:
+        ss.simulate_many(unit_rig("aging", 0.5, 0.4, 1e-3), until=1.0, **arguments)
+    assert any(problem.name == name for problem in caught.value.problems), caught.value
+
+
+def test_memory_is_bounded_by_what_is_asked_for():
+    """A hundred thousand runs of which one number is kept use little more than that number's array."""
+    import tracemalloc
+
+    k = kappas(100_000)
+    many(k[:64], events=False, observables=["v"], until=0.1)
+    tracemalloc.start()
+    ensemble = many(k, events=False, observables=["v"], until=0.1, threads=1)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert ensemble.final["v"].shape == (100_000,)
+    assert peak < 40 * 8 * 100_000  # results, parameters, starting values: under forty numbers a run

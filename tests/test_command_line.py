@@ -102,3 +102,55 @@ def test_help_and_analyze_stay_light():
     code = code.replace("'scipy.signal'", "'scipy.signal','sympy','numpy'")
     done = subprocess.run([sys.executable, "-c", code, "--help"], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]", done.stdout
+
+
+STICK_SLIP = EXAMPLE.parent / "stick-slip.toml"
+
+
+@pytest.mark.slow
+def test_simulate_runs_the_protocol_of_the_file(tmp_path):
+    done = run(
+        "simulate", STICK_SLIP, "-o", tmp_path / "run.nc", "-o", tmp_path / "run.csv", "-o", tmp_path / "run.png"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "done at 500 s" in done.stdout
+    assert "slip events" in done.stdout
+    history = ss.load_history(tmp_path / "run.nc")
+    assert history.rig == ss.read_rig(STICK_SLIP)
+    assert len(history.protocol.pieces) == 2
+    assert len((tmp_path / "run.csv").read_text().splitlines()) == len(history["t"]) + 1
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_simulate_takes_pieces_and_changes():
+    done = run(
+        "simulate", EXAMPLE, "--set", "stiffness=32 GPa/m", "--until", "20 s", "--protocol",
+        "velocity-step at=10s to='2 um/s'", "--initial", "v=1.1e-6", "--samples", "11", "--json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert data["status"] == "done"
+    assert data["end"] == 20.0
+    rig = ss.read_rig(EXAMPLE, ["stiffness=32 GPa/m"])
+    same = ss.simulate(rig, ss.VelocityStep(at=10, to=2e-6), until=20, initial={"v": 1.1e-6})
+    assert data["final"]["v"] == pytest.approx(same["v"][-1], rel=1e-9)
+    assert data["units"]["v"] == "m/s"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "--until"),
+        (["--until", "3 m"], "wrong dimension"),
+        (["--until", "1 s", "--protocol", "velocity-stp at=1"], "did you mean 'velocity-step'"),
+        (["--until", "1 s", "--initial", "v"], "NAME=NUMBER"),
+        (["--until", "1 s", "--initial", "w=3"], "unknown variable"),
+        (["--until", "1 s", "--method", "euler"], "unknown method"),
+    ],
+)
+def test_simulate_says_what_is_wrong(arguments, words):
+    done = run("simulate", EXAMPLE, *arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr

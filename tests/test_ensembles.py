@@ -7,10 +7,10 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from dimensionless import A, unit_rig
-from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
 
 import steadyslip as ss
+from dimensionless import A, unit_rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
 from steadyslip.motion import engine
 
 STEP = ss.VelocityStep(at=5.0, to=1.5)

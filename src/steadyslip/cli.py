@@ -90,7 +90,8 @@ def simulate(
         typer.Option("--initial", metavar="NAME=VALUE", help="start elsewhere than in steady sliding; SI; repeatable"),
     ] = None,
     output: Annotated[
-        list[Path] | None, typer.Option("-o", "--output", help="write a file: .nc, .csv, .png, .svg or .pdf; repeatable")
+        list[Path] | None,
+        typer.Option("-o", "--output", help="write .nc, .csv, .png, .svg or .pdf; repeatable"),
     ] = None,
     samples: Annotated[int | None, typer.Option(min=2, help="report at this many even times")] = None,
     phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,

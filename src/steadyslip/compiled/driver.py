@@ -256,9 +256,9 @@ def event_function(R, kind, theta, y, out):
     if kind == PEAK:
         return out[1]
     if kind == EVENT_BEGINS:
-        return 1.000001 * out[5] - out[0]
+        return max(1.000001 * out[5], R[ROW_V_LOW]) - out[0]
     if kind == EVENT_ENDS:
-        return out[0] - 1.000001 * out[5]
+        return out[0] - max(1.000001 * out[5], R[ROW_V_LOW])
     if kind == ARREST:
         return abs(out[0]) - R[ROW_V_LOW]
     if kind == RESTART:

@@ -309,7 +309,7 @@ class KernelText:
             f"{cell('REJECTED')} += 0.0 if good else 1.0",
             f"failures = 0.0 if good else {cell('FAILURES')} + 1.0",
             f"{cell('FAILURES')} = failures",
-            f"gap = now0 - 1.000001*in_v if good else {cell('GAP')}",
+            f"gap = now0 - max(1.000001*in_v, {cell('V_LOW')}) if good else {cell('GAP')}",
             f"{cell('GAP')} = gap",
             "slipping = 1.0 if gap > 0.0 else 0.0",
             f"resting = 1.0 if abs(now0) < {cell('V_LOW')} else 0.0",
@@ -336,7 +336,7 @@ class KernelText:
         rates = [*load, *from_rows, *self._inputs_at("tau"), *self.full_lines]
         rates += [f"{self.entry('F', i)} = g{i}" for i in range(n)]
         rates += [f"{self.entry('OUT', i)} = o_{name}" for i, name in enumerate(OUTPUTS[:3])]
-        rates.append(f"{self.entry('GAP')} = o_v - 1.000001*in_v")
+        rates.append(f"{self.entry('GAP')} = o_v - max(1.000001*in_v, {self.entry('V_LOW')})")
         outputs = [*load, *(f"y{i} = y[{i}]" for i in range(n)), *self._inputs_at("tau"), *self.output_lines]
         outputs += [f"out[{i}] = o_{name}" for i, name in enumerate(OUTPUTS)] + ["out[5] = in_v"]
         restore = [*load, *from_rows, *self._inputs_at("tau"), *self.restore_lines]

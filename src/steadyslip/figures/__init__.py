@@ -1,4 +1,4 @@
-"""Figures: each takes a rig and ``ax=None``, returns the Axes, labels with units and never shows.
+"""Figures: each takes a rig or a run and ``ax=None``, returns the Axes, labels with units and never shows.
 
 The only part of the package that imports matplotlib.
 """
@@ -8,5 +8,13 @@ from __future__ import annotations
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.locus import root_locus
+from steadyslip.figures.motion import history, phase_plane
 
-__all__ = ["ANGLES", "critical_stiffness_against_mass", "root_locus", "stability_chart"]
+__all__ = [
+    "ANGLES",
+    "critical_stiffness_against_mass",
+    "history",
+    "phase_plane",
+    "root_locus",
+    "stability_chart",
+]

@@ -62,9 +62,7 @@ def run_file(
             [Problem("until", "missing; give the end as --until '200 s', or write [protocol] with until in the file")]
         )
     times = None if samples is None else np.linspace(0.0, end, samples)
-    return simulate(
-        rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol
-    )
+    return simulate(rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol)
 
 
 def _seconds(text: str) -> float:

@@ -16,8 +16,8 @@ class Event:
     Attributes
     ----------
     kind : str
-        ``slip begins`` (the block becomes faster than the load point), ``slip ends``, ``velocity peak``,
-        ``arrest``, ``restart``, ``contact lost`` or ``blow-up``.
+        ``slip begins`` (the block becomes faster than the load point, and than the limit of arrest),
+        ``slip ends``, ``velocity peak``, ``arrest``, ``restart``, ``contact lost`` or ``blow-up``.
     time : float
         s, located on the dense output.
     velocity : float

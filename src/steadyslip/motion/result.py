@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import unknown_name
+from steadyslip.errors import NotAvailable, unknown_name
 from steadyslip.motion.events import Event, SlipEvent, slip_events
 from steadyslip.motion.status import remedy
 from steadyslip.protocol import Protocol
@@ -142,6 +142,20 @@ class History(Mapping[str, np.ndarray]):
         from steadyslip.motion.store import to_csv
 
         to_csv(self, path)
+
+    def plot(self, kind: str = "history", ax: Any = None) -> Any:
+        """Draw the run: ``history`` (velocity, friction and normal stress in time) or ``phase`` (phase plane).
+
+        Returns
+        -------
+        matplotlib.axes.Axes or array of them
+        """
+        from steadyslip import figures
+
+        kinds: dict[str, Any] = {"history": figures.history, "phase": figures.phase_plane}
+        if kind not in kinds:
+            raise NotAvailable(unknown_name("kind of plot", kind, kinds))
+        return kinds[kind](self, ax=ax)
 
 
 def _plain(record: Any) -> dict[str, Any]:

@@ -1,59 +1,24 @@
-"""The figures and numbers of Dupont & Bapna (1994), from this package's general route.
+"""The numbers of Dupont & Bapna (1994) beside ours.
 
 Each number of the paper (or of its equations, evaluated to 18 digits) stands beside ours, which comes from
-the Model's critical stiffness, eigenvalues and boundaries and not from the closed forms of
-`steadyslip.paper`. Another figure is one more entry of `FIGURES`.
+the Model's critical stiffness, eigenvalues and boundaries, or from simulated motion, and not from the closed
+forms of `steadyslip.paper`.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from steadyslip import figures
-from steadyslip.contact import InclinedSpring
-from steadyslip.drive import Steady
-from steadyslip.errors import SteadyslipError
-from steadyslip.figures import mass, style
-from steadyslip.friction import LinkerDieterich, RateState, Slip
+from steadyslip.figures import mass
 from steadyslip.linear import boundary, critical_stiffness, eigenvalues
-from steadyslip.slider import Slider
-from steadyslip.units import GPa, MPa, deg, m, s, um
-
-D_C = 1 * um
-V0 = 1 * um / s
-
-
-class OutputError(SteadyslipError, OSError):
-    """Results cannot be written where they were asked for."""
-
-
-def paper_rig(angle: float = -45 * deg) -> Slider:
-    """The paper's inclined spring (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
-
-    The paper gives neither v0 nor a stiffness; both are round numbers that no dimensionless result depends on.
-    """
-    rock = RateState(
-        a=0.0145,
-        b=0.0160,
-        d_c=D_C,
-        mu_ref=0.7,
-        v_ref=V0,
-        evolution=Slip(),
-        normal_memory=LinkerDieterich(alpha=0.56),
-    )
-    contact = InclinedSpring(preload=5 * MPa, angle=angle)
-    return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=Steady(V0))
-
-
-# --- the numbers ------------------------------------------------------------------------------------
+from steadyslip.reproduce.rig import D_C, V0, paper_rig
+from steadyslip.units import deg
 
 
 @dataclass(frozen=True)
@@ -183,60 +148,3 @@ def _frequency(angle: float, m_star: float = 0.0) -> float:
     rig = paper_rig(angle * deg).with_values({"slider.mass": float(heavy)})
     found = eigenvalues(rig, {"slider.stiffness": critical_stiffness(rig)})
     return float(np.nanmax(found.imag)) * D_C / V0
-
-
-# --- the figures ------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class PaperFigure:
-    """A figure of the paper: name of its files, and how to draw it on given Axes."""
-
-    name: str
-    draw: Callable[[Any], Any]
-
-
-def _figure_7(ax: Any) -> Any:
-    return figures.critical_stiffness_against_mass(paper_rig(), ax=ax)
-
-
-FIGURES = (PaperFigure("fig7", _figure_7),)
-
-
-def reproduce(folder: str | PathLike[str]) -> list[Path]:
-    """Write the paper's figures and the table of its numbers.
-
-    Parameters
-    ----------
-    folder : path
-        Where to write; created if missing. Files of the same names are replaced.
-
-    Returns
-    -------
-    list of Path
-        ``fig7.png``, ``fig7.svg``, ``paper-numbers.md``, ``paper-numbers.csv``.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be created or written to.
-    """
-    folder = Path(folder)
-    table = paper_table()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        written = []
-        for figure in FIGURES:
-            written += style.write(figure.draw(style.unmanaged_axes()), folder / figure.name)
-        for path, text in (
-            (folder / "paper-numbers.md", table.markdown()),
-            (folder / "paper-numbers.csv", table.csv()),
-        ):
-            path.write_text(text, encoding="utf-8", newline="\n")
-            written.append(path)
-    except OSError as error:
-        raise OutputError(
-            f"folder: got {str(folder)!r}, which cannot be written ({error.strerror or error}); "
-            "allowed: a folder, existing or new, where files may be created"
-        ) from error
-    return written

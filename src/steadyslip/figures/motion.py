@@ -1,0 +1,154 @@
+"""Simulated motion: histories in time, and the phase plane of the paper's Figs 5 and 6."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.errors import NoSteadySliding
+from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, axes_or_new, display_unit, labelled
+from steadyslip.quantities import shown
+from steadyslip.steady import steady_state
+
+if TYPE_CHECKING:
+    from steadyslip.motion import History
+
+_SPANS = 40  # slip events are shaded only if they are fewer than this
+_DECADES = 12.0  # a blow-up is drawn to this many decades above the drive
+
+
+def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
+    """Velocity, friction and normal stress in time, one panel each.
+
+    Parameters
+    ----------
+    run : History
+    ax : three matplotlib Axes, optional
+        New ones unless given.
+
+    Returns
+    -------
+    ndarray of three matplotlib.axes.Axes
+    """
+    panels = _three(ax)
+    factor, unit = display_unit("s", float(run.end) or 1.0)
+    time = run["t"] / factor
+    _velocity_panel(run, panels[0], time)
+    panels[1].plot(time, run["friction"], color=BLUE)
+    panels[1].set_ylabel("friction τ/σ (1)")
+    stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)))
+    panels[2].plot(time, run["normal_stress"] / stress_factor, color=BLUE)
+    panels[2].set_ylabel(labelled("normal stress", stress_unit))
+    panels[2].set_xlabel(labelled("time", unit))
+    slips = run.slip_events if len(run.slip_events) < _SPANS else ()
+    for panel in panels:
+        panel.grid(color=GREY, linewidth=0.3)
+        for slip in slips:
+            panel.axvspan(slip.begin / factor, slip.end / factor, color=ORANGE, alpha=0.15, linewidth=0)
+        if run.status != "done":
+            panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
+    if run.status != "done":
+        panels[0].set_title(f"{run.status} at {shown(run.end, 's')}", color=VERMILION, fontsize="medium")
+    return panels
+
+
+def _three(ax: Sequence[Axes] | None) -> np.ndarray:
+    if ax is not None:
+        return np.asarray(ax, dtype=object)
+    from matplotlib import pyplot as plt
+
+    axes: Any = plt.subplots(3, 1, sharex=True, figsize=(6.4, 6.4), layout="constrained")[1]
+    return np.asarray(axes, dtype=object)
+
+
+def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
+    """On a logarithmic axis where the block never rests or reverses."""
+    v, load = run["v"], run["load_velocity"]
+    drive = run.rig.drive.velocity
+    top = drive * 10.0**_DECADES
+    factor, unit = display_unit("m/s", drive)
+    if np.all(v > 0):
+        ax.set_yscale("log")
+        load = np.where(load > 0, load, np.nan)
+        if v.max() > top:
+            ax.set_ylim(top=top / factor)
+        if v.max() < 100 * v.min():  # less than two decades: plain numbers read better than powers of ten
+            ax.yaxis.set_major_formatter("{x:g}")
+            ax.yaxis.set_minor_formatter("{x:g}")
+    ax.plot(time, load / factor, color=GREY, linewidth=2, label="load point")
+    ax.plot(time, np.minimum(v, 10 * top) / factor, color=BLUE, label="block")
+    ax.set_ylabel(labelled("velocity", unit))
+    ax.legend(loc="best", fontsize="small")
+
+
+def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: str = BLUE) -> Axes:
+    """Spring stress against ln(v/v0), with the line of steady states and the present one marked.
+
+    Motion runs along the curve as the arrows show; vertical distance from the line of steady states is out of
+    balance. Runs drawn on the same Axes share the line of the first.
+
+    Parameters
+    ----------
+    run : History
+        One that never rests or reverses; points where it does are left out.
+    ax : matplotlib.axes.Axes, optional
+    label : str, optional
+        For a legend.
+    color : str, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    drive = run.rig.drive.velocity
+    moving = run["v"] > 0
+    with np.errstate(all="ignore"):
+        u = np.where(moving, np.log(np.where(moving, run["v"], 1.0) / drive), np.nan)
+    shows = np.abs(u) < _DECADES * np.log(10)
+    factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)))
+    x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
+    ax.plot(x, y, color=color, label=label or None, linewidth=1)
+    _arrows(ax, x, y, color)
+    if not ax.get_xlabel():
+        _steady_line(run, ax, x, factor)
+        ax.set_xlabel("ln(v/v0) (1)")
+        ax.set_ylabel(labelled("spring stress", unit))
+    return ax
+
+
+def _arrows(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:
+    """A few arrow heads along the curve, at equal distances in the figure."""
+    finite = np.isfinite(x)
+    x, y = x[finite], y[finite]
+    if len(x) < 3:
+        return
+    width, height = np.ptp(x) or 1.0, np.ptp(y) or 1.0
+    way = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
+    for share in (0.12, 0.37, 0.62):
+        i = int(np.searchsorted(way, share * way[-1]))
+        i = min(max(i, 1), len(x) - 1)
+        ax.annotate(
+            "", (x[i], y[i]), (x[i - 1], y[i - 1]), arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1}
+        )
+
+
+def _steady_line(run: History, ax: Axes, x: np.ndarray, factor: float) -> None:
+    """Spring stress of steady sliding at other drive velocities, and the dot at the rig's own."""
+    low, high = float(np.nanmin(x)), float(np.nanmax(x))
+    margin = 0.1 * (high - low) + 0.05
+    steps = np.linspace(low - margin, high + margin, 41)
+    stress = []
+    for u in steps:
+        try:
+            velocity = run.rig.drive.velocity * float(np.exp(u))
+            stress.append(steady_state(run.rig.with_values({"drive.velocity": velocity})).spring_stress)
+        except NoSteadySliding:
+            stress.append(np.nan)
+    ax.plot(steps, np.array(stress) / factor, color=BLACK, linewidth=1, label="steady states")
+    with suppress(NoSteadySliding):
+        ax.plot([0], [steady_state(run.rig).spring_stress / factor], "o", color=BLACK, markersize=4)

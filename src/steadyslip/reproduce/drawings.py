@@ -1,0 +1,122 @@
+"""The figures of Dupont & Bapna (1994): simulated motion (1, 2, 5, 6) and critical stiffness (7).
+
+The paper does not print the stiffnesses and starting points of its Figs 5 and 6; those used here are named in
+the figures. Its "closed" trajectory at k = k_cr is closed to linear order only: it is a very weak inward spiral
+(theory 6 gives its rate), invisible in the drawing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip import figures
+from steadyslip.contact import Constant
+from steadyslip.figures import style
+from steadyslip.linear import critical_stiffness
+from steadyslip.motion import History, simulate
+from steadyslip.protocol import NormalStressStep, VelocityStep
+from steadyslip.reproduce.rig import D_C, V0, paper_rig
+from steadyslip.slider import Slider
+from steadyslip.units import MPa, deg
+
+SIGMA = 5 * MPa
+_STEP = 1.0  # s, when Figs 1 and 2 step
+_PROMPT = 1e-4  # s, in which the stiff machine has followed and the state has hardly moved
+_STIFF = 1e16  # Pa/m: friction itself, without the machine; a million times critical
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of the paper: name of its files, and how to draw it on given Axes."""
+
+    name: str
+    draw: Callable[[Any], Any]
+
+
+def _figure_7(ax: Any) -> Any:
+    return figures.critical_stiffness_against_mass(paper_rig(), ax=ax)
+
+
+def sheared(protocol: Any, slip: float = 8 * D_C) -> History:
+    """The paper's rock at constant velocity in a stiff machine, without coupling to the normal stress."""
+    paper = paper_rig()
+    rig = Slider(friction=paper.friction, contact=Constant(preload=SIGMA), stiffness=_STIFF, drive=paper.drive)
+    return simulate(rig, protocol, until=slip / V0, method="rosenbrock", events=False)
+
+
+def _response(ax: Any, run: History, direct: str, evolution: str) -> Any:
+    """Shear stress over slip, with the direct and the evolving part of the change marked."""
+    change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
+    slip = run["slip"] / D_C
+    ax.plot(slip, change, color=style.BLUE)
+    peak = float(np.interp(_STEP + _PROMPT, run["t"], change))
+    last, where = float(change[-1]), float(slip[-1])
+    middle = 1.0 + 0.55 * (where - 1.0)
+    for low, high, text, x in ((0.0, peak, direct, middle * 0.55), (peak, last, evolution, middle)):
+        ax.annotate("", (x, high), (x, low), arrowprops={"arrowstyle": "<->", "color": style.VERMILION})
+        ax.text(x + 0.02 * where, 0.5 * (low + high), text, va="center", color=style.VERMILION)
+    for level in (0.0, peak, last):
+        ax.axhline(level, color=style.GREY, linewidth=0.5)
+    ax.set_xlabel("slip/d_c (1)")
+    ax.set_ylabel("change of shear stress/σ (1)")
+    return ax
+
+
+def _figure_1(ax: Any) -> Any:
+    run = sheared(VelocityStep(at=_STEP, to=float(np.e) * V0))
+    _response(ax, run, "A", "B")
+    ax.set_title("Step of velocity by a factor e", fontsize="medium")
+    return ax
+
+
+def _figure_2(ax: Any) -> Any:
+    step = 0.01 * SIGMA
+    run = sheared(NormalStressStep(at=_STEP, by=step))
+    _response(ax, run, "(μ − α) Δσ", "α Δσ")
+    ax.set_title("Step of normal stress by 1 %", fontsize="medium")
+    return ax
+
+
+def trajectory(angle: float, stiffness: float, cycles: float = 4.0, kick: float = 0.5) -> History:
+    """The quasistatic inclined spring, its velocity e^kick times that of the load point at first."""
+    rig = paper_rig(angle).with_values({"slider.stiffness": stiffness})
+    until = cycles * 2 * np.pi * D_C / V0 / 0.19  # 0.19: angular frequency at the edge for −45 degrees, eq. 26
+    return simulate(rig, until=float(until), initial={"v": float(np.exp(kick)) * V0}, rtol=1e-9, events=False)
+
+
+def _figure_5(ax: Any) -> Any:
+    edge = float(critical_stiffness(paper_rig()))
+    for share, color in ((0.97, style.VERMILION), (1.0, style.BLUE), (1.1, style.GREEN)):
+        run = trajectory(-45 * deg, share * edge, cycles=3.0)
+        figures.phase_plane(run, ax=ax, label=f"k = {share:g} k_cr", color=color)
+    ax.set_title("ψ = −45°, start at x = 0, ln(v/v0) = 0.5", fontsize="medium")
+    ax.legend(fontsize="small")
+    return ax
+
+
+def _figure_6(ax: Any) -> Any:
+    stiffness = 1.1 * float(critical_stiffness(paper_rig()))
+    for angle, color in ((-45, style.BLUE), (0, style.ORANGE), (45, style.GREEN)):
+        run = trajectory(angle * deg, stiffness, cycles=3.0)
+        drive = run.rig.drive.velocity
+        scaled = run["spring_stress"] / run["spring_stress"][0]
+        ax.plot(np.log(run["v"] / drive), scaled, color=color, linewidth=1, label=f"ψ = {angle}°".replace("-", "−"))
+    ax.plot([0], [1], "o", color=style.BLACK, markersize=4)
+    ax.set_xlabel("ln(v/v0) (1)")
+    ax.set_ylabel("spring stress/its steady value (1)")
+    ax.set_title("k = 1.1 k_cr(−45°), start at x = 0, ln(v/v0) = 0.5", fontsize="medium")
+    ax.legend(fontsize="small")
+    return ax
+
+
+FIGURES = (
+    PaperFigure("fig1", _figure_1),
+    PaperFigure("fig2", _figure_2),
+    PaperFigure("fig5", _figure_5),
+    PaperFigure("fig6", _figure_6),
+    PaperFigure("fig7", _figure_7),
+)

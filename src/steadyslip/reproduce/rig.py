@@ -1,0 +1,30 @@
+"""The paper's rig."""
+
+from __future__ import annotations
+
+from steadyslip.contact import InclinedSpring
+from steadyslip.drive import Steady
+from steadyslip.friction import LinkerDieterich, RateState, Slip
+from steadyslip.slider import Slider
+from steadyslip.units import GPa, MPa, deg, m, s, um
+
+D_C = 1 * um
+V0 = 1 * um / s
+
+
+def paper_rig(angle: float = -45 * deg) -> Slider:
+    """The paper's inclined spring (section 4) at a spring angle (rad); stiffness 9 GPa/m, no mass.
+
+    The paper gives neither v0 nor a stiffness; both are round numbers that no dimensionless result depends on.
+    """
+    rock = RateState(
+        a=0.0145,
+        b=0.0160,
+        d_c=D_C,
+        mu_ref=0.7,
+        v_ref=V0,
+        evolution=Slip(),
+        normal_memory=LinkerDieterich(alpha=0.56),
+    )
+    contact = InclinedSpring(preload=5 * MPa, angle=angle)
+    return Slider(friction=rock, contact=contact, stiffness=9 * GPa / m, drive=Steady(V0))

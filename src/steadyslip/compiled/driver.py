@@ -21,19 +21,8 @@ EVENTS, V_MAX, V_MIN, LAST_BEGIN, LAST_DURATION, LAST_SLIP, LAST_DROP, LAST_PEAK
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
 )  # fmt: skip
 PEAK_TIME, PEAK_PERIOD, ANY_BEGIN = 11, 12, 13
-NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, LOAD_TIME = 14, 15, 16, 17, 18, 19
+NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN = 14, 15, 16, 17, 18, 19
 LOG_COLUMNS = 8
-
-
-@njit(**PLAIN)
-def channel_at(R, i, tau):
-    """Input i (0: load-point velocity) at local time tau."""
-    value = R[ROW_INPUT + i] + R[ROW_SLOPE + i] * tau
-    for h in range(HARMONICS):
-        k = i * HARMONICS + h
-        angle = R[ROW_OMEGA + k] * tau + R[ROW_PHASE + k]
-        value += R[ROW_AMPLITUDE + k] * math.sin(angle)
-    return value
 
 
 @njit(**PLAIN)
@@ -142,14 +131,6 @@ def first_step(R):
 
 
 @njit(**PLAIN)
-def keep_w(R):
-    """Remember w for the next jump."""
-    for i in range(N):
-        if MASSLESS and i == STATE_W:
-            R[ROW_Z] = R[ROW_Y + i]
-
-
-@njit(**PLAIN)
 def start_job(R, j, cursor, log, arrays, y, out):
     """Load a job into a lane. False if there is no velocity to start with."""
     constants, initial, settings, segments, times = arrays
@@ -195,57 +176,8 @@ def start_job(R, j, cursor, log, arrays, y, out):
         for i in range(N):
             y[i] = R[ROW_Y + i]
         outputs_at(R, 0.0, y, out)
-        note(R, EVENT_BEGINS, 0.0, y, out)
-        write_log(R, log, cursor, EVENT_BEGINS, 0.0, y, out)
+        note(R, EVENT_BEGINS, 0.0, y, out, log, cursor)
     return True
-
-
-@njit(**PLAIN)
-def begin_event(R, tau, out, y):
-    """The block begins to slip faster than the load point moves."""
-    R[ROW_TALLY + NOW_BEGIN] = R[ROW_START] + tau
-    R[ROW_TALLY + NOW_STRESS] = out[4]
-    R[ROW_TALLY + NOW_X] = position(R, tau, y)
-    R[ROW_TALLY + NOW_PEAK] = out[0]
-
-
-@njit(**PLAIN)
-def end_event(R, tau, out, y):
-    """It has fallen back to the load point's velocity: the event is complete."""
-    time = R[ROW_START] + tau
-    begin = R[ROW_TALLY + NOW_BEGIN]
-    if R[ROW_TALLY + ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
-        R[ROW_TALLY + RECURRENCE] = begin - R[ROW_TALLY + LAST_BEGIN]
-    R[ROW_TALLY + ANY_BEGIN] = 1.0 if begin > 0.0 else 0.0
-    R[ROW_TALLY + EVENTS] += 1.0
-    R[ROW_TALLY + LAST_BEGIN] = begin
-    R[ROW_TALLY + LAST_DURATION] = time - begin
-    R[ROW_TALLY + LAST_SLIP] = position(R, tau, y) - R[ROW_TALLY + NOW_X]
-    R[ROW_TALLY + LAST_DROP] = R[ROW_TALLY + NOW_STRESS] - out[4]
-    R[ROW_TALLY + LAST_PEAK] = R[ROW_TALLY + NOW_PEAK]
-
-
-@njit(**PLAIN)
-def write_log(R, log, cursor, kind, tau, y, out):
-    """One line of the log; only single runs keep one."""
-    if log.shape[0] == 0:
-        return
-    i = cursor[LOGGED]
-    log[i, 0] = kind
-    log[i, 1] = R[ROW_START] + tau
-    log[i, 2] = out[0]
-    log[i, 3] = out[2]
-    log[i, 4] = out[3]
-    log[i, 5] = out[4]
-    log[i, 6] = position(R, tau, y)
-    log[i, 7] = R[ROW_SEGMENT]
-    cursor[LOGGED] = i + 1
-
-
-@njit(**PLAIN)
-def position(R, tau, y):
-    """Slip of the block since the start of the run: that of the load point plus x."""
-    return y[0] + R[ROW_TALLY + LOAD_MOVED] + load_advance(R, tau)
 
 
 @njit(**PLAIN)
@@ -306,19 +238,19 @@ def follow(R, cursor, log, y, out, order):
     resting = 1.0 if abs(v) < R[ROW_V_LOW] else 0.0
     count = 0
     if sigma <= R[ROW_SIGMA_LOW]:
-        order[count, 0], order[count, 1] = located(R, LOST, y, out), LOST
+        order[count, 1] = LOST
         count += 1
     if slipping != R[ROW_SLIPPING]:
-        kind = EVENT_BEGINS if slipping > 0.0 else EVENT_ENDS
-        order[count, 0], order[count, 1] = located(R, kind, y, out), kind
+        order[count, 1] = EVENT_BEGINS if slipping > 0.0 else EVENT_ENDS
         count += 1
     if resting != R[ROW_RESTING]:
-        kind = ARREST if resting > 0.0 else RESTART
-        order[count, 0], order[count, 1] = located(R, kind, y, out), kind
+        order[count, 1] = ARREST if resting > 0.0 else RESTART
         count += 1
     if R[ROW_OUT_OLD + 1] * h > 1e-10 * abs(v) and R[ROW_OUT + 1] <= 0.0:
-        order[count, 0], order[count, 1] = located(R, PEAK, y, out), PEAK
+        order[count, 1] = PEAK
         count += 1
+    for i in range(count):
+        order[i, 0] = located(R, int(order[i, 1]), y, out)
     for _ in range(count):
         first = 0
         for i in range(count):
@@ -329,8 +261,7 @@ def follow(R, cursor, log, y, out, order):
         dense_at(R, theta, y)
         tau = tau_old + theta * h
         outputs_at(R, tau, y, out)
-        note(R, kind, tau, y, out)
-        write_log(R, log, cursor, kind, tau, y, out)
+        note(R, kind, tau, y, out, log, cursor)
         if kind == LOST:
             R[ROW_TAU] = tau
             for i in range(N):
@@ -345,16 +276,34 @@ def follow(R, cursor, log, y, out, order):
 
 
 @njit(**PLAIN)
-def note(R, kind, tau, y, out):
-    """Keep the tally of events."""
+def note(R, kind, tau, y, out, log, cursor):
+    """Keep the tally of events, and the log where there is one."""
+    time = R[ROW_START] + tau
+    place = y[0] + R[ROW_TALLY + LOAD_MOVED] + load_advance(R, tau)
+    if log.shape[0] > 0:
+        i = cursor[LOGGED]
+        log[i, 0], log[i, 1], log[i, 2], log[i, 3] = kind, time, out[0], out[2]
+        log[i, 4], log[i, 5], log[i, 6], log[i, 7] = out[3], out[4], place, R[ROW_SEGMENT]
+        cursor[LOGGED] = i + 1
     if kind == EVENT_BEGINS:
-        begin_event(R, tau, out, y)
+        R[ROW_TALLY + NOW_BEGIN] = time
+        R[ROW_TALLY + NOW_STRESS] = out[4]
+        R[ROW_TALLY + NOW_X] = place
+        R[ROW_TALLY + NOW_PEAK] = out[0]
     elif kind == EVENT_ENDS:
-        end_event(R, tau, out, y)
+        begin = R[ROW_TALLY + NOW_BEGIN]
+        if R[ROW_TALLY + ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
+            R[ROW_TALLY + RECURRENCE] = begin - R[ROW_TALLY + LAST_BEGIN]
+        R[ROW_TALLY + ANY_BEGIN] = 1.0 if begin > 0.0 else 0.0
+        R[ROW_TALLY + EVENTS] += 1.0
+        R[ROW_TALLY + LAST_BEGIN] = begin
+        R[ROW_TALLY + LAST_DURATION] = time - begin
+        R[ROW_TALLY + LAST_SLIP] = place - R[ROW_TALLY + NOW_X]
+        R[ROW_TALLY + LAST_DROP] = R[ROW_TALLY + NOW_STRESS] - out[4]
+        R[ROW_TALLY + LAST_PEAK] = R[ROW_TALLY + NOW_PEAK]
     elif kind == ARREST:
         R[ROW_TALLY + ARRESTS] += 1.0
     elif kind == PEAK:
-        time = R[ROW_START] + tau
         if R[ROW_TALLY + PEAKS] > 0.0:
             R[ROW_TALLY + PEAK_PERIOD] = time - R[ROW_TALLY + PEAK_TIME]
         R[ROW_TALLY + PEAKS] += 1.0
@@ -364,20 +313,20 @@ def note(R, kind, tau, y, out):
 
 
 @njit(**PLAIN)
-def take_samples(R, j, j0, times, samples, until, y):
-    """Write the state at every requested time before `until` (local), from the dense output."""
-    tau_old, h = R[ROW_TAU_OLD], R[ROW_DONE]
-    start = R[ROW_START]
-    k = int(R[ROW_TALLY + LOAD_TIME])
-    while k < times.shape[0] and times[k] < start + until:
-        theta = (times[k] - start - tau_old) / h
-        if theta < 0.0:
-            theta = 0.0
-        dense_at(R, theta, y)
+def take_samples(R, row, times, samples, at_end, y):
+    """Write the state at every requested time up to now: from the dense output, or `at_end` of a run as it is."""
+    now = R[ROW_START] + R[ROW_TAU]
+    k = int(R[ROW_TALLY + TAKEN])
+    while k < times.shape[0] and (times[k] < now or (at_end and times[k] <= now)):
+        if at_end:
+            for i in range(N):
+                y[i] = R[ROW_Y + i]
+        else:
+            dense_at(R, max((times[k] - R[ROW_START] - R[ROW_TAU_OLD]) / R[ROW_DONE], 0.0), y)
         for i in range(N):
-            samples[j - j0, k, i] = y[i]
+            samples[row, k, i] = y[i]
         k += 1
-    R[ROW_TALLY + LOAD_TIME] = k
+    R[ROW_TALLY + TAKEN] = k
     R[ROW_NEXT] = times[k] if k < times.shape[0] else math.inf
 
 
@@ -410,31 +359,20 @@ def finish(R, row, status, results):
 
 
 @njit(**PLAIN)
-def sample_here(R, j, j0, times, samples):
-    """The end of the run is a sample too."""
-    k = int(R[ROW_TALLY + LOAD_TIME])
-    while k < times.shape[0] and times[k] <= R[ROW_START] + R[ROW_TAU]:
-        for i in range(N):
-            samples[j - j0, k, i] = R[ROW_Y + i]
-        k += 1
-    R[ROW_TALLY + LOAD_TIME] = k
-    R[ROW_NEXT] = times[k] if k < times.shape[0] else math.inf
-
-
-@njit(**PLAIN)
 def go_on(R, j, cursor, arrays, results, y, out, order):
     """Look after a job that has raised its flag. Returns its status."""
     j0 = cursor[FIRST_JOB]
     segments, times = arrays[3], arrays[4]
     samples, log, recorded = results[3], results[4], results[5]
     good = R[ROW_GOOD] > 0.0
-    keep_w(R)
+    if MASSLESS and STATE_W >= 0:
+        R[ROW_Z] = R[ROW_Y + STATE_W]  # a guess for after the next jump
     if DENSE and good:
-        if R[ROW_WATCH] > 0.0 and follow(R, cursor, log, y, out, order):
-            take_samples(R, j, j0, times, samples, R[ROW_TAU], y)
-            return CONTACT_LOST
+        lost = R[ROW_WATCH] > 0.0 and follow(R, cursor, log, y, out, order)
         if R[ROW_NEXT] < R[ROW_START] + R[ROW_TAU]:
-            take_samples(R, j, j0, times, samples, R[ROW_TAU], y)
+            take_samples(R, j - j0, times, samples, False, y)
+        if lost:
+            return CONTACT_LOST
         if R[ROW_RECORD] > 0.0:
             record(R, cursor, recorded)
     if abs(R[ROW_OUT]) >= R[ROW_V_HIGH]:
@@ -448,7 +386,7 @@ def go_on(R, j, cursor, arrays, results, y, out, order):
     while R[ROW_TAU] >= R[ROW_END]:
         k = int(R[ROW_SEGMENT]) + 1
         if k >= segments.shape[1]:
-            sample_here(R, j, j0, times, samples)
+            take_samples(R, j - j0, times, samples, True, y)
             return DONE
         h = R[ROW_H]
         if not enter_segment(R, j, k, segments, y, out):
@@ -470,8 +408,7 @@ def crossed(R, cursor, log, y, out):
     slipping = 1.0 if R[ROW_GAP] > 0.0 else 0.0
     if slipping != R[ROW_SLIPPING]:
         kind = EVENT_BEGINS if slipping > 0.0 else EVENT_ENDS
-        note(R, kind, 0.0, y, out)
-        write_log(R, log, cursor, kind, 0.0, y, out)
+        note(R, kind, 0.0, y, out, log, cursor)
         R[ROW_SLIPPING] = slipping
     R[ROW_RESTING] = 1.0 if abs(out[0]) < R[ROW_V_LOW] else 0.0
     R[ROW_TALLY + V_MAX] = max(R[ROW_TALLY + V_MAX], out[0])

@@ -403,6 +403,8 @@ class KernelText:
     def text(self) -> str:
         """The whole kernel, to be compiled behind the primitives and a preamble."""
         header = {f"ROW_{name}": row for name, row in self.rows.items()}
+        for name in ("OLD", "STAGE", "DONE", "TAU_OLD", "OUT_OLD"):
+            header.setdefault(f"ROW_{name}", 0)  # named by the driver, not used without dense output
         header |= {"W": self.choice.lanes, "N": self.size, "ROWS": self.row_count, "DENSE": self.choice.dense}
         header |= {"NC": len(self.constants.symbols), "NK": len(self.reduction.continuous)}
         header |= {"HARMONICS": self.choice.harmonics, "MASSLESS": self.reduction.restart is not None}

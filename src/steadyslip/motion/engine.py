@@ -122,7 +122,7 @@ def run_many(
                     pending[pool.submit(work, start, stop, stopped)] = stop - start
                 if not pending:
                     return True
-                done, _ = wait(pending, return_when=FIRST_COMPLETED)
+                done, _ = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)  # so that Ctrl-C is seen
                 for future in done:
                     future.result()
                     if advanced is not None:

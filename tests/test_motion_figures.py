@@ -40,7 +40,10 @@ def test_blow_up_is_said_and_clipped():
     run = ss.simulate(unit_rig("slip", 0.5, 0.3), ss.VelocityStep(at=5.0, to=1.5), until=60.0)
     panels = run.plot()
     assert "blow-up" in panels[0].get_title()
-    assert panels[0].get_ylim()[1] <= 1e13
+    low, high = panels[0].get_ylim()
+    assert low < run["v"].min()  # clipped above only: the slow part stays in view
+    assert high <= 1e13
+    assert any(line.get_xdata()[0] == pytest.approx(run.end) for line in panels[1].lines[1:])
     matplotlib.pyplot.close("all")
 
 
@@ -54,6 +57,22 @@ def test_phase_plane_shows_the_run_and_steady_states(spiral):
     assert ax.get_xlabel() == "ln(v/v0) (1)"
     with pytest.raises(ss.NotAvailable, match="history"):
         spiral.plot("orbit")
+
+
+def test_the_dot_is_where_a_stable_run_ends_and_stress_steps_are_named(spiral):
+    dot = lines(spiral.plot("phase", ax=Figure().subplots()))["_steady sliding"]
+    assert dot.get_xdata()[0] == pytest.approx(np.log(1.5))
+    assert dot.get_ydata()[0] == pytest.approx(spiral["spring_stress"][-1], rel=1e-3)
+    pressed = ss.simulate(paper_rig(), ss.NormalStressStep(at=1.0, by=1e4), until=5.0)
+    drawn = lines(pressed.plot("phase", ax=Figure().subplots()))
+    assert "steady states before the change of normal stress" in drawn
+    assert "_steady sliding" not in drawn
+
+
+def test_history_needs_three_axes(spiral):
+    for ax in (Figure().subplots(), Figure().subplots(2, 1)):
+        with pytest.raises(ss.ParameterError, match="three"):
+            spiral.plot(ax=ax)
 
 
 def test_reversing_runs_can_be_drawn():

@@ -46,7 +46,9 @@ def test_the_paper_rig_has_the_papers_parameters():
 def test_every_number_agrees(table):
     assert len(table) >= 15
     for row in table:
-        assert row.difference < 1e-10, row
+        # motion is read a short time after a step, and from an orbit of finite size
+        assert row.difference < (5e-4 if row.source.startswith("Fig.") else 1e-10), row
+    assert {row.source for row in table if row.source.startswith("Fig.")} == {"Fig. 1", "Fig. 2", "Fig. 5"}
 
 
 def test_the_numbers_are_those_printed(table):
@@ -58,7 +60,7 @@ def test_the_numbers_are_those_printed(table):
 
 def test_the_expected_numbers_are_those_of_the_closed_forms(table):
     """The literals against `steadyslip.paper`, so that neither can be mistyped."""
-    expected = {row.quantity: row.expected for row in table}
+    expected = {row.quantity: row.expected for row in table if row.source.startswith("eq.")}
     law = {"a": 0.0145, "b": 0.0160, "mu_ss": 0.7, "alpha": 0.56}
     degrees = {f"ψ = {d}°".replace("-", "−"): d * deg for d in (-45, -30, 0, 15, 30, 45)}
     checked = 0

@@ -157,7 +157,7 @@ def start_job(R, j, cursor, log, arrays, y, out):
     R[ROW_ACCEPTED] = 0.0
     R[ROW_REJECTED] = 0.0
     R[ROW_FAILURES] = 0.0
-    R[ROW_ERROR] = 1.0
+    R[ROW_ERROR] = 0.0
     R[ROW_GOOD] = 0.0
     R[ROW_FLAG] = 0.0
     R[ROW_NEXT] = times[0] if times.shape[0] > 0 else math.inf

@@ -8,6 +8,7 @@ lane. A single run is the same kernel with one lane.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
@@ -24,7 +25,9 @@ OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 _SLOPE_NAMES = {s: f"slope_{c}" for s, c in zip(SLOPES[:3], CHANNELS, strict=True)}
 _INPUT_NAMES = {s: f"in_{c}" for s, c in zip(INPUTS[:3], CHANNELS, strict=True)} | {TIME: "time"}
 NEWTON_STEPS = 6
-PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson: few rejections, even error
+ABREAST = 3  # chains of operations that are interleaved, each a vector of lanes
+PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
+# hardly any rejections, and an end error near rtol after tens of cycles
 Where = Callable[[str, int], str]
 
 
@@ -217,14 +220,12 @@ class KernelText:
         lines += [
             f"error = error*{1 / n!r}",
             "good = error <= 1.0",
-            "bounded = max(error, 1e-10)",
+            "size = log(min(max(error, 1e-10), 1e30))",
             f"earlier = {self.cell('ERROR')}",
-            f"gain = power(bounded, {-0.5 * PROPORTIONAL / self.method.order!r})",
-            f"memory = power(earlier, {0.5 * INTEGRAL / self.method.order!r})",
-            f"plain = power(bounded, {-0.5 / self.method.order!r})",
-            "factor = min(max(0.9*gain*memory if good else 0.9*plain, 0.2), 6.0)",
-            "factor = factor if error < 1e60 else 0.2",
-            f"{self.cell('ERROR')} = bounded if good else earlier",
+            f"kept = {-0.5 * PROPORTIONAL / self.method.order!r}*size + {0.5 * INTEGRAL / self.method.order!r}*earlier",
+            f"factor = 0.8*exp(kept if good else {-0.5 / self.method.order!r}*size)",
+            "factor = min(max(factor, 0.2), 6.0) if error < 1e60 else 0.2",
+            f"{self.cell('ERROR')} = size if good else earlier",
             "after = end if last else tau + h",
             "next_h = h*factor",
             "next_h = max(proposed, next_h) if last and good else next_h",
@@ -412,12 +413,30 @@ class KernelText:
         header["IMPLICIT"] = header["MASSLESS"] and self.reduction.unknown is not None
         constants = "".join(f"{name} = {value!r}\n" for name, value in header.items())
         driver = files("steadyslip.compiled").joinpath("driver.py").read_text(encoding="utf-8")
-        loop = "\n\n@njit(**FLAT)\ndef step_lanes(S):\n    for l in range(W):\n" + indented(self.step(), 2)
+        step, count = self.step(), "W"
+        if self.choice.lanes > 1 and not any(line.startswith("for ") for line in step):
+            step, count = _abreast(step, self.choice.lanes // ABREAST, ABREAST), f"W // {ABREAST}"
+        loop = f"\n\n@njit(**FLAT)\ndef step_lanes(S):\n    for l in range({count}):\n" + indented(step, 2)
         return constants + self.functions() + loop + "\n\n" + driver
 
 
 def _function(signature: str, lines: Lines) -> str:
     return f"\n\n@njit(**PLAIN)\ndef {signature}:\n" + indented(lines, 1)
+
+
+def _abreast(lines: Lines, apart: int, count: int) -> Lines:
+    """The same statements for lanes l, l + apart, l + 2 apart, ..., line by line.
+
+    One chain of dependent operations leaves a processor idle for most of the time; several fill its gaps
+    (measured: two take 1.6 to 1.9 times less time for each lane, three up to 2.4 times, four no less).
+    """
+    assigned = {match[1] for line in lines if (match := re.match(r"(\w+) \+?= ", line))}
+    names = re.compile(rf"\b({'|'.join(sorted(assigned))})\b")
+
+    def moved(line: str, by: int) -> str:
+        return re.sub(r"S\[(\d+) \+ l\]", lambda match: f"S[{int(match[1]) + by} + l]", line)
+
+    return [names.sub(rf"\1{'_' * c}", moved(line, c * apart)) for line in lines for c in range(count)]
 
 
 def _factorised(n: int) -> Lines:

@@ -12,7 +12,6 @@ LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 @njit(**INLINE)
 def exp(x):
     """e^x; saturates at e^±700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme."""
-    x = min(max(x, -700.0), 700.0)
     shifted = x * 1.4426950408889634 + ROUND
     n = shifted - ROUND
     r = (x - n * LN2_HIGH) - n * LN2_LOW
@@ -23,7 +22,9 @@ def exp(x):
     high = (1 / 39916800 * r + 1 / 3628800) * r2 + (1 / 362880 * r + 1 / 40320)
     top = (1 / 6227020800 * r + 1 / 479001600) * r4 + high
     value = top * (r4 * r4) + (middle * r4 + low)
-    return real(bits(value) + (bits(shifted) << 52))
+    value = real(bits(value) + (bits(shifted) << 52))
+    value = 1.0142320547350045e304 if x > 700.0 else value  # chosen at the end, off the chain of operations
+    return 9.859676543759770e-305 if x < -700.0 else value
 
 
 @njit(**INLINE)

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter
 
-from steadyslip.errors import NoSteadySliding
+from steadyslip.errors import NoSteadySliding, ParameterError, Problem
 from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, axes_or_new, display_unit, labelled
+from steadyslip.protocol import Protocol
+from steadyslip.protocol.protocol import NORMAL_STRESS
 from steadyslip.quantities import shown
 from steadyslip.steady import steady_state
 
@@ -33,6 +36,11 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     Returns
     -------
     ndarray of three matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If `ax` is not three Axes.
     """
     panels = _three(ax)
     factor, unit = display_unit("s", float(run.end) or 1.0)
@@ -58,7 +66,10 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
 
 def _three(ax: Sequence[Axes] | None) -> np.ndarray:
     if ax is not None:
-        return np.asarray(ax, dtype=object)
+        given = np.asarray(ax, dtype=object)
+        if given.shape != (3,):
+            raise ParameterError([Problem("ax", f"got Axes of shape {given.shape}; allowed: a sequence of three")])
+        return given
     from matplotlib import pyplot as plt
 
     axes: Any = plt.subplots(3, 1, sharex=True, figsize=(6.4, 6.4), layout="constrained")[1]
@@ -74,22 +85,24 @@ def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
     if np.all(v > 0):
         ax.set_yscale("log")
         load = np.where(load > 0, load, np.nan)
-        if v.max() > top:
-            ax.set_ylim(top=top / factor)
+        if v.max() > top:  # both ends: one alone would keep the other where it was without data
+            ax.set_ylim(0.5 * min(v.min(), np.nanmin(load, initial=drive)) / factor, top / factor)
         if v.max() < 100 * v.min():  # less than two decades: plain numbers read better than powers of ten
+            ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_formatter("{x:g}")
-    ax.plot(time, load / factor, color=GREY, linewidth=2, label="load point")
+            ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label="load point")
     ax.plot(time, np.minimum(v, 10 * top) / factor, color=BLUE, label="block")
     ax.set_ylabel(labelled("velocity", unit))
     ax.legend(loc="best", fontsize="small")
 
 
 def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: str = BLUE) -> Axes:
-    """Spring stress against ln(v/v0), with the line of steady states and the present one marked.
+    """Spring stress against ln(v/v0), with the line of steady states; a dot at the last load-point velocity.
 
     Motion runs along the curve as the arrows show; vertical distance from the line of steady states is out of
-    balance. Runs drawn on the same Axes share the line of the first.
+    balance. Runs drawn on the same Axes share the line of the first. The line is that of the rig's own
+    normal stress, without what a protocol adds to it; v0 is the velocity of the rig's drive.
 
     Parameters
     ----------
@@ -138,7 +151,7 @@ def _arrows(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:
 
 
 def _steady_line(run: History, ax: Axes, x: np.ndarray, factor: float) -> None:
-    """Spring stress of steady sliding at other drive velocities, and the dot at the rig's own."""
+    """Spring stress of steady sliding at other drive velocities, and the dot at the last one of the run."""
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     margin = 0.1 * (high - low) + 0.05
     steps = np.linspace(low - margin, high + margin, 41)
@@ -149,6 +162,14 @@ def _steady_line(run: History, ax: Axes, x: np.ndarray, factor: float) -> None:
             stress.append(steady_state(run.rig.with_values({"drive.velocity": velocity})).spring_stress)
         except NoSteadySliding:
             stress.append(np.nan)
-    ax.plot(steps, np.array(stress) / factor, color=BLACK, linewidth=1, label="steady states")
-    with suppress(NoSteadySliding):
-        ax.plot([0], [steady_state(run.rig).spring_stress / factor], "o", color=BLACK, markersize=4)
+    pressed = any(piece.channel == NORMAL_STRESS for piece in Protocol.of(run.protocol).pieces)
+    label = "steady states before the change of normal stress" if pressed else "steady states"
+    ax.plot(steps, np.array(stress) / factor, color=BLACK, linewidth=1, label=label)
+    last = float(run["load_velocity"][-1])
+    if not pressed and last > 0:
+        with suppress(NoSteadySliding):
+            level = steady_state(run.rig.with_values({"drive.velocity": last})).spring_stress / factor
+            u = np.log(last / run.rig.drive.velocity)
+            ax.plot([u], [level], "o", color=BLACK, markersize=4, label="_steady sliding")
+    elif pressed:
+        ax.legend(fontsize="small")

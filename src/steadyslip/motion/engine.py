@@ -13,7 +13,7 @@ import numpy as np
 from steadyslip.compiled.program import TALLY, Program
 from steadyslip.motion.setup import Jobs
 
-LANES = 16
+LANES = 24  # three vectors of eight doubles, see compiled.kernel
 CHUNK = 2048  # jobs per call: keeps the arrays small and Ctrl-C prompt
 QUOTA = 20_000  # passes between looks at the clock and at Ctrl-C, some tens of milliseconds
 INTERRUPTED = 7

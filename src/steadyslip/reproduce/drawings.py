@@ -24,8 +24,8 @@ from steadyslip.slider import Slider
 from steadyslip.units import MPa, deg
 
 SIGMA = 5 * MPa
-_STEP = 1.0  # s, when Figs 1 and 2 step
-_PROMPT = 1e-4  # s, in which the stiff machine has followed and the state has hardly moved
+STEP = 1.0  # s, when Figs 1 and 2 step
+PROMPT = 1e-4  # s, in which the stiff machine has followed and the state has hardly moved
 _STIFF = 1e16  # Pa/m: friction itself, without the machine; a million times critical
 
 
@@ -53,7 +53,7 @@ def _response(ax: Any, run: History, direct: str, evolution: str) -> Any:
     change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
     slip = run["slip"] / D_C
     ax.plot(slip, change, color=style.BLUE)
-    peak = float(np.interp(_STEP + _PROMPT, run["t"], change))
+    peak = float(np.interp(STEP + PROMPT, run["t"], change))
     last, where = float(change[-1]), float(slip[-1])
     middle = 1.0 + 0.55 * (where - 1.0)
     for low, high, text, x in ((0.0, peak, direct, middle * 0.55), (peak, last, evolution, middle)):
@@ -67,7 +67,7 @@ def _response(ax: Any, run: History, direct: str, evolution: str) -> Any:
 
 
 def _figure_1(ax: Any) -> Any:
-    run = sheared(VelocityStep(at=_STEP, to=float(np.e) * V0))
+    run = sheared(VelocityStep(at=STEP, to=float(np.e) * V0))
     _response(ax, run, "A", "B")
     ax.set_title("Step of velocity by a factor e", fontsize="medium")
     return ax
@@ -75,8 +75,8 @@ def _figure_1(ax: Any) -> Any:
 
 def _figure_2(ax: Any) -> Any:
     step = 0.01 * SIGMA
-    run = sheared(NormalStressStep(at=_STEP, by=step))
-    _response(ax, run, "(μ − α) Δσ", "α Δσ")
+    run = sheared(NormalStressStep(at=STEP, by=step))
+    _response(ax, run, "≈ (μ − α) Δσ", "≈ α Δσ")
     ax.set_title("Step of normal stress by 1 %", fontsize="medium")
     return ax
 
@@ -93,7 +93,7 @@ def _figure_5(ax: Any) -> Any:
     for share, color in ((0.97, style.VERMILION), (1.0, style.BLUE), (1.1, style.GREEN)):
         run = trajectory(-45 * deg, share * edge, cycles=3.0)
         figures.phase_plane(run, ax=ax, label=f"k = {share:g} k_cr", color=color)
-    ax.set_title("ψ = −45°, start at x = 0, ln(v/v0) = 0.5", fontsize="medium")
+    ax.set_title("ψ = −45°, start at x = 0, ln(v/v0) = 0.5; k_cr: closed to linear order only", fontsize="medium")
     ax.legend(fontsize="small")
     return ax
 

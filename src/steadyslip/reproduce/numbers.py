@@ -17,6 +17,8 @@ import numpy as np
 from steadyslip import figures
 from steadyslip.figures import mass
 from steadyslip.linear import boundary, critical_stiffness, eigenvalues
+from steadyslip.protocol import NormalStressStep, VelocityStep
+from steadyslip.reproduce.drawings import PROMPT, SIGMA, STEP, sheared, trajectory
 from steadyslip.reproduce.rig import D_C, V0, paper_rig
 from steadyslip.units import deg
 
@@ -28,7 +30,7 @@ class Row:
     Attributes
     ----------
     source : str
-        Equation of the paper.
+        Equation or figure of the paper.
     quantity, unit : str
     expected, found : float
         The equation's number, and ours by the general route.
@@ -130,7 +132,7 @@ def paper_table() -> PaperTable:
         Row("eq. 31", _at("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg))
         for angle, value in _MASS_2.items()
     ]
-    return PaperTable(tuple(rows))
+    return PaperTable((*rows, *_from_motion()))
 
 
 def _at(symbol: str, angle: int, m_star: float | None = None) -> str:
@@ -148,3 +150,35 @@ def _frequency(angle: float, m_star: float = 0.0) -> float:
     rig = paper_rig(angle * deg).with_values({"slider.mass": float(heavy)})
     found = eigenvalues(rig, {"slider.stiffness": critical_stiffness(rig)})
     return float(np.nanmax(found.imag)) * D_C / V0
+
+
+def _from_motion() -> tuple[Row, ...]:
+    """What Figs 1, 2 and 5 show, read from simulated motion: good to the finite time of a step or size of a kick."""
+    rise, settled = _parts(VelocityStep(at=STEP, to=float(np.e) * V0))
+    share = 0.01
+    jump, final = _parts(NormalStressStep(at=STEP, by=share * SIGMA))
+    at_once = (1 + share) * (0.7 - 0.56 * np.log1p(share)) - 0.7  # eq. 1; (μss − α) Δσ/σ to first order
+    edge = float(critical_stiffness(paper_rig()))
+    return (
+        Row("Fig. 1", "A", "1", 0.0145, rise),
+        Row("Fig. 1", "B", "1", 0.0160, rise - settled),
+        Row("Fig. 2", "jump of τ/σ for Δσ/σ = 1 %", "1", float(at_once), jump),
+        Row("Fig. 2", "final change of τ/σ for Δσ/σ = 1 %", "1", 0.7 * share, final),
+        Row("Fig. 5", "β d_c/v0 of a small orbit at k_cr, ψ = −45°", "1", _BETA[-45], _orbit_frequency(edge)),
+    )
+
+
+def _parts(piece: VelocityStep | NormalStressStep) -> tuple[float, float]:
+    """Change of shear stress over σ just after a step, and in the end."""
+    run = sheared(piece, 20 * D_C)
+    change = (run["shear_stress"] - run["shear_stress"][0]) / SIGMA
+    return float(np.interp(STEP + PROMPT, run["t"], change)), float(change[-1])
+
+
+def _orbit_frequency(stiffness: float) -> float:
+    """From the times at which a small orbit returns to v0 from below."""
+    run = trajectory(-45 * deg, stiffness, cycles=4.0, kick=0.02)
+    u, t = np.log(run["v"] / V0), run["t"]
+    i = np.nonzero((u[:-1] < 0) & (u[1:] >= 0))[0]
+    returns = t[i] - u[i] * (t[i + 1] - t[i]) / (u[i + 1] - u[i])
+    return float(2 * np.pi / np.mean(np.diff(returns)) * D_C / V0)

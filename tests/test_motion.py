@@ -15,6 +15,7 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.compiled.program import Program
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.setup import Options, prepare
+from steadyslip.records import positive, real
 from test_motion_oracle import LAWS
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -466,3 +467,72 @@ def test_history_tells_what_it_has():
     assert data["v"].attrs["units"] == "m/s"
     assert data.attrs["status"] == "done"
     assert "rate-state" in data.attrs["rig"]
+
+
+# -- laws of machines, and of users
+
+
+def test_coulomb_friction_sticks_and_breaks_loose_at_the_static_limit():
+    """Stuck blocks creep at less than a millionth; friction reaches μ_S σ before each slip, no more."""
+    friction = ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5)
+    contact = ss.Constant(preload=1e5)
+    a_rig = ss.Slider(friction=friction, contact=contact, stiffness=1e8, mass=100.0, drive=ss.Steady(1e-3))
+    run = ss.simulate(a_rig, ss.VelocityStep(at=0.01, to=1.1e-3), until=1.0)
+    assert run.status == "done"
+    assert len(run.slip_events) > 4
+    late = run["t"] > 0.3
+    assert run["shear_stress"][late].max() == pytest.approx(3e4, rel=2e-3)
+    stuck = late & (run["v"] < 1e-6)
+    assert np.sum(stuck) > 20
+    assert np.all(run["v"][stuck] > -1e-8)
+
+
+class Softening(ss.FrictionLaw, name="test-softening"):
+    """A law of one's own: strength falls with a saturating memory, and a kink."""
+
+    mu: float = ss.parameter("1", positive, "level")
+    a: float = ss.parameter("1", positive, "direct effect")
+    c: float = ss.parameter("1", real, "evolution effect")
+    length: float = ss.parameter("m", positive, "slip distance")
+    v_ref: float = ss.parameter("m/s", positive, "reference")
+
+    def memory(self):
+        return ("s",)
+
+    def strength(self, v, sigma, memory, tau):
+        import sympy as sp
+
+        bent = sp.Piecewise((memory[0], memory[0] > -1), (2 * memory[0] + 1, True))
+        return sigma * (self.mu + self.a * sp.log(v / self.v_ref) + self.c * sp.tanh(bent))
+
+    def rates(self, v, sigma, memory, tau):
+        import sympy as sp
+
+        return (-v / self.length * (memory[0] + sp.log(v / self.v_ref)),)
+
+    def steady_memory(self, v, sigma):
+        import sympy as sp
+
+        return (-sp.log(v / self.v_ref),)
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e9])
+def test_a_law_of_one_s_own_moves(mass):
+    from oracle import Oracle
+
+    law = Softening(mu=0.6, a=0.01, c=0.015, length=1e-6, v_ref=1e-6)
+    a_rig = rig(friction=law, mass=mass, stiffness=2e10, radiation_damping=1e10)
+    run = ss.simulate(a_rig, until=2.0, initial={"x": 5e-7}, rtol=1e-9)
+    assert run.status == "done"
+    expected = Oracle(a_rig).run(2.0, x=5e-7)
+    assert [run["x"][-1], run["v"][-1], run["s"][-1]] == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_summary_tells_the_same_whatever_the_steps():
+    """Extremes of velocity are located, not picked from samples."""
+
+    def lines(**options):
+        run = ss.simulate(unit_rig("slip", 0.5, 0.45, damping=1e-3), until=40.0, initial={"v": 1.5}, **options)
+        return str(run).splitlines()[1]
+
+    assert lines() == lines(rtol=1e-11) == lines(times=[0.0, 40.0])

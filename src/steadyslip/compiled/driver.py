@@ -15,7 +15,7 @@ S_RTOL, S_MOST, S_V_HIGH, S_V_LOW, S_SIGMA_LOW, S_WATCH, S_RECORD, S_GUESS, S_Z_
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
 )  # fmt: skip
 # kinds in the log
-EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN = 1, 2, 3, 4, 5, 6, 7
+EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN, TROUGH = 1, 2, 3, 4, 5, 6, 7, 8
 # columns of `tally`: what is known about a trajectory's slip events
 EVENTS, V_MAX, V_MIN, LAST_BEGIN, LAST_DURATION, LAST_SLIP, LAST_DROP, LAST_PEAK, RECURRENCE, ARRESTS, PEAKS = (
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
@@ -187,6 +187,8 @@ def event_function(R, kind, theta, y, out):
     outputs_at(R, R[ROW_TAU_OLD] + theta * R[ROW_DONE], y, out)
     if kind == PEAK:
         return out[1]
+    if kind == TROUGH:
+        return -out[1]
     if kind == EVENT_BEGINS:
         return max(1.000001 * out[5], R[ROW_V_LOW]) - out[0]
     if kind == EVENT_ENDS:
@@ -249,6 +251,9 @@ def follow(R, cursor, log, y, out, order):
     if R[ROW_OUT_OLD + 1] * h > 1e-10 * abs(v) and R[ROW_OUT + 1] <= 0.0:
         order[count, 1] = PEAK
         count += 1
+    elif R[ROW_OUT_OLD + 1] * h < -1e-10 * abs(v) and R[ROW_OUT + 1] >= 0.0:
+        order[count, 1] = TROUGH
+        count += 1
     for i in range(count):
         order[i, 0] = located(R, int(order[i, 1]), y, out)
     for _ in range(count):
@@ -310,6 +315,8 @@ def note(R, kind, tau, y, out, log, cursor):
         R[ROW_TALLY + PEAK_TIME] = time
         R[ROW_TALLY + V_MAX] = max(R[ROW_TALLY + V_MAX], out[0])
         R[ROW_TALLY + NOW_PEAK] = max(R[ROW_TALLY + NOW_PEAK], out[0])
+    elif kind == TROUGH:
+        R[ROW_TALLY + V_MIN] = min(R[ROW_TALLY + V_MIN], out[0])
 
 
 @njit(**PLAIN)

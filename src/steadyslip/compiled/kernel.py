@@ -314,7 +314,8 @@ class KernelText:
             f"{cell('GAP')} = gap",
             "slipping = 1.0 if gap > 0.0 else 0.0",
             f"resting = 1.0 if abs(now0) < {cell('V_LOW')} else 0.0",
-            "event = 1.0 if before1*h > 1e-10*abs(now0) and now1 <= 0.0 else 0.0",  # more than rounding
+            "turn = 1.0 if before1*h > 1e-10*abs(now0) and now1 <= 0.0 else 0.0",  # more than rounding
+            "event = turn + (1.0 if before1*h < -1e-10*abs(now0) and now1 >= 0.0 else 0.0)",
             f"event += abs(slipping - {cell('SLIPPING')}) + abs(resting - {cell('RESTING')})",
             f"event = event*{cell('WATCH')}",
             "flag = 1.0 if moved >= end else 0.0",

@@ -16,7 +16,9 @@ from steadyslip.compiled.reduction import Reduction, reduce_model
 from steadyslip.model import Model
 
 STATUSES = ("running", "done", "contact lost", "blow-up", "too many steps", "stuck", "no velocity")
-LOG_KINDS = ("", "slip begins", "slip ends", "velocity peak", "arrest", "restart", "contact lost", "blow-up")
+LOG_KINDS = (
+    "", "slip begins", "slip ends", "velocity peak", "arrest", "restart", "contact lost", "blow-up", "velocity trough",
+)  # fmt: skip
 TALLY = (
     "events",
     "peak_velocity",

@@ -13,6 +13,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
+from steadyslip.errors import NotAvailable
 from steadyslip.expressions import array_function
 
 Lines = list[str]
@@ -22,17 +23,16 @@ PRIMITIVES = (
 )  # fmt: skip
 
 
-class UnknownFunction(ValueError):
-    """A law uses a function for which kernels have no primitive."""
-
-
 class _Printer(PythonCodePrinter):  # type: ignore[misc]  # SymPy's printers are untyped
     """Kernel text: our own primitives, products for small powers, selections for branches."""
 
     def _print_Function(self, expr: sp.Expr) -> str:  # noqa: N802
         name = type(expr).__name__
         if name not in PRIMITIVES:
-            raise UnknownFunction(name)
+            raise NotAvailable(
+                f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
+                f"{', '.join(PRIMITIVES)}, tan, abs, powers and Piecewise"
+            )
         return f"{name}({', '.join(self._print(argument) for argument in expr.args)})"
 
     _print_exp = _print_log = _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_Function
@@ -93,8 +93,10 @@ class Constants:
         return known
 
     def _lift(self, expression: sp.Expr) -> sp.Expr:
-        if expression.is_Number or expression.is_NumberSymbol or expression in self.variables:
+        if expression in self.variables or isinstance(expression, (sp.Number, sp.NumberSymbol)):
             return expression
+        if not isinstance(expression, sp.Expr):  # conditions of a Piecewise
+            return expression.func(*(self.lifted(a) for a in expression.args)) if expression.args else expression
         if not expression.free_symbols & self.variables:
             return self._constant(expression)
         if expression.is_Mul or expression.is_Add:

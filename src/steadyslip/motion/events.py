@@ -17,7 +17,8 @@ class Event:
     ----------
     kind : str
         ``slip begins`` (the block becomes faster than the load point, and than the limit of arrest),
-        ``slip ends``, ``velocity peak``, ``arrest``, ``restart``, ``contact lost`` or ``blow-up``.
+        ``slip ends``, ``velocity peak``, ``velocity trough``, ``arrest``, ``restart``, ``contact lost`` or
+        ``blow-up``.
     time : float
         s, located on the dense output.
     velocity : float

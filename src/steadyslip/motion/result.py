@@ -84,9 +84,10 @@ class History(Mapping[str, np.ndarray]):
         v = self.data["v"]
         lines = [f"{self.message}"]
         if len(v):
+            reached = [*v, *(event.velocity for event in self.events)]  # extremes lie between samples
             lines.append(
-                f"velocity        {shown(float(v.min()), 'm/s')} to {shown(float(v.max()), 'm/s')}, "
-                f"at the end {shown(float(v[-1]), 'm/s')}"
+                f"velocity        {shown(min(reached), 'm/s')} to {shown(max(reached), 'm/s')}, "
+                f"at the end {shown(v[-1], 'm/s')}"
             )
             stress = self.data["normal_stress"]
             lines.append(f"normal stress   {shown(float(stress.min()), 'Pa')} to {shown(float(stress.max()), 'Pa')}")

@@ -487,7 +487,7 @@ def test_coulomb_friction_sticks_and_breaks_loose_at_the_static_limit():
     assert np.all(run["v"][stuck] > -1e-8)
 
 
-class Softening(ss.FrictionLaw, name="test-softening"):
+class Softening(ss.FrictionLaw):
     """A law of one's own: strength falls with a saturating memory, and a kink."""
 
     mu: float = ss.parameter("1", positive, "level")

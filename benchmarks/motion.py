@@ -31,7 +31,7 @@ from problems import Problem, problems
 import steadyslip as ss
 from steadyslip.compiled.build import compiled
 from steadyslip.compiled.source import indented
-from steadyslip.motion.engine import LANES, _Call
+from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.setup import Options, prepare
 
 TARGET = 1e-6
@@ -44,7 +44,7 @@ def ours_single(problem: Problem, tolerance: float, variants: np.ndarray) -> tup
     jobs = prepare(problem.rig(), None, problem.until, {}, problem.start, Options(rtol=tolerance))
     machine = jobs.program(lanes=1, dense=False)
     _ = machine.module
-    call = _Call(machine, jobs.tables(machine, 0, 1, False, False), 1, np.empty(0))
+    call = Call(machine, jobs.tables(machine, 0, 1, False, False), 1, np.empty(0))
     begin = time.perf_counter()
     call.go(10**12)
     seconds = time.perf_counter() - begin
@@ -150,7 +150,7 @@ def bare_rate(problem: Problem) -> tuple[float, float]:
     jobs = prepare(problem.rig(), None, problem.until, problem.vary(2048), problem.start, Options(rtol=1e-6))
     quickest, total = np.inf, 1.0
     for _ in range(5):
-        call = _Call(machine, jobs.tables(machine, 0, 2048, False, False), 2048, np.empty(0))
+        call = Call(machine, jobs.tables(machine, 0, 2048, False, False), 2048, np.empty(0))
         begin = time.perf_counter()
         call.go(10**12)
         quickest = min(quickest, time.perf_counter() - begin)
@@ -187,6 +187,8 @@ def draw(everything: dict[str, dict[str, Curve]]) -> None:
         ax.set_xlabel("end error (1)")
         ax.set_ylabel("time per trajectory (s)")
         ax.legend(fontsize="x-small")
+    for ax in axes.flat[len(everything) :]:
+        ax.remove()
     axes[0, 0].figure.savefig("motion.png", dpi=120)
 
 

@@ -141,6 +141,7 @@ GROUPS = {
     "linear": "Linear stability",
     "model": "The Model",
     "motion": "Motion",
+    "nonlinear": "Beyond the edge",
     "protocol": "Protocols of experiments",
     "records": "To declare a law of your own",
     "slider": "The rig",
@@ -151,7 +152,16 @@ ORDER = (
     *("analysis", "steady", "linear", "model", "records"),
 )
 MODULES = {
-    "figures": ("critical_stiffness_against_mass", "root_locus", "stability_chart"),
+    "figures": (
+        "basin",
+        "critical_stiffness_against_mass",
+        "cycle_branch",
+        "history",
+        "hopf_curve",
+        "phase_plane",
+        "root_locus",
+        "stability_chart",
+    ),
     "testing": ("check_friction_law", "check_contact_law"),
 }
 

@@ -91,6 +91,25 @@ from .motion import (
     simulate as simulate,
     simulate_many as simulate_many,
 )
+from .nonlinear import (
+    Basin as Basin,
+    Cycle as Cycle,
+    CycleBranch as CycleBranch,
+    HopfCurve as HopfCurve,
+    KickMargin as KickMargin,
+    Onset as Onset,
+    SpecialCycle as SpecialCycle,
+    SpecialPoint as SpecialPoint,
+    Threshold as Threshold,
+    basin as basin,
+    cycles as cycles,
+    hopf as hopf,
+    hopf_curve as hopf_curve,
+    margin_to_kick as margin_to_kick,
+    orbit as orbit,
+    threshold as threshold,
+    threshold_map as threshold_map,
+)
 from .protocol import (
     DisplacementStep as DisplacementStep,
     DisturbanceHarmonic as DisturbanceHarmonic,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -42,13 +43,19 @@ def analyze(
     ] = False,
     formula: Annotated[bool, typer.Option("--formula", help="also print the critical stiffness as a formula")] = False,
     branch: Annotated[int, typer.Option(help="which steady sliding, where there are several")] = 0,
+    kick: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--kick", help="also find the smallest kick not survived: velocity, displacement, ...; repeatable"
+        ),
+    ] = None,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.analysis import analyze as run
     from steadyslip.config import read_rig
     from steadyslip.errors import NotAvailable
 
-    result = run(read_rig(rig, changes or ()), branch=branch)
+    result = run(read_rig(rig, changes or ()), branch=branch, kick=kick or ())
     if as_json:
         data = result.to_dict()
         if formula:
@@ -112,6 +119,68 @@ def simulate(
         return
     typer.echo(history.summary())
     for path in output or ():
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
+def cycles(
+    rig: RigFile,
+    changes: Changes = None,
+    along: Annotated[str, typer.Option(help="the parameter that is varied")] = "stiffness",
+    between: Annotated[
+        tuple[str, str] | None, typer.Option(metavar="LOW HIGH", help="range of it, such as '1 GPa/m' '50 GPa/m'")
+    ] = None,
+    doublings: Annotated[int, typer.Option(min=0, help="how many period doublings to follow")] = 1,
+    output: Annotated[
+        list[Path] | None, typer.Option("-o", "--output", help="write .nc, .csv, .png, .svg or .pdf; repeatable")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+) -> None:
+    """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
+    from steadyslip.nonlinear.commands import cycles_of_file, write_branch
+
+    branch = cycles_of_file(rig, changes or (), along, between, doublings)
+    _given(branch, output or (), as_json, write_branch)
+
+
+@app.command()
+def threshold(
+    rig: RigFile,
+    changes: Changes = None,
+    kick: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--kick", help="velocity, displacement, normal-stress or impulse; repeatable; the first two unless given"
+        ),
+    ] = None,
+    reverse: Annotated[bool, typer.Option("--reverse", help="slower, backward, pressed less")] = False,
+    reference: Annotated[
+        str, typer.Option(help="whether the rig's drive is the velocity 'before' or 'after' a velocity step")
+    ] = "before",
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("-o", "--output", help="draw the basin in the phase plane: .png, .svg or .pdf; repeatable"),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON list in SI units")] = False,
+) -> None:
+    """How large a kick does steady sliding survive?"""
+    from steadyslip.nonlinear.commands import thresholds_of_file, write_basin
+
+    found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
+    _given(found, output or (), as_json, write_basin)
+
+
+def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], None]) -> None:
+    """Write the files asked for, then print JSON or words."""
+    for path in output:
+        write(result, path)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+        return
+    typer.echo(str(result))
+    for path in output:
         typer.echo(f"wrote {path}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +16,15 @@ from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
+from steadyslip.nonlinear.onset import Onset, onset_at
 from steadyslip.slider import Slider
 from steadyslip.steady import SteadySliding, steady_states
 from steadyslip.values import Values, axial_projection, model_values
 
 if TYPE_CHECKING:
     import sympy as sp
+
+    from steadyslip.nonlinear.threshold import Threshold
 
 _ON_THE_EDGE = 1e-9  # growth per radian below which a verdict is within rounding of the boundary
 
@@ -61,6 +65,10 @@ class Analysis:
         Of that oscillation; negative if it grows.
     time_to_halve, time_to_double : float or None
         Of the slowest decay, or of the fastest growth (s).
+    onset : Onset or None
+        Kind of onset at the oscillatory edge in stiffness nearest to the rig, None where there is none.
+    kicks : tuple of Threshold
+        Smallest kicks that are not survived, where asked for.
     margins : tuple of Margin
         Distance of each parameter to its nearest edge, the most critical first.
     warnings : tuple of str
@@ -85,6 +93,8 @@ class Analysis:
     damping_ratio: float | None = None
     time_to_halve: float | None = None
     time_to_double: float | None = None
+    onset: Onset | None = None
+    kicks: tuple[Threshold, ...] = ()
     version: str = field(default="", repr=False)
 
     @property
@@ -126,7 +136,7 @@ class Analysis:
         return f"```\n{self}\n```"
 
 
-def analyze(rig: Slider, *, branch: int = 0) -> Analysis:
+def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:
     """Verdict on a rig.
 
     Parameters
@@ -134,6 +144,8 @@ def analyze(rig: Slider, *, branch: int = 0) -> Analysis:
     rig : Slider
     branch : int
         Which steady sliding to judge where there are several, by rising normal stress.
+    kick : str or sequence of str
+        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived.
 
     Returns
     -------
@@ -162,11 +174,14 @@ def analyze(rig: Slider, *, branch: int = 0) -> Analysis:
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
         values = model_values(rig, None, present_zeros(rig), branch)
         numbers = _linear_numbers(rig, values)
+        distances = margins(rig, branch=branch)
         found = Analysis(
             rig=rig,
             steady=states[branch],
             reason="",
-            margins=margins(rig, branch=branch),
+            margins=distances,
+            onset=_onset(rig, distances, branch),
+            kicks=_kicks(rig, (kick,) if isinstance(kick, str) else tuple(kick), branch),
             warnings=_warnings(rig, values, states, numbers),
             version=__version__,
             **numbers,
@@ -174,6 +189,25 @@ def analyze(rig: Slider, *, branch: int = 0) -> Analysis:
     from steadyslip.analysis.verdict import reason
 
     return replace(found, reason=reason(found))
+
+
+def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | None:
+    """Kind of onset at the oscillatory edge in stiffness nearest to the rig's own."""
+    names = ("slider.stiffness", "slider.axial_stiffness")
+    for margin in distances:
+        if margin.parameter in names:
+            edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]
+            if edges:
+                return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)
+    return None
+
+
+def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold, ...]:
+    if not kinds:
+        return ()
+    from steadyslip.nonlinear.threshold import threshold  # compiles; only where asked for
+
+    return tuple(threshold(rig, kind, branch=branch) for kind in kinds)
 
 
 def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:

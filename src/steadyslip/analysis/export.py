@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from steadyslip.analysis.analyze import Analysis
     from steadyslip.linear.boundary import Margin
+    from steadyslip.nonlinear.onset import Onset
 
 
 def as_dict(analysis: Analysis) -> dict[str, Any]:
@@ -40,12 +41,27 @@ def as_dict(analysis: Analysis) -> dict[str, Any]:
         "damping_ratio": analysis.damping_ratio,
         "time_to_halve": analysis.time_to_halve,
         "time_to_double": analysis.time_to_double,
+        "onset": None if analysis.onset is None else _onset(analysis.onset),
+        "kicks": [kick.to_dict() for kick in analysis.kicks],
         "boundaries": [row for margin in analysis.margins for row in _edges(margin)],
         "warnings": list(analysis.warnings),
     }
     if analysis.rig.area is not None:
         data["forces"] = _forces(analysis, analysis.rig.area)
     return data
+
+
+def _onset(onset: Onset) -> dict[str, Any]:
+    return {
+        "kind": onset.kind,
+        "parameter": onset.along,
+        "value": onset.value,
+        "coefficient": onset.coefficient,
+        "normalised_coefficient": onset.normalised,
+        "growth_slope": onset.growth_slope,
+        "angular_frequency": onset.angular_frequency,
+        "meaning": onset.meaning,
+    }
 
 
 def _edges(margin: Margin) -> list[dict[str, Any]]:

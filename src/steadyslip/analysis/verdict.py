@@ -16,6 +16,13 @@ from steadyslip.records import resolve
 if TYPE_CHECKING:
     from steadyslip.analysis.analyze import Analysis
     from steadyslip.linear.boundary import Margin
+    from steadyslip.nonlinear.threshold import Threshold
+
+_ONSETS = {
+    "supercritical": "beyond the edge in stiffness, oscillation begins small and grows with distance",
+    "subcritical": "on the stable side of the edge in stiffness, small kicks already start oscillation",
+    "degenerate": "at the edge in stiffness, oscillations of many sizes neither grow nor decay",
+}
 
 _BEYOND = {
     "oscillatory": "stick-slip oscillation sets in",
@@ -34,6 +41,8 @@ def verdict(analysis: Analysis) -> str:
     lines += _margin_table(analysis)
     if analysis.stable:
         lines += ["", "Stable means: small disturbances die out. A large enough kick may still start stick-slip."]
+        if analysis.onset is not None and not analysis.kicks:
+            lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
     for text in analysis.warnings:
         lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
@@ -158,7 +167,24 @@ def _facts(analysis: Analysis) -> list[str]:
         rows.append(("at the edge", f"oscillation with period {shown(2 * math.pi / beta, 's')}"))
     if analysis.critical_axial_stiffness is not None:
         rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
-    return [f"{name:<15} {text}" for name, text in rows]
+    if analysis.onset is not None:
+        rows.append(("onset", f"{analysis.onset.kind}: {_ONSETS[analysis.onset.kind]}"))
+    rows += [("a kick", _survived(kick)) for kick in analysis.kicks]
+    lines: list[str] = []
+    for name, text in rows:
+        lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
+    return lines
+
+
+def _survived(kick: Threshold) -> str:
+    """A threshold in a few words."""
+    if kick.size == 0:
+        return "none is survived: steady sliding is unstable"
+    if math.isinf(kick.size):
+        return f"every {kick.kick} step in the range searched is survived"
+    what = {"velocity": "a velocity step to", "displacement": "a displacement step of",
+            "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
+    return f"survives {what} {shown(kick.amount, kick.unit)}; more leads to {kick.outcome}"
 
 
 def _disturbance(analysis: Analysis) -> str:

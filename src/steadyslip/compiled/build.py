@@ -32,7 +32,9 @@ ENTRIES = {
     "float64[:,:,::1], float64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1], "
     "float64[:,::1], int64)",
     "observe": "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
+    "field": "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
 }
+"""Functions that are called from outside; not every kernel has all of them."""
 _MAGIC = b"steadyslip kernel 1\n"
 _lock = threading.RLock()
 _loaded: dict[str, ModuleType] = {}
@@ -115,7 +117,9 @@ def _module(source: str, key: str) -> ModuleType:
     folder = cache_folder()
     with _without_collection():
         for name, signature in ENTRIES.items():
-            function = getattr(module, name)
+            function = getattr(module, name, None)
+            if function is None:
+                continue
             function._cache = _FileCache(None if folder is None else folder / f"{key}-{name}")
             function.compile(signature)
             function.disable_compile()

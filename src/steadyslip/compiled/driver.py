@@ -9,11 +9,11 @@ variables, settings and segments; results are written to the job's own row, what
 """
 
 RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
+SETTLED, PERIODIC = 7, 8
 NEXT_JOB, LAST_JOB, BUSY, PAUSED, LOGGED, RECORDED, FIRST_JOB = 0, 1, 2, 3, 4, 5, 6
 # columns of `settings`
-S_RTOL, S_MOST, S_V_HIGH, S_V_LOW, S_SIGMA_LOW, S_WATCH, S_RECORD, S_GUESS, S_Z_SCALE, S_H, S_ATOL = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
-)  # fmt: skip
+S_RTOL, S_MOST, S_V_HIGH, S_V_LOW, S_SIGMA_LOW, S_WATCH, S_RECORD = 0, 1, 2, 3, 4, 5, 6
+S_GUESS, S_Z_SCALE, S_H, S_SETTLED, S_SAME, S_ATOL = 7, 8, 9, 10, 11, 12
 # kinds in the log
 EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN, TROUGH = 1, 2, 3, 4, 5, 6, 7, 8
 # columns of `tally`: what is known about a trajectory's slip events
@@ -21,7 +21,7 @@ EVENTS, V_MAX, V_MIN, LAST_BEGIN, LAST_DURATION, LAST_SLIP, LAST_DROP, LAST_PEAK
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
 )  # fmt: skip
 PEAK_TIME, PEAK_PERIOD, ANY_BEGIN = 11, 12, 13
-NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN = 14, 15, 16, 17, 18, 19
+NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, DECIDED = 14, 15, 16, 17, 18, 19, 20, 21
 LOG_COLUMNS = 8
 
 
@@ -150,6 +150,8 @@ def start_job(R, j, cursor, log, arrays, y, out):
     R[ROW_RECORD] = own[S_RECORD]
     R[ROW_Z] = own[S_GUESS]
     R[ROW_Z_SCALE] = own[S_Z_SCALE]
+    R[ROW_SETTLED] = own[S_SETTLED]
+    R[ROW_SAME] = own[S_SAME]
     R[ROW_H] = own[S_H]
     for i in range(N):
         R[ROW_ATOL + i] = own[S_ATOL + i]
@@ -311,12 +313,25 @@ def note(R, kind, tau, y, out, log, cursor):
     elif kind == PEAK:
         if R[ROW_TALLY + PEAKS] > 0.0:
             R[ROW_TALLY + PEAK_PERIOD] = time - R[ROW_TALLY + PEAK_TIME]
+            decide(R, out)
+        R[ROW_TALLY + PEAK_SIZE] = math.log(abs(out[0] / out[5])) if out[5] != 0.0 else math.inf
         R[ROW_TALLY + PEAKS] += 1.0
         R[ROW_TALLY + PEAK_TIME] = time
         R[ROW_TALLY + V_MAX] = max(R[ROW_TALLY + V_MAX], out[0])
         R[ROW_TALLY + NOW_PEAK] = max(R[ROW_TALLY + NOW_PEAK], out[0])
     elif kind == TROUGH:
         R[ROW_TALLY + V_MIN] = min(R[ROW_TALLY + V_MIN], out[0])
+
+
+@njit(**PLAIN)
+def decide(R, out):
+    """Where asked for, end a run whose last two peaks are both small, or both the same."""
+    before = R[ROW_TALLY + PEAK_SIZE]
+    now = math.log(abs(out[0] / out[5])) if out[5] != 0.0 else math.inf
+    if abs(before) < R[ROW_SETTLED] and abs(now) < R[ROW_SETTLED]:
+        R[ROW_TALLY + DECIDED] = SETTLED
+    elif abs(now - before) < R[ROW_SAME] * (1.0 + abs(now)):
+        R[ROW_TALLY + DECIDED] = PERIODIC
 
 
 @njit(**PLAIN)
@@ -382,6 +397,8 @@ def go_on(R, j, cursor, arrays, results, y, out, order):
             return CONTACT_LOST
         if R[ROW_RECORD] > 0.0:
             record(R, cursor, recorded)
+        if R[ROW_TALLY + DECIDED] > 0.0:
+            return int(R[ROW_TALLY + DECIDED])
     if abs(R[ROW_OUT]) >= R[ROW_V_HIGH]:
         return BLOW_UP
     if R[ROW_OUT + 2] <= R[ROW_SIGMA_LOW]:
@@ -493,6 +510,27 @@ def advance(S, ids, cursor, constants, initial, settings, segments, times, statu
     return 0
 
 
+@njit(**PLAIN)
+def placed(R, constants, settings, state, inputs, own, y):
+    """Bring a given state into a record, balance solved where there is one left to solve."""
+    for i in range(NC):
+        R[ROW_CONSTANT + i] = constants[own if constants.shape[0] > 1 else 0, i]
+    settings_row = settings[own if settings.shape[0] > 1 else 0]
+    R[ROW_Z_SCALE] = settings_row[S_Z_SCALE]
+    R[ROW_START] = inputs[6]
+    for i in range(3):
+        R[ROW_INPUT + i] = inputs[i]
+        R[ROW_SLOPE + i] = inputs[3 + i]
+    R[ROW_TAU] = 0.0
+    for i in range(N):
+        R[ROW_Y + i] = state[i]
+        y[i] = state[i]
+    if IMPLICIT:
+        for i in range(NK):
+            R[ROW_CONTINUOUS + i] = y[i]
+        R[ROW_Z] = solve_balance(R, R[ROW_Z])
+
+
 @njit(**ENTRY)
 def observe(constants, settings, states, inputs, own, values):
     """Outputs and continuous variables at given states.
@@ -503,26 +541,10 @@ def observe(constants, settings, states, inputs, own, values):
     R, y, out = np.zeros(ROWS), np.empty(N), np.empty(6)
     rig = -1
     for m in range(states.shape[0]):
-        j = own[m]
-        if j != rig:
-            rig = j
-            for i in range(NC):
-                R[ROW_CONSTANT + i] = constants[j if constants.shape[0] > 1 else 0, i]
-            settings_row = settings[j if settings.shape[0] > 1 else 0]
-            R[ROW_Z] = settings_row[S_GUESS]
-            R[ROW_Z_SCALE] = settings_row[S_Z_SCALE]
-        R[ROW_START] = inputs[m, 6]
-        for i in range(3):
-            R[ROW_INPUT + i] = inputs[m, i]
-            R[ROW_SLOPE + i] = inputs[m, 3 + i]
-        R[ROW_TAU] = 0.0
-        for i in range(N):
-            R[ROW_Y + i] = states[m, i]
-            y[i] = states[m, i]
-        if IMPLICIT:
-            for i in range(NK):
-                R[ROW_CONTINUOUS + i] = y[i]
-            R[ROW_Z] = solve_balance(R, R[ROW_Z])
+        if own[m] != rig:
+            rig = own[m]
+            R[ROW_Z] = settings[rig if settings.shape[0] > 1 else 0, S_GUESS]
+        placed(R, constants, settings, states[m], inputs[m], rig, y)
         outputs_at(R, 0.0, y, out)
         restore_at(R)
         for i in range(5):

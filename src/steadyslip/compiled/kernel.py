@@ -16,7 +16,7 @@ from importlib.resources import files
 import sympy as sp
 
 from steadyslip.compiled.methods import METHODS, Method
-from steadyslip.compiled.reduction import INPUTS, SLOPES, TIME, Reduction
+from steadyslip.compiled.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
 from steadyslip.compiled.source import Constants, Lines, indented, statements, weighted
 
 LEVELS = ("constant", "linear", "harmonic")
@@ -47,6 +47,8 @@ class Choice:
         Trajectories side by side.
     dense : bool
         Whether stages are kept for dense output (events, samples).
+    field : bool
+        Whether the kernel can also be asked for rates at given states.
     """
 
     method: str
@@ -54,6 +56,7 @@ class Choice:
     harmonics: int = 0
     lanes: int = 1
     dense: bool = True
+    field: bool = False
 
 
 class KernelText:
@@ -70,6 +73,7 @@ class KernelText:
             variables.add(reduction.unknown)
         self.constants = Constants(variables)
         self.rates = [self._fixed(rate) for rate in reduction.rates]
+        self.driven = self._answers_to_constants()
         self.timed = choice.level != "constant" or any(rate.has(TIME) for rate in self.rates)
         self._blocks()
         self._rows()
@@ -79,6 +83,39 @@ class KernelText:
         if self.choice.level == "constant":
             expression = expression.xreplace(dict.fromkeys(SLOPES[:3], sp.Integer(0)))
         return self.constants.lifted(expression)
+
+    def _answers_to_constants(self) -> dict[int, sp.Expr]:
+        """By position in the state: what a change of the constants adds to the rates of `Reduction.direction`."""
+        reduction = self.reduction
+        if not reduction.direction:
+            return {}
+        residual = None if reduction.residual is None else self._fixed(reduction.residual)
+        known = [*self.constants.symbols.values(), V_LP]  # the steady drive is a constant too
+
+        def change(expression: sp.Expr) -> sp.Expr:
+            return sp.Add(*(sp.diff(expression, c) * self.constants.rate_of(c) for c in known if expression.has(c)))
+
+        found = {}
+        for i, symbol in enumerate(reduction.direction):
+            added = change(self.rates[i])
+            if residual is not None and reduction.unknown is not None:
+                slope = sp.diff(residual, reduction.unknown)
+                added -= sp.diff(self.rates[i], reduction.unknown) * change(residual) / slope
+            found[reduction.state.index(symbol)] = added
+        self.rates = [rate + found.get(k, 0) for k, rate in enumerate(self.rates)]
+        return found
+
+    def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
+        """An entry of the Jacobian, with what changing constants add."""
+        entry = self._fixed(matrix[i][k])
+        if i not in self.driven:
+            return entry
+        variable, unknown = self.reduction.state[k], self.reduction.unknown
+        entry += sp.diff(self.driven[i], variable)
+        if self.reduction.residual is not None and unknown is not None:
+            residual = self._fixed(self.reduction.residual)
+            entry -= sp.diff(self.driven[i], unknown) * sp.diff(residual, variable) / sp.diff(residual, unknown)
+        return entry
 
     # -- the equations as lines
 
@@ -95,9 +132,12 @@ class KernelText:
             [(f"k{i}", self._fixed(e)) for i, e in enumerate(reduction.restored)], self.names
         )
         self.jacobian_lines: Lines = []
+        self.pattern: Pattern = set()
         if self.method.implicit:
             matrix = reduction.jacobian()
-            entries = [(f"j{i}_{k}", self._fixed(matrix[i][k])) for i in range(n) for k in range(n)]
+            found = {(i, k): self._entry(matrix, i, k) for i in range(n) for k in range(n)}
+            self.pattern = {place for place, entry in found.items() if entry != 0}
+            entries = [(f"j{i}_{k}", found[i, k]) for i, k in sorted(self.pattern)]
             if self.timed:
                 entries += [(f"ft{i}", self._fixed(e)) for i, e in enumerate(reduction.time_derivative())]
             self.jacobian_lines = statements(entries, self.names)
@@ -138,7 +178,7 @@ class KernelText:
             "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
             "FAILURES": 1, "ERROR": 1,
             "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
-            "SLIPPING": 1, "RESTING": 1, "TALLY": 24, "CONSTANT": len(self.constants.symbols),
+            "SETTLED": 1, "SAME": 1, "SLIPPING": 1, "RESTING": 1, "TALLY": 24, "CONSTANT": len(self.constants.all),
         }  # fmt: skip
         if choice.dense:
             groups |= {"OLD": n, "STAGE": n * self.method.stages, "DONE": 1, "TAU_OLD": 1, "OUT_OLD": 3}
@@ -165,7 +205,7 @@ class KernelText:
 
     def _constant_rows(self) -> list[tuple[str, str, int]]:
         """What every evaluation reads: variable, row, offset."""
-        rows = [(str(s), "CONSTANT", i) for i, s in enumerate(self.constants.symbols.values())]
+        rows = [(str(s), "CONSTANT", i) for i, s in enumerate(self.constants.all)]
         rows += [(f"start_{c}", "INPUT", i) for i, c in enumerate(CHANNELS)]
         if self.choice.level != "constant":
             rows += [(f"rise_{c}", "SLOPE", i) for i, c in enumerate(CHANNELS)]
@@ -264,7 +304,8 @@ class KernelText:
             lines += self._inputs_at("tau")
         lines += self.jacobian_lines
         lines += ["inverse = 1.0/h", f"diagonal = inverse*{1 / method.gamma!r}"]
-        lines += _factorised(n)
+        factors, filled = _factorised(n, self.pattern)
+        lines += factors
         arguments = method.arguments()
         for s in range(method.stages):
             if s:
@@ -283,7 +324,7 @@ class KernelText:
                 if self.timed and abs(method.time_weights[s]) > 1e-12:
                     right += f" + h*{method.time_weights[s]!r}*ft{i}"
                 lines.append(f"r{i} = {right}")
-            lines += _substituted(n, s)
+            lines += _substituted(n, s, filled)
         lines += [f"y{i} = y{i} + u{method.stages - 1}_{i}" for i in range(n)]
         lines += [f"e{i} = u{method.stages - 1}_{i}" for i in range(n)]
         if self.timed:
@@ -408,12 +449,13 @@ class KernelText:
         for name in ("OLD", "STAGE", "DONE", "TAU_OLD", "OUT_OLD"):
             header.setdefault(f"ROW_{name}", 0)  # named by the driver, not used without dense output
         header |= {"W": self.choice.lanes, "N": self.size, "ROWS": self.row_count, "DENSE": self.choice.dense}
-        header |= {"NC": len(self.constants.symbols), "NK": len(self.reduction.continuous)}
+        header |= {"NC": len(self.constants.all), "NK": len(self.reduction.continuous)}
         header |= {"HARMONICS": self.choice.harmonics, "MASSLESS": self.reduction.restart is not None}
         header["STATE_W"] = self.reduction.names.index("w") if "w" in self.reduction.names else -1
         header["IMPLICIT"] = header["MASSLESS"] and self.reduction.unknown is not None
         constants = "".join(f"{name} = {value!r}\n" for name, value in header.items())
-        driver = files("steadyslip.compiled").joinpath("driver.py").read_text(encoding="utf-8")
+        parts = ["driver.py", "field.py"] if self.choice.field else ["driver.py"]
+        driver = "\n\n".join(files("steadyslip.compiled").joinpath(p).read_text(encoding="utf-8") for p in parts)
         step, count = self.step(), "W"
         if self.choice.lanes > 1 and not any(line.startswith("for ") for line in step):
             step, count = _abreast(step, self.choice.lanes // ABREAST, ABREAST), f"W // {ABREAST}"
@@ -440,23 +482,39 @@ def _abreast(lines: Lines, apart: int, count: int) -> Lines:
     return [names.sub(rf"\1{'_' * c}", moved(line, c * apart)) for line in lines for c in range(count)]
 
 
-def _factorised(n: int) -> Lines:
-    """LU factors of W = 1/(hγ) − J without pivoting: the diagonal dominates once h is accepted."""
-    lines = [f"w{i}_{k} = {'diagonal' if i == k else '0.0'} - j{i}_{k}" for i in range(n) for k in range(n)]
+Pattern = set[tuple[int, int]]
+
+
+def _factorised(n: int, pattern: Pattern) -> tuple[Lines, Pattern]:
+    """LU factors of W = 1/(hγ) − J without pivoting (the diagonal dominates once h is accepted), and where they are.
+
+    Entries that are zero whatever the numbers are left out: those of J outside `pattern`, and what follows from them.
+    """
+    filled = pattern | {(i, i) for i in range(n)}
+    lines = []
+    for i, k in sorted(filled):
+        parts = (["diagonal"] if i == k else []) + ([f"j{i}_{k}"] if (i, k) in pattern else [])
+        lines.append(f"w{i}_{k} = {' - '.join(parts) if i == k else '-' + parts[0]}")
     for k in range(n):
         lines.append(f"p{k} = 1.0/w{k}_{k}")
         for i in range(k + 1, n):
+            if (i, k) not in filled:
+                continue
             lines.append(f"w{i}_{k} = w{i}_{k}*p{k}")
-            lines += [f"w{i}_{c} = w{i}_{c} - w{i}_{k}*w{k}_{c}" for c in range(k + 1, n)]
-    return lines
+            for c in range(k + 1, n):
+                if (k, c) in filled:
+                    before = f"w{i}_{c}" if (i, c) in filled else ""
+                    lines.append(f"w{i}_{c} = {before} - w{i}_{k}*w{k}_{c}")
+                    filled.add((i, c))
+    return lines, filled
 
 
-def _substituted(n: int, s: int) -> Lines:
+def _substituted(n: int, s: int, filled: Pattern) -> Lines:
     """Solve for stage s from r."""
     lines = []
     for i in range(1, n):
-        lines += [f"r{i} = r{i} - w{i}_{k}*r{k}" for k in range(i)]
+        lines += [f"r{i} = r{i} - w{i}_{k}*r{k}" for k in range(i) if (i, k) in filled]
     for i in reversed(range(n)):
-        known = "".join(f" - w{i}_{k}*u{s}_{k}" for k in range(i + 1, n))
+        known = "".join(f" - w{i}_{k}*u{s}_{k}" for k in range(i + 1, n) if (i, k) in filled)
         lines.append(f"u{s}_{i} = (r{i}{known})*p{i}")
     return lines

@@ -15,7 +15,9 @@ from steadyslip.compiled.kernel import Choice, KernelText
 from steadyslip.compiled.reduction import Reduction, reduce_model
 from steadyslip.model import Model
 
-STATUSES = ("running", "done", "contact lost", "blow-up", "too many steps", "stuck", "no velocity")
+STATUSES = (
+    "running", "done", "contact lost", "blow-up", "too many steps", "stuck", "no velocity", "settled", "periodic",
+)  # fmt: skip
 LOG_KINDS = (
     "", "slip begins", "slip ends", "velocity peak", "arrest", "restart", "contact lost", "blow-up", "velocity trough",
 )  # fmt: skip
@@ -34,7 +36,8 @@ TALLY = (
     "last_peak_time",
     "peak_period",
 )
-SETTINGS = ("rtol", "most_steps", "v_high", "v_low", "sigma_low", "watch", "record", "guess", "z_scale", "first_step")
+SETTINGS = ("rtol", "most_steps", "v_high", "v_low", "sigma_low", "watch", "record", "guess", "z_scale", "first_step",
+            "settled", "same")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,6 +60,9 @@ class Reduction:
         v, acceleration, sigma, tau, T and the memory variables.
     w_of_v : sympy.Expr
         The velocity variable from v and the memory.
+    direction : tuple of sympy.Symbol
+        State variables (see `steadyslip.compiled.variational`) that answer to a change of the constants; the
+        kernel adds that to their `rates`, in the order of the first variables of `state`.
     """
 
     model: Model
@@ -75,6 +78,7 @@ class Reduction:
     restored: tuple[sp.Expr, ...]
     outputs: dict[str, sp.Expr]
     w_of_v: sp.Expr
+    direction: tuple[sp.Symbol, ...] = ()
 
     @property
     def inputs(self) -> tuple[sp.Symbol, ...]:

@@ -57,6 +57,9 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]  # SymPy's printers are
     _print_Pi = _print_NumberSymbol  # noqa: N815
     _print_Exp1 = _print_NumberSymbol  # noqa: N815
 
+    def _print_DiracDelta(self, expr: sp.Expr) -> str:  # noqa: N802
+        return "0.0"  # the derivative of sign, but for one point
+
     def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
         base, exponent = expr.args
         text = f"({self._print(base)})"
@@ -83,6 +86,7 @@ class Constants:
     def __init__(self, variables: Iterable[sp.Symbol]) -> None:
         self.variables = frozenset(variables)
         self.symbols: dict[sp.Expr, sp.Symbol] = {}
+        self.rates: dict[sp.Symbol, sp.Symbol] = {}
         self._seen: dict[sp.Expr, sp.Expr] = {}
 
     def lifted(self, expression: sp.Expr) -> sp.Expr:
@@ -115,8 +119,17 @@ class Constants:
             self.symbols[expression] = sp.Symbol(f"c{len(self.symbols)}", real=True)
         return self.symbols[expression]
 
+    @property
+    def all(self) -> list[sp.Symbol]:
+        """Every constant, then the rates of change of some."""
+        return [*self.symbols.values(), *self.rates.values()]
+
+    def rate_of(self, constant: sp.Symbol) -> sp.Symbol:
+        """A further constant: how fast `constant` changes with something that the caller varies."""
+        return self.rates.setdefault(constant, sp.Symbol(f"{constant}_rate", real=True))
+
     def function(self, arguments: Sequence[sp.Symbol]) -> Callable[..., list[Any]]:
-        """A NumPy function from parameter values to the constants."""
+        """A NumPy function from parameter values to the constants, not to their rates of change."""
         return array_function(arguments, list(self.symbols))
 
 

@@ -9,11 +9,15 @@ from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.motion import history, phase_plane
+from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve
 
 __all__ = [
     "ANGLES",
+    "basin",
     "critical_stiffness_against_mass",
+    "cycle_branch",
     "history",
+    "hopf_curve",
     "phase_plane",
     "root_locus",
     "stability_chart",

@@ -10,15 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.compiled.program import TALLY, Program
+from steadyslip.compiled.program import SETTINGS, STATUSES, TALLY, Program
 from steadyslip.motion.setup import Jobs
 
 LANES = 24  # three vectors of eight doubles, see compiled.kernel
 CHUNK = 2048  # jobs per call: keeps the arrays small and Ctrl-C prompt
 QUOTA = 20_000  # passes between looks at the clock and at Ctrl-C, some tens of milliseconds
-INTERRUPTED = 7
-NO_STEADY = 8
-ILL_POSED = 9
+INTERRUPTED, NO_STEADY, ILL_POSED = range(len(STATUSES), len(STATUSES) + 3)  # statuses that no kernel gives
 
 
 @dataclass
@@ -36,7 +34,7 @@ class Outcome:
     recorded: np.ndarray
 
 
-class _Call:
+class Call:
     """The arrays of one chain of calls to a kernel."""
 
     def __init__(self, machine: Program, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
@@ -72,11 +70,16 @@ class _Call:
 
 def run_single(jobs: Jobs, machine: Program, times: np.ndarray, watch: bool, record: bool) -> Outcome:
     """One trajectory, with its events and, if asked, its own steps. Ctrl-C ends it early, with what there is."""
-    tables = jobs.tables(machine, 0, 1, watch, record)
-    call = _Call(machine, tables, 1, times)
-    if watch:
+    return run_tables(machine, jobs.tables(machine, 0, 1, watch, record), times)
+
+
+def run_tables(machine: Program, tables: tuple[np.ndarray, ...], times: np.ndarray) -> Outcome:
+    """`run_single` from the kernel's own arrays; what to watch and record stands in the settings."""
+    settings = tables[2][0]
+    call = Call(machine, tables, 1, times)
+    if settings[SETTINGS.index("watch")]:
         call.log = np.zeros((64, 8))
-    if record:
+    if settings[SETTINGS.index("record")]:
         call.recorded = np.zeros((512, call.recorded.shape[1]))
     try:
         while (reason := call.go(QUOTA * 10)) != 0:
@@ -92,7 +95,7 @@ def run_chunk(
     jobs: Jobs, machine: Program, start: int, stop: int, times: np.ndarray, watch: bool, stopped: threading.Event
 ) -> Outcome:
     """Some jobs in lanes, until done or asked to stop."""
-    call = _Call(machine, jobs.tables(machine, start, stop, watch, False), stop - start, times)
+    call = Call(machine, jobs.tables(machine, start, stop, watch, False), stop - start, times)
     while call.go(QUOTA) != 0 and not stopped.is_set():
         pass
     return call.outcome()

@@ -153,11 +153,11 @@ def simulate_many(
         If anything given is wrong; everything is listed.
     """
     options = Options(method, rtol, most_steps, arrest)
-    flat, start, shape, dims, coords = _broadcast(rig, Protocol.of(protocol), vary, initial or {})
+    flat, start, shape, dims, coords = broadcast_arrays(rig, Protocol.of(protocol), vary, initial or {})
     size = int(np.prod(shape, dtype=int))
     store: _Store | None = None
-    groups = list(_regimes(rig, flat, size))
-    with _progress(size, progress) as advanced:
+    groups = list(regimes(rig, flat, size))
+    with progress_bar(size, progress) as advanced:
         for group_rig, chosen, index in groups:
             part = {name: _picked(a, index) for name, a in chosen.items()}
             begin = {name: _picked(a, index) for name, a in start.items()}
@@ -172,7 +172,7 @@ def simulate_many(
     return store.result(shape, dims, coords)
 
 
-def _broadcast(
+def broadcast_arrays(
     rig: Slider, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any], tuple[int, ...], tuple[str, ...], Any]:
     """Flat arrays of equal length by full name, the starting values apart, and the common shape."""
@@ -219,9 +219,7 @@ def _picked(array: Any, index: np.ndarray | None) -> Any:
     return array[index] if index is not None and np.ndim(array) else array
 
 
-def _regimes(
-    rig: Slider, flat: dict[str, Any], size: int
-) -> Iterator[tuple[Slider, dict[str, Any], np.ndarray | None]]:
+def regimes(rig: Slider, flat: dict[str, Any], size: int) -> Iterator[tuple[Slider, dict[str, Any], np.ndarray | None]]:
     """Split where a structural parameter (mass, B0, ...) is zero in some runs: those have other equations."""
     structural = [
         name
@@ -325,7 +323,7 @@ def _run(
 
 
 @contextmanager
-def _progress(size: int, wanted: bool | None) -> Iterator[Callable[[int], None] | None]:
+def progress_bar(size: int, wanted: bool | None) -> Iterator[Callable[[int], None] | None]:
     """A bar with rate and time left, on a terminal or where asked for."""
     if wanted is False or (wanted is None and not sys.stderr.isatty()):
         yield None

@@ -1,0 +1,169 @@
+"""Beyond the edge: branches of cycles, edges in two parameters, basins."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+
+from steadyslip.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    axes_or_new,
+    display_unit,
+    labelled,
+)
+
+if TYPE_CHECKING:
+    from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
+
+_MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN)}
+_COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY}
+_AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY}
+
+
+def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
+    """Bifurcation diagram: peak and lowest velocity of the cycles against the parameter.
+
+    Full lines are stable cycles, dashed ones unstable; a dotted line is steady sliding. Doubled branches are thin.
+
+    Parameters
+    ----------
+    branch : CycleBranch
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    factor, unit = display_unit(branch.unit, branch.onset.value)
+    drive = branch.rig.drive.velocity
+    speed, speed_unit = display_unit("m/s", drive)
+    onset_speed = branch.onset.value if branch.along == "drive.velocity" else drive
+    _velocities(branch, ax, factor, speed, 1.8, True)
+    if branch.doubled is not None:
+        _velocities(branch.doubled, ax, factor, speed, 0.9, False)
+    ax.axhline(drive / speed, color=BLACK, linewidth=0.8, linestyle=":", label="steady sliding")
+    kind = branch.onset.kind
+    mark: dict[str, Any] = {"color": _COLOURS[kind], "marker": "o", "linestyle": "none"}
+    ax.plot([branch.onset.value / factor], [onset_speed / speed], label=f"{kind} onset", **mark)
+    seen: set[str] = set()
+    for point in (*branch.special, *(branch.doubled.special if branch.doubled else ())):
+        symbol, colour = _MARKS[point.kind]
+        name = "" if point.kind in seen else point.kind
+        seen.add(point.kind)
+        ax.plot([point.cycle.value / factor], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
+    ax.set_yscale("log")
+    if np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
+        ax.set_xscale("log")
+    ax.set_xlabel(labelled(branch.along.rpartition(".")[2].replace("_", " "), unit))
+    ax.set_ylabel(labelled("highest and lowest velocity", speed_unit))
+    ax.grid(color=GREY, linewidth=0.3)
+    ax.legend(fontsize="small")
+    return ax
+
+
+def _velocities(branch: CycleBranch, ax: Axes, factor: float, speed: float, width: float, named: bool) -> None:
+    """Stretches of equal stability, one line each; neighbours share their point so that no gap shows."""
+    stable = branch["stable"]
+    cuts = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1), len(stable)]
+    used: set[bool] = set()
+    for start, stop in pairwise(cuts):
+        part = slice(max(start - 1, 0), stop)
+        good = bool(stable[start])
+        style = {"color": BLUE if good else VERMILION, "linestyle": "-" if good else "--", "linewidth": width}
+        name = ("stable cycle" if good else "unstable cycle") if named and good not in used else ""
+        used.add(good)
+        for quantity in ("peak_velocity", "lowest_velocity"):
+            ax.plot(branch["value"][part] / factor, branch[quantity][part] / speed, label=name, **style)  # type: ignore[arg-type]
+            name = ""
+
+
+def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
+    """The oscillatory edge in the plane of two parameters, coloured by the kind of onset.
+
+    Parameters
+    ----------
+    curve : HopfCurve
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    factors, names = [], []
+    for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
+        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))))
+        factors.append(factor)
+        names.append(labelled(name.rpartition(".")[2].replace("_", " "), shown_unit))
+    x, y = curve.first / factors[0], curve.second / factors[1]
+    for kind, colour in _COLOURS.items():
+        here = curve.kind == kind
+        if not here.any():
+            continue
+        for edge, style in ((True, "-"), (False, ":")):
+            inside = here & (curve.is_edge == edge)
+            if inside.any():
+                wide = inside.copy()
+                wide[1:] |= inside[:-1]  # up to the next point, so that no gap shows
+                label = kind if edge else f"{kind}, behind another edge"
+                ax.plot(np.where(wide, x, np.nan), np.where(wide, y, np.nan), style, color=colour, label=label)
+    for i, point in enumerate(curve.special):
+        at = [point.values[name] / factor for name, factor in zip(curve.names, factors, strict=True)]
+        ax.plot(at[:1], at[1:], "o", color=BLACK, markersize=5, label="" if i else "kind of onset changes")
+    for column, scale in ((curve.first, ax.set_xscale), (curve.second, ax.set_yscale)):
+        if np.all(column > 0) and column.max() > 100 * column.min():
+            scale("log")
+    ax.set_xlabel(names[0])
+    ax.set_ylabel(names[1])
+    ax.grid(color=GREY, linewidth=0.3)
+    ax.legend(fontsize="small")
+    return ax
+
+
+def basin(found: Basin, ax: Axes | None = None) -> Axes:
+    """What comes of every starting point: slip ahead of the load point against velocity.
+
+    White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles.
+
+    Parameters
+    ----------
+    found : Basin
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    length, length_unit = display_unit("m", float(np.max(np.abs(found.x))) / 3)
+    speed, speed_unit = display_unit("m/s", found.rig.drive.velocity)
+    names = list(_AREAS)
+    codes = np.vectorize(lambda word: names.index(word) if word in names else len(names) - 1)(found.outcome)
+    colours = ListedColormap([*_AREAS.values()])
+    norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, colours.N)
+    ax.pcolormesh(found.x / length, found.v / speed, codes, cmap=colours, norm=norm, shading="nearest", rasterized=True)
+    for i, run in enumerate(found.cycles):
+        label = "" if i else "unstable cycle"
+        ax.plot(run["x"] / length, run["v"] / speed, "--", color=VERMILION, label=label)
+    ax.plot([0], [found.rig.drive.velocity / speed], "o", color=BLACK, markersize=4, label="steady sliding")
+    for index in np.unique(codes):
+        patch: dict[str, Any] = {"facecolor": _AREAS[names[index]], "edgecolor": GREY}
+        ax.fill_between([], [], label=names[index], **patch)
+    ax.set_yscale("log")
+    ax.set_xlim(found.x.min() / length, found.x.max() / length)
+    ax.set_ylim(found.v.min() / speed, found.v.max() / speed)
+    ax.set_xlabel(labelled("slip ahead of the load point", length_unit))
+    ax.set_ylabel(labelled("velocity", speed_unit))
+    ax.legend(fontsize="small", loc="upper right")
+    return ax

@@ -1,0 +1,153 @@
+"""From where in the phase plane motion returns to steady sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.motion import History, simulate
+from steadyslip.motion.setup import Options, prepare
+from steadyslip.nonlinear.branch import Cycle
+from steadyslip.nonlinear.cycles import cycles
+from steadyslip.nonlinear.kicks import (
+    NEUTRAL,
+    OUTCOMES,
+    SAME,
+    SETTLED,
+    constant_inputs,
+    horizon_of,
+    leading_eigenvalue,
+    outcomes_of,
+)
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_states
+from steadyslip.values import model_values
+
+Array = np.ndarray
+POINTS = 81
+
+
+@dataclass(frozen=True, eq=False)
+class Basin:
+    """What comes of every starting point on a grid.
+
+    Attributes
+    ----------
+    rig : Slider
+    x : ndarray (n,)
+        Slip ahead of the load point at the start, m.
+    v : ndarray (m,)
+        Velocity at the start, m/s.
+    outcome : ndarray of str (m, n)
+        ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``.
+    cycles : tuple of History
+        One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
+        the plane of a rig with two variables.
+    """
+
+    rig: Slider
+    x: Array = field(repr=False)
+    v: Array = field(repr=False)
+    outcome: Array = field(repr=False)
+    cycles: tuple[History, ...] = field(repr=False)
+
+    @property
+    def share(self) -> float:
+        """Share of the grid's points that return."""
+        return float(np.mean(self.outcome == "returns"))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the basin; see `steadyslip.figures.basin`."""
+        from steadyslip import figures
+
+        return figures.basin(self, ax=ax)
+
+
+def basin(
+    rig: Slider,
+    x: Sequence[float] | None = None,
+    v: Sequence[float] | None = None,
+    *,
+    along: str = "stiffness",
+    rtol: float = 1e-8,
+    threads: int | None = None,
+    branch: int = 0,
+) -> Basin:
+    """Start everywhere in the phase plane and see what returns to steady sliding.
+
+    Parameters
+    ----------
+    rig : Slider
+    x : array_like, optional
+        Slip ahead of the load point, m (negative: the spring is stretched); 81 values unless given, over the width
+        of what a displacement kick survives.
+    v : array_like, optional
+        Velocity, m/s; 81 values unless given, four decades to each side of the drive. Without mass, the first
+        memory variable follows from it; other memory variables start as in steady sliding.
+    along : str, optional
+        The parameter along which unstable cycles of this rig are looked for.
+    rtol, threads, branch
+        As for `threshold_map`.
+
+    Returns
+    -------
+    Basin
+    """
+    steady_states(rig)  # raises, and says why
+    drive = rig.drive.velocity
+    values = model_values(rig, branch=branch)
+    options = Options(rtol=rtol, most_steps=2_000_000, settled=SETTLED, same=SAME)
+    across: Array = _default_width(rig, options, branch) if x is None else np.atleast_1d(np.asarray(x, dtype=float))
+    up: Array = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else np.atleast_1d(np.asarray(v, dtype=float))
+    if across.ndim != 1 or up.ndim != 1 or not (np.all(np.isfinite(across)) and np.all(np.isfinite(up))):
+        raise ParameterError([Problem("x, v", "allowed: one-dimensional arrays of finite numbers, m and m/s")])
+    width = np.broadcast_to(across, (len(up), len(across)))
+    height = np.broadcast_to(up[:, None], width.shape)
+    jobs = prepare(rig, None, 1.0, {}, {"x": width.ravel(), "v": height.ravel()}, options, branch)
+    leading = leading_eigenvalue(values)
+    count = width.size
+    nothing = np.zeros(count)
+    horizon = np.broadcast_to(horizon_of(leading), (count,))
+    jobs = replace(jobs, segments=constant_inputs(horizon, np.full(count, drive), nothing, nothing), size=count)
+    neutral = np.broadcast_to(np.abs(leading.real) <= NEUTRAL * np.abs(leading), (count,))
+    found = outcomes_of(jobs, neutral, threads)
+    outcome = np.array(OUTCOMES)[found].reshape(width.shape)
+    return Basin(rig, across, up, outcome, _unstable_cycles(rig, along, branch))
+
+
+def _default_width(rig: Slider, options: Options, branch: int) -> Array:
+    from steadyslip.nonlinear.kicks import Kicked
+
+    kicked = Kicked(rig, "displacement", 1, "before", {}, branch, options.rtol)
+    return np.asarray(float(kicked.length[0]) * np.linspace(-15.0, 15.0, POINTS))
+
+
+def _unstable_cycles(rig: Slider, along: str, branch: int) -> tuple[History, ...]:
+    """One period of each unstable cycle at the rig's own parameter; none where no branch can be followed."""
+    try:
+        found = cycles(rig, along, doublings=0, branch=branch)
+    except NotAvailable:
+        return ()
+    own = float(rig.parameters()[found.along].value)  # type: ignore[arg-type]
+    return tuple(orbit(rig, cycle) for cycle in found.at(own) if not cycle.stable)
+
+
+def orbit(rig: Slider, cycle: Cycle, periods: float = 1.0) -> History:
+    """A cycle as a history, for drawing: simulated from its start.
+
+    Parameters
+    ----------
+    rig : Slider
+        The rig that has this cycle (its parameter at ``cycle.value``).
+    cycle : Cycle
+    periods : float
+        How many; unstable cycles leave themselves after a few.
+    """
+    names = dict(cycle.start)
+    if rig.friction.memory() and not model_values(rig).model.inertial:
+        names.pop("v")  # follows from the memory
+    return simulate(rig, until=periods * cycle.period, initial=names, rtol=1e-10)

@@ -1,0 +1,220 @@
+"""Cycles along a parameter: what is known of each, of special points, and of where a branch ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.nonlinear.onset import Onset
+from steadyslip.quantities import shown
+from steadyslip.slider import Slider
+
+Array = np.ndarray
+UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "stress_drop": "Pa",
+         "lowest_normal_stress": "Pa", "highest_normal_stress": "Pa", "slip": "m", "growth": "1"}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """One periodic motion.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter, SI units.
+    period : float
+        s.
+    peak_velocity, lowest_velocity : float
+        m/s, located.
+    amplitude : float
+        Half of ln(peak velocity/lowest velocity).
+    stress_drop : float
+        Highest less lowest spring stress, Pa.
+    lowest_normal_stress, highest_normal_stress : float
+        Pa.
+    multipliers : tuple of complex
+        Floquet multipliers by falling size, the trivial one (1) left out.
+    trivial : float
+        The one that should be 1; its distance from 1 is a measure of precision.
+    stable : bool
+        Whether the cycle attracts: all multipliers inside the unit circle.
+    start : dict of str to float
+        State where the block, speeding up, is as fast as the load point: x, v and memory, SI units, for
+        ``simulate(rig, initial=...)``.
+    """
+
+    value: float
+    period: float
+    peak_velocity: float
+    lowest_velocity: float
+    amplitude: float
+    stress_drop: float
+    lowest_normal_stress: float
+    highest_normal_stress: float
+    multipliers: tuple[complex, ...]
+    trivial: float
+    stable: bool
+    start: dict[str, float]
+    _state: tuple[float, ...] = field(default=(), repr=False)
+
+    @property
+    def growth(self) -> float:
+        """Size of the largest multiplier: factor by which a small deviation grows in one period."""
+        return max((abs(m) for m in self.multipliers), default=0.0)
+
+    @property
+    def slip(self) -> float:
+        """Slip per period, m: the load point's advance."""
+        return self.start["v"] * self.period
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialCycle:
+    """A cycle at which the branch changes.
+
+    Attributes
+    ----------
+    kind : str
+        ``fold``, ``period doubling``, ``torus`` or ``range`` (the end of the range asked for).
+    cycle : Cycle
+    bracket : tuple of float
+        Values of the parameter on both sides (at a fold: of neighbouring cycles).
+    precision : float
+        Estimated error of the parameter's value there, relative.
+    """
+
+    kind: str
+    cycle: Cycle
+    bracket: tuple[float, float]
+    precision: float
+
+
+@dataclass(frozen=True, eq=False)
+class CycleBranch:
+    """Cycles that are born at an oscillatory edge of stability, in the order in which they were followed.
+
+    Attributes
+    ----------
+    rig : Slider
+    along, unit : str
+        The parameter and its SI unit.
+    onset : Onset
+        The edge at which the branch begins.
+    cycles : tuple of Cycle
+    special : tuple of SpecialCycle
+    end : str
+        Why the branch stops.
+    doubled : CycleBranch or None
+        The branch of twice the period that begins at the first period doubling.
+    """
+
+    rig: Slider = field(repr=False)
+    along: str
+    unit: str
+    onset: Onset = field(repr=False)
+    cycles: tuple[Cycle, ...] = field(repr=False)
+    special: tuple[SpecialCycle, ...] = field(repr=False)
+    end: str
+    doubled: CycleBranch | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.cycles)
+
+    def __getitem__(self, name: str) -> Array:
+        """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ..."""
+        return np.array([getattr(cycle, name) for cycle in self.cycles])
+
+    def at(self, value: float) -> tuple[Cycle, ...]:
+        """The cycles that exist at one value of the parameter, corrected to full precision."""
+        from steadyslip.nonlinear.cycles import cycles_at
+
+        return cycles_at(self, value)
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over ``point``."""
+        import xarray as xr
+
+        names = {"value": self.unit} | UNITS
+        data = {name: ("point", self[name].astype(float), {"units": unit}) for name, unit in names.items()}
+        data["stable"] = ("point", self["stable"], {})
+        attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind}
+        return xr.Dataset(data, attrs=attributes)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write one row for each cycle, units in the header."""
+        names = {"value": self.unit} | UNITS
+        table = np.column_stack([self[name].astype(float) for name in names] + [self["stable"].astype(float)])
+        header = ",".join([f"{name} ({unit})" for name, unit in names.items()] + ["stable"]).replace(
+            "value", self.along, 1
+        )
+        np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.12g")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units, as ``steadyslip cycles --json`` prints it."""
+
+        def plain(cycle: Cycle) -> dict[str, Any]:
+            found = {name: getattr(cycle, name) for name in ("value", *UNITS)}
+            found |= {"stable": cycle.stable, "start": cycle.start}
+            return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
+
+        return {
+            "parameter": self.along,
+            "unit": self.unit,
+            "onset": {"kind": self.onset.kind, "value": self.onset.value},
+            "end": self.end,
+            "cycles": [plain(cycle) for cycle in self.cycles],
+            "special": [
+                {"kind": s.kind, "bracket": list(s.bracket), "precision": s.precision} | plain(s.cycle)
+                for s in self.special
+            ],
+            "doubled": None if self.doubled is None else self.doubled.to_dict(),
+        }
+
+    def plot(self, kind: str = "branch", ax: Any = None) -> Any:
+        """Draw the branch; see `steadyslip.figures.cycle_branch`."""
+        from steadyslip import figures
+
+        return figures.cycle_branch(self, ax=ax)
+
+    def __str__(self) -> str:
+        lines = [
+            f"cycles along {self.along} from a {self.onset.kind} onset at {shown(self.onset.value, self.unit, 6)}: "
+            f"{len(self.cycles)} cycles"
+        ]
+        if self.cycles:
+            v = self["peak_velocity"], self["lowest_velocity"]
+            period, drop = self["period"], self["stress_drop"]
+            lines += [
+                f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}",
+                f"  period       {shown(float(period.min()), 's')} to {shown(float(period.max()), 's')}",
+                f"  stress drop  up to {shown(float(drop.max()), 'Pa')}",
+                f"  stable       {_stretches(self)}",
+            ]
+        for point in self.special:
+            lines.append(
+                f"  {point.kind} at {shown(point.cycle.value, self.unit, 7)} "
+                f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
+            )
+        lines.append(f"  ends: {self.end}")
+        if self.doubled is not None:
+            lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]
+        return "\n".join(lines)
+
+
+def _stretches(branch: CycleBranch) -> str:
+    """Where along the branch cycles are stable, in words."""
+    stable = branch["stable"]
+    if stable.all():
+        return "all"
+    if not stable.any():
+        return "none"
+    changes = np.flatnonzero(stable[1:] != stable[:-1]) + 1
+    pieces = np.split(np.arange(len(stable)), changes)
+    found = [piece for piece in pieces if stable[piece[0]]]
+    values = branch["value"]
+    return "; ".join(
+        f"{shown(float(values[p].min()), branch.unit)} to {shown(float(values[p].max()), branch.unit)}" for p in found
+    )

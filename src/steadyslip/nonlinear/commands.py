@@ -1,0 +1,107 @@
+"""Cycles and thresholds from a rig file and the words of a command line, and the files that they are written to."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from steadyslip.config import read_rig
+from steadyslip.errors import NotAvailable
+from steadyslip.nonlinear.basin import basin
+from steadyslip.nonlinear.branch import Cycle, CycleBranch
+from steadyslip.nonlinear.cycles import cycles
+from steadyslip.nonlinear.threshold import Threshold, threshold
+from steadyslip.quantities import shown
+from steadyslip.slider import Slider
+
+FIGURES = (".png", ".svg", ".pdf")
+
+
+def cycles_of_file(
+    path: str | os.PathLike[str], changes: Iterable[str], along: str, between: Sequence[str] | None, doublings: int
+) -> CycleBranch:
+    """`steadyslip.cycles` for the rig of a file; shows progress on a terminal."""
+    rig = read_rig(path, changes)
+    if not sys.stderr.isatty():
+        return cycles(rig, along, between=between, doublings=doublings)
+    from rich.console import Console
+
+    with Console(stderr=True).status("following cycles; Ctrl-C keeps what there is") as status:
+
+        def progress(count: int, cycle: Cycle) -> None:
+            status.update(f"{count} cycles, period {shown(cycle.period, 's')}; Ctrl-C keeps what there is")
+
+        return cycles(rig, along, between=between, doublings=doublings, progress=progress)
+
+
+def write_branch(branch: CycleBranch, path: Path) -> None:
+    """Write a branch as netCDF, as columns or as a figure, by the ending of the name.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is none of these, or the file cannot be written.
+    """
+    ending = path.suffix.lower()
+    try:
+        if ending == ".nc":
+            branch.to_xarray().to_netcdf(path)
+        elif ending == ".csv":
+            branch.to_csv(path)
+        elif ending in FIGURES:
+            branch.plot().figure.savefig(path, dpi=150)
+        else:
+            raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are .nc, .csv, {', '.join(FIGURES)}")
+    except OSError as error:
+        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Several kinds of kick of one rig."""
+
+    rig: Slider
+    found: tuple[Threshold, ...]
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.found))
+
+    def to_dict(self) -> list[dict[str, Any]]:
+        """One entry for each kind of kick."""
+        return [one.to_dict() for one in self.found]
+
+
+def thresholds_of_file(
+    path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str
+) -> Thresholds:
+    """`steadyslip.threshold` for several kinds of kick and the rig of a file."""
+    rig = read_rig(path, changes)
+    waiting: Any = nullcontext()
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        waiting = Console(stderr=True).status("kicking")
+    with waiting:
+        direction = -1 if reverse else 1
+        return Thresholds(rig, tuple(threshold(rig, k, direction=direction, reference=reference) for k in kicks))
+
+
+def write_basin(thresholds: Thresholds, path: Path) -> None:
+    """Draw the basin of the same rig.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is not that of a figure, or the file cannot be written.
+    """
+    if path.suffix.lower() not in FIGURES:
+        raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are {', '.join(FIGURES)}")
+    try:
+        basin(thresholds.rig).plot().figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error

@@ -1,0 +1,145 @@
+"""Pseudo-arclength continuation: follow the curve of solutions of n equations in n + 1 unknowns.
+
+Nothing here knows what the equations mean. Unknowns are expected to be of order one (the caller scales them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+Array = np.ndarray
+Equations = Callable[[Array], tuple[Array, Array]]
+"""u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
+MOST_ITERATIONS = 10
+GROW, SHRINK = 1.4, 0.4
+
+
+class Failure(ArithmeticError):
+    """The equations cannot be evaluated here, or Newton's method does not converge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A solution on the curve, the unit tangent there, and the length of curve since the start."""
+
+    u: Array
+    tangent: Array
+    length: float
+    iterations: int
+
+
+class Curve:
+    """A curve of solutions.
+
+    Parameters
+    ----------
+    equations : callable
+    tolerance : float
+        Size of the last Newton step that counts as converged, relative to unknowns that exceed one.
+    most_turn : float
+        Largest angle (cosine) between tangents of neighbouring points.
+    """
+
+    def __init__(self, equations: Equations, tolerance: float = 1e-9, most_turn: float = 0.94) -> None:
+        self.equations, self.tolerance, self.most_turn = equations, tolerance, most_turn
+
+    def start(self, guess: Array, tangent: Array) -> Point:
+        """The solution nearest to a guess, across the direction given; its tangent points that way."""
+        return self.corrected(guess, tangent, 0.0)
+
+    def corrected(self, guess: Array, tangent: Array, length: float) -> Point:
+        """Newton's method on the plane through `guess` across `tangent`.
+
+        Raises
+        ------
+        Failure
+            If it does not converge.
+        """
+        u = guess.copy()
+        before = np.inf
+        for iteration in range(MOST_ITERATIONS):
+            residual, jacobian = self.equations(u)
+            matrix = np.vstack([jacobian, tangent])
+            right = np.append(residual, tangent @ (u - guess))
+            try:
+                step = np.linalg.solve(matrix, right)
+            except np.linalg.LinAlgError as error:
+                raise Failure("singular") from error
+            if not np.all(np.isfinite(step)):
+                raise Failure("not finite")
+            u = u - step
+            size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
+            if size <= self.tolerance or (size < 10 * self.tolerance and size > 0.3 * before):
+                along = np.zeros(len(u))
+                along[-1] = 1.0
+                direction = np.linalg.solve(matrix, along)
+                direction /= np.linalg.norm(direction)
+                return Point(u, direction, length, iteration + 1)
+            if size > 2.0 * before and iteration > 2:
+                break
+            before = size
+        raise Failure("no convergence")
+
+    def follow(self, first: Point, step: float, least: float, most: float) -> Iterator[Point]:
+        """Points along the curve from `first`, which is not among them.
+
+        Steps grow up to `most`, or to a fifth of the largest unknown where that is more.
+        Ends by raising `Failure` where steps of `least` no longer succeed.
+        """
+        here = first
+        while True:
+            try:
+                ahead = self.corrected(here.u + step * here.tangent, here.tangent, here.length + step)
+                turned = float(ahead.tangent @ here.tangent)
+                if turned < self.most_turn and step > 4 * least:
+                    raise Failure("turns too sharply")
+            except Failure:
+                step *= SHRINK
+                if step < least:
+                    raise
+                continue
+            yield ahead
+            if ahead.iterations <= 4 and turned > 1 - 0.3 * (1 - self.most_turn):
+                step = min(step * GROW, max(most, 0.2 * float(np.max(np.abs(ahead.u)))))
+            elif ahead.iterations > 6:
+                step *= 0.7
+            here = ahead
+
+    def located(
+        self, low: Point, high: Point, measure: Callable[[Point], float], at_low: float, at_high: float,
+        width: float = 1e-11,
+    ) -> tuple[Point, Point]:  # fmt: skip
+        """Two neighbouring points between which a measure changes sign (Illinois); the second is the better one.
+
+        Raises
+        ------
+        Failure
+            If a point between the two cannot be found.
+        """
+        a, b, side = 0.0, high.length - low.length, 0
+        near, far = low, high
+        for _ in range(60):
+            s = b - at_high * (b - a) / (at_high - at_low)
+            if not a < s < b:
+                s = 0.5 * (a + b)
+            middle = self.corrected(low.u + s * low.tangent, low.tangent, low.length + s)
+            value = measure(middle)
+            if (value > 0) == (at_low > 0):
+                a, at_low, near = s, value, middle
+                at_high = at_high / 2 if side == 1 else at_high
+                side = 1
+            else:
+                b, at_high, far = s, value, middle
+                at_low = at_low / 2 if side == -1 else at_low
+                side = -1
+            if value == 0 or b - a <= width * (1 + abs(low.length)):
+                break
+        return (near, far) if side == -1 else (far, near)
+
+
+def turned_round(point: Point) -> Point:
+    """The same point, to be followed the other way; lengths count the other way too."""
+    return replace(point, tangent=-point.tangent, length=-point.length)

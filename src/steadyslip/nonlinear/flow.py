@@ -1,0 +1,270 @@
+"""The motion over a given time as a smooth map of starting state and one parameter, with its derivative.
+
+Cycles are fixed points of this map. Inputs are steady: constant drive, no disturbance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from steadyslip.compiled.kernel import Choice
+from steadyslip.compiled.program import SETTINGS, Program, program
+from steadyslip.compiled.reduction import TIME, V_LP, P, Q, Reduction
+from steadyslip.compiled.variational import with_sensitivities
+from steadyslip.errors import NotAvailable
+from steadyslip.expressions import array_function
+from steadyslip.motion.engine import Call, Outcome, run_tables
+from steadyslip.motion.observe import observe
+from steadyslip.motion.setup import METHODS, Options, automatic_method, initial_values, prepare
+from steadyslip.motion.status import WORDS, remedy
+from steadyslip.nonlinear.continuation import Failure
+from steadyslip.protocol import Protocol, pack
+from steadyslip.slider import Slider
+from steadyslip.steady import steady_stress
+from steadyslip.values import Values, model_values
+
+Array = np.ndarray
+DONE = WORDS.index("done")
+DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
+
+
+class FlowFailure(Failure):
+    """A run that did not reach its end; `status` says why, in the words of `steadyslip.motion.status`."""
+
+    def __init__(self, status: str) -> None:
+        super().__init__(f"a run ended with: {status}")
+        self.status = status
+
+
+@lru_cache(maxsize=64)
+def _restored(reduction: Reduction) -> Any:
+    """Continuous variables from the state, for starting a kernel anywhere."""
+    model = reduction.model
+    arguments = [*model.parameters.values(), model.sigma_ss, *reduction.state, V_LP, Q, P, TIME]
+    return array_function(arguments, list(reduction.restored))
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A rig at one value of the free parameter, as kernels take it.
+
+    Attributes
+    ----------
+    value, unit : float
+        The parameter, and the size of change that derivatives in it refer to.
+    values : Values
+        Of the model, arrays of one number.
+    sigma, drive : ndarray (1,)
+    plain, varied : tuple of ndarray
+        Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
+    """
+
+    value: float
+    unit: float
+    values: Values
+    sigma: Array
+    drive: Array
+    plain: tuple[Array, Array]
+    varied: tuple[Array, Array]
+
+
+class Flow:
+    """Runs of a rig with one parameter left free.
+
+    Parameters
+    ----------
+    rig : Slider
+    name : str
+        Full name of the free parameter.
+    branch : int
+    rtol : float, optional
+        Error allowed per step; 1e-10 for explicit methods, 1e-9 for Rosenbrock methods unless given.
+
+    Attributes
+    ----------
+    noise : float
+        Smallest absolute error, in natural sizes, that integration can keep to.
+    size : int
+        Number of state variables n.
+    scales : ndarray (n,)
+        Their natural sizes, at the rig's own parameter.
+    time : float
+        Natural time, s.
+    """
+
+    def __init__(self, rig: Slider, name: str, branch: int = 0, rtol: float | None = None) -> None:
+        self.rig, self.name, self.branch = rig, name, branch
+        address = rig.parameters()[name]
+        self.present = (name,) if address.role.structural else ()
+        self.domain = address.role.domain
+        self.options = Options(rtol=rtol or 1e-10, most_steps=1_000_000)
+        own = float(address.value)  # type: ignore[arg-type]
+        self.base = prepare(rig, None, 1.0, {name: np.array([own])}, {}, self.options, branch)
+        if not self.base.posed[0]:
+            raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
+        if self.base.values.model.imposed != 0:
+            raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
+        self.reduction, self.size = self.base.reduction, len(self.base.reduction.state)
+        method = METHODS[self.options.method] or automatic_method(self.reduction)
+        stiff = method != "tsit5"
+        if stiff and rtol is None:
+            self.options = replace(self.options, rtol=1e-9)
+            self.base = replace(self.base, options=self.options)
+        self.noise = 1e-13 if stiff else 1e-16
+        self.finest = self.noise / self.options.rtol
+        self.machine = program(self.reduction.model, Choice(method), self.base.eliminate)
+        self.sensitive = Program(with_sensitivities(self.reduction), Choice(method, dense=False, field=True))
+        self._settings: dict[float, Setting] = {}
+        row = self.setting(own).plain[1][0]
+        self.scales = row[-self.size :] / self.options.rtol
+        self.time = float(self.scales[0] / self.setting(own).drive[0])
+
+    # -- one rig
+
+    def setting(self, value: float) -> Setting:
+        """The rig with the free parameter at a value.
+
+        Raises
+        ------
+        Failure
+            If the value is outside its domain, or steady sliding does not exist there.
+        """
+        if value not in self._settings:
+            if len(self._settings) > 64:
+                self._settings.clear()
+            self._settings[value] = self._made(value)
+        return self._settings[value]
+
+    def _made(self, value: float) -> Setting:
+        if not self.domain.contains(value):
+            raise Failure(f"{self.name} leaves its domain")
+        unit = abs(value) or 1.0
+        values = self._varied(np.array([value]))
+        sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
+        if not sigma[0] > 0:
+            raise Failure("steady sliding ceases to exist")
+        jobs = replace(self.base, values=values, sigma=sigma)
+        constants, _, settings, _ = jobs.tables(self.machine, 0, 1, True, True)
+        scales = settings[0, -self.size :]
+        ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
+        varied = np.concatenate([settings[0], ratio, scales])[None]
+        drive = np.atleast_1d(np.asarray(values.named()["drive.velocity"], dtype=float))
+        own = self.sensitive.constants(values.arguments, sigma)
+        return Setting(
+            value, unit, values, sigma, drive, (constants, settings), (self._with_rates(own, value, unit), varied)
+        )
+
+    def _with_rates(self, constants: Array, value: float, unit: float) -> Array:
+        """Constants and how fast they change with the parameter, per unit: central differences."""
+        beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
+        found = self.sensitive.constants(beside.arguments, steady_stress(beside))
+        if len(found) == 1:
+            found = np.repeat(found, 2, axis=0)
+        rates = (found[0] - found[1]) / (2 * DIFFERENCE)
+        drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
+        table = self.sensitive.text.constants
+        named = dict(zip(table.symbols.values(), rates, strict=True))
+        named[V_LP] = (drive[0] - drive[1]) / (2 * DIFFERENCE)
+        return np.concatenate([constants[0], [named[c] for c in table.rates]])[None]
+
+    def _varied(self, around: Array) -> Values:
+        """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
+        if self.rig.axial_stiffness is None:
+            named = self.base.values.named() | {self.name: around}
+            return replace(self.base.values, arguments=tuple(named.values()))
+        return model_values(self.rig, {self.name: around}, self.present, self.branch)
+
+    def steady(self, value: float) -> Array:
+        """State in steady sliding."""
+        setting = self.setting(value)
+        continuous, _ = initial_values(self.reduction, setting.values, setting.sigma, {})
+        where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
+        guess = setting.plain[1][0, SETTINGS.index("guess")]
+        return np.array([where.get(symbol, guess) for symbol in self.reduction.state])
+
+    # -- runs
+
+    def run(self, setting: Setting, states: Array, times: Array, amplitude: float = 1.0) -> tuple[Array, Array, Array]:
+        """Runs from `states` (m, n) over `times` (m,).
+
+        Returns
+        -------
+        ends : ndarray (m, n)
+        sensitivities : ndarray (m, n, n)
+            In the starting state.
+        slopes : ndarray (m, n)
+            In the parameter, per ``setting.unit``.
+        """
+        count, n = len(states), self.size
+        initial = np.hstack([self._continuous(setting, states), self._unit(count)])
+        settings = self._finer(setting.varied[1], amplitude)
+        final = self._advanced(self.sensitive, setting.varied[0], settings, initial, setting.drive, times)
+        matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
+        return final[:, :n], matrix, final[:, n + n * n :]
+
+    def _unit(self, count: int) -> Array:
+        """S and D where a run starts."""
+        return np.tile(np.append(np.eye(self.size).ravel(), np.zeros(self.size)), (count, 1))
+
+    def _finer(self, settings: Array, amplitude: float) -> Array:
+        """Settings for small motions: absolute errors allowed shrink with their size."""
+        finer = settings.copy()
+        atol = slice(len(SETTINGS), len(SETTINGS) + self.size)
+        finer[:, atol] *= max(min(1.0, amplitude), self.finest)
+        finer[:, SETTINGS.index("watch")] = finer[:, SETTINGS.index("record")] = 0.0
+        return finer
+
+    def _continuous(self, setting: Setting, states: Array) -> Array:
+        with np.errstate(all="ignore"):
+            found = _restored(self.reduction)(
+                *map(np.asarray, setting.values.arguments), setting.sigma, *states.T, setting.drive, 0.0, 0.0, 0.0
+            )
+        return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
+
+    def _advanced(
+        self, machine: Program, constants: Array, settings: Array, initial: Array, drive: Array, times: Array
+    ) -> Array:
+        tables = (constants, np.ascontiguousarray(initial), settings, _segments(drive, times))
+        call = Call(machine, tables, len(times), np.empty(0))
+        call.go(2**62)
+        if np.any(call.status != DONE):
+            raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
+        return call.final[:, 4:]
+
+    def field(self, setting: Setting, states: Array) -> tuple[Array, Array, Array]:
+        """Rates (m, n), their Jacobian (m, n, n) and their slopes in the parameter (m, n) at given states."""
+        count, n = len(states), self.size
+        full = np.hstack([states, self._unit(count)])
+        inputs = np.zeros((count, 7))
+        inputs[:, 0] = setting.drive
+        values = np.empty_like(full)
+        own = np.zeros(count, dtype=np.int64)
+        self.sensitive.module.field(*setting.varied, full, inputs, own, values)
+        matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
+        return values[:, :n], matrix, values[:, n + n * n :]
+
+    def watched(self, setting: Setting, state: Array, time: float, samples: int = 0) -> Outcome:
+        """One run with its events and steps, or with even samples."""
+        initial = self._continuous(setting, state[None])
+        settings = setting.plain[1].copy()
+        settings[:, SETTINGS.index("record")] = float(samples == 0)
+        tables = (setting.plain[0], initial, settings, _segments(setting.drive, np.array([time])))
+        return run_tables(self.machine, tables, np.linspace(0, time, samples) if samples else np.empty(0))
+
+    def observed(self, setting: Setting, times: Array, states: Array) -> dict[str, Array]:
+        """All observables at given states."""
+        jobs = replace(self.base, values=setting.values, sigma=setting.sigma,
+                       segments=pack(Protocol.of(None), float(setting.drive[0]), float(times[-1]) or 1.0))  # fmt: skip
+        zero = np.zeros(len(times), dtype=int)
+        return observe(jobs, self.machine, 0, zero, zero, times, states)
+
+
+def _segments(drive: Array, times: Array) -> Array:
+    rows = np.zeros((len(times), 1, 9))  # start, end, jump, values, slopes
+    rows[:, 0, 1] = times
+    rows[:, 0, 3] = drive
+    return rows

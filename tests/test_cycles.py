@@ -1,0 +1,316 @@
+"""Cycles and their continuation: against simulation, independent numbers, and laws of nature."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from dimensionless import MU, A, unit_rig
+from rigs_of_theory import CONTACTS, rate_state, rig
+from steadyslip.nonlinear.continuation import Curve, Failure
+from steadyslip.nonlinear.flow import Flow
+from steadyslip.nonlinear.shooting import multipliers
+from test_motion_oracle import LAWS
+
+REFERENCE = Path(__file__).parent / "reference"
+
+
+def table(name):
+    return list(csv.DictReader((REFERENCE / name).read_text("utf-8").splitlines()))
+
+
+def two_states(kappa=0.08):
+    """Theory 4: β = (1, .84), ρ = .048; κ = k d_1/(aσ)."""
+    states = (ss.State(b=A, d_c=0.048), ss.State(b=0.84 * A, d_c=1.0))
+    law = ss.RateState(a=A, states=states, mu_ref=MU, v_ref=1.0, evolution=ss.Slip())
+    stiffness = kappa * A / 0.048
+    return ss.Slider(friction=law, contact=ss.Constant(preload=1.0), stiffness=stiffness, drive=ss.Steady(1.0))
+
+
+@pytest.fixture(scope="module")
+def damped():
+    """A supercritical branch over many decades."""
+    return ss.cycles(unit_rig("slip", 0.5, 0.4, damping=1e-3))
+
+
+# -- continuation itself
+
+
+def test_continuation_follows_a_circle_all_the_way_round():
+    def circle(u):
+        return np.array([u @ u - 1]), 2 * u[None]
+
+    curve = Curve(circle)
+    start = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    angles = []
+    for point in curve.follow(start, 0.05, 1e-6, 0.2):
+        assert point.u @ point.u == pytest.approx(1, abs=1e-12)
+        angles.append(np.arctan2(point.u[1], point.u[0]))
+        if point.length > 7:
+            break
+    assert np.unwrap(angles)[-1] > 2 * np.pi
+
+
+def test_continuation_locates_a_fold():
+    def parabola(u):
+        return np.array([u[0] ** 2 + u[1] - 0.3]), np.array([[2 * u[0], 1.0]])
+
+    curve = Curve(parabola)
+    here = curve.start(np.array([-1.0, -0.7]), np.array([1.0, 1.0]) / np.sqrt(2))
+    for ahead in curve.follow(here, 0.1, 1e-6, 0.3):
+        if here.tangent[1] * ahead.tangent[1] < 0:
+            pair = curve.located(here, ahead, lambda p: p.tangent[1], here.tangent[1], ahead.tangent[1])
+            assert pair[1].u == pytest.approx([0, 0.3], abs=1e-9)
+            break
+        here = ahead
+
+
+def test_continuation_says_when_it_cannot_go_on():
+    def ends(u):
+        if u[1] > 1:
+            raise Failure("a wall")
+        return np.array([u[0] - u[1]]), np.array([[1.0, -1.0]])
+
+    curve = Curve(ends)
+    start = curve.start(np.zeros(2), np.ones(2) / np.sqrt(2))
+    with pytest.raises(Failure, match="a wall"):
+        list(curve.follow(start, 0.1, 1e-4, 0.2))
+
+
+# -- the flow and its derivatives
+
+
+@pytest.mark.parametrize(
+    ("law", "mass"),
+    [("slip", 0.0), ("nagata regularised", 0.0), ("two states", 0.0), ("aging+ld", 1e8), ("prakash-clifton", 1e8)],
+)
+@pytest.mark.slow
+def test_sensitivities_are_derivatives_of_the_flow(law, mass):
+    """Of end states in starting states and in the parameter, against central differences of other runs."""
+    a_rig = rig(friction=LAWS[law], mass=mass, stiffness=3e9, radiation_damping=1e10)
+    flow = Flow(a_rig, "slider.stiffness", rtol=1e-11)
+    setting = flow.setting(3e9)
+    state = flow.steady(3e9) + 0.3 * flow.scales * np.cos(np.arange(flow.size) + 0.5)
+    time = np.array([2 * flow.time])
+    _, matrix, slope = flow.run(setting, state[None], time)
+    for k in range(flow.size):
+        step = 1e-4 * flow.scales * (np.arange(flow.size) == k)
+        ends = [flow.run(setting, (state + sign * step)[None], time)[0][0] for sign in (1, -1)]
+        expected = (ends[0] - ends[1]) / (2 * step[k])
+        size = flow.scales / flow.scales[k]
+        assert matrix[0, :, k] / size == pytest.approx(expected / size, rel=2e-5, abs=2e-6)
+    ends = [flow.run(flow.setting(3e9 * (1 + sign * 1e-5)), state[None], time)[0][0] for sign in (1, -1)]
+    expected = (ends[0] - ends[1]) / 2e-5
+    assert slope[0] / flow.scales == pytest.approx(expected / flow.scales, rel=2e-5, abs=2e-5)
+
+
+@pytest.mark.parametrize("contact", [CONTACTS[1], CONTACTS[9]], ids=lambda c: type(c).__name__)
+def test_field_is_the_linearisation_at_steady_sliding(contact):
+    a_rig = rig(contact=contact, stiffness=5e9)
+    flow = Flow(a_rig, "slider.stiffness")
+    setting = flow.setting(5e9)
+    rates, jacobian, slope = flow.field(setting, flow.steady(5e9)[None])
+    assert rates[0] / flow.scales == pytest.approx(np.zeros(flow.size), abs=1e-9)
+    assert slope[0] / flow.scales == pytest.approx(np.zeros(flow.size), abs=1e-8)
+    own = ss.eigenvalues(a_rig)
+    found = np.linalg.eigvals(jacobian[0])
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(own[np.isfinite(own)]), rel=1e-7)
+
+
+def test_multipliers_do_not_depend_on_the_number_of_segments():
+    rng = np.random.default_rng(1)
+    whole = [np.diag([1e3, 1.0, 1e-2]) + 0.1 * rng.normal(size=(3, 3)) for _ in range(3)]
+    rates = [rng.normal(size=3)]
+    for s in whole[:2]:
+        rates.append(s @ rates[-1])
+    back = np.outer(rates[0] - whole[2] @ rates[-1], rates[-1]) / (rates[-1] @ rates[-1])
+    pieces = np.array([whole[0], whole[1], whole[2] + back])  # the last brings the rate back: a closed motion
+    arrived = np.array([*rates[1:], rates[0]])
+    together = (pieces[2] @ pieces[1] @ pieces[0])[None]
+    trivial, many = multipliers(pieces, np.array(rates), arrived)
+    single, one = multipliers(together, np.array(rates[:1]), np.array(rates[:1]))
+    assert (trivial, single) == pytest.approx((1, 1), rel=1e-6)
+    assert many[0] == pytest.approx(one[0], rel=1e-6)
+    assert np.prod(many) == pytest.approx(np.linalg.det(together[0]), rel=1e-6)
+
+
+# -- branches
+
+
+@pytest.mark.parametrize("row", table("stickslip.csv"), ids=lambda r: f"{r['law']} H={r['H']}")
+def test_cycles_are_those_of_the_reference(row):
+    """Theory 10: found with other tools from other equations."""
+    number = {name: float(value) for name, value in row.items() if name != "law"}
+    branch = ss.cycles(unit_rig(row["law"], number["lam"], number["kappa"], damping=number["H"]))
+    (cycle,) = branch.at(number["kappa"] * A)
+    assert cycle.period == pytest.approx(number["period_DOP853"], rel=1e-9)
+    assert cycle.stress_drop / A == pytest.approx(number["dtau_DOP853"], rel=1e-8)
+    assert np.log(cycle.peak_velocity) == pytest.approx(number["phimax_DOP853"], rel=1e-8)
+    assert np.log(cycle.lowest_velocity) == pytest.approx(number["phimin_DOP853"], rel=1e-8)
+    assert cycle.stable
+    assert cycle.trivial == pytest.approx(1, abs=1e-6)
+
+
+def test_branch_begins_at_the_edge_with_the_predicted_amplitude(damped):
+    assert damped["amplitude"][0] == pytest.approx(1e-6, rel=1e-3)
+    assert damped["value"][0] == pytest.approx(damped.onset.value, rel=1e-8)
+    assert damped["period"][0] == pytest.approx(2 * np.pi / damped.onset.angular_frequency, rel=1e-8)
+    small = (damped["amplitude"] > 3e-2) & (damped["amplitude"] < 0.3)
+    assert small.sum() > 2
+    expected = damped.onset.velocity_amplitude(damped["value"][small])
+    assert damped["amplitude"][small] == pytest.approx(expected, rel=0.06)
+    assert np.log10(damped["peak_velocity"][-1] / damped["lowest_velocity"][-1]) > 7.9
+    assert damped["stable"].all()
+    assert np.abs(damped["trivial"] - 1).max() < 1e-6
+    assert damped["slip"] == pytest.approx(damped["period"] * 1.0)
+
+
+@pytest.mark.parametrize("share", [0.9, 0.5])
+def test_cycles_agree_with_simulation(damped, share):
+    """Started at the cycle the motion stays there; started elsewhere it comes to it."""
+    (cycle,) = damped.at(share * damped.onset.value)
+    assert cycle.growth < 0.1
+    a_rig = damped.rig.with_values({"stiffness": cycle.value})
+    run = ss.simulate(a_rig, until=12 * cycle.period, initial={"x": 1.3 * cycle.start["x"]}, rtol=1e-11)
+    peaks = [e for e in run.events if e.kind == "velocity peak"]
+    assert peaks[-1].time - peaks[-2].time == pytest.approx(cycle.period, rel=1e-8)
+    assert peaks[-1].velocity == pytest.approx(cycle.peak_velocity, rel=1e-7)
+    around = ss.orbit(a_rig, cycle)
+    assert around["x"][-1] == pytest.approx(around["x"][0], rel=1e-6)
+
+
+def test_mass_and_aging_turn_back_at_a_fold():
+    """Subcritical by theory 6: unstable cycles above the edge, which become stable at a fold."""
+    branch = ss.cycles(unit_rig("aging", 0.5, 0.5, mass=0.05))
+    assert branch.onset.kind == "subcritical"
+    (fold,) = [point for point in branch.special if point.kind == "fold"]
+    assert fold.cycle.value > branch.onset.value
+    assert max(abs(m) for m in fold.cycle.multipliers) == pytest.approx(1, abs=1e-5)
+    before = branch["period"] < fold.cycle.period
+    assert not branch["stable"][before].any()
+    assert branch["stable"][~before].all()
+    middle = 0.5 * (fold.cycle.value + branch.onset.value)
+    small, large = branch.at(middle)
+    assert not small.stable
+    assert large.stable
+    assert small.peak_velocity < large.peak_velocity
+
+
+@pytest.mark.slow
+def test_two_state_law_doubles_its_period_where_theory_says():
+    """Theory 7: at .8662587 and .8570388 of the critical stiffness."""
+    branch = ss.cycles(two_states(), between=(0.8 * two_states().stiffness, 0.02))
+    (first,) = [point for point in branch.special if point.kind == "period doubling"]
+    assert first.cycle.value / branch.onset.value == pytest.approx(0.8662587, abs=1e-6)
+    assert min(m.real for m in first.cycle.multipliers) == pytest.approx(-1, abs=1e-6)
+    second = next(point for point in branch.doubled.special if point.kind == "period doubling")
+    assert second.cycle.value / branch.onset.value == pytest.approx(0.8570388, abs=1e-6)
+    assert branch.doubled["period"][0] == pytest.approx(2 * first.cycle.period, rel=1e-4)
+    stable = branch.doubled["value"][branch.doubled["stable"]] / branch.onset.value
+    assert (stable.min() > 0.857, stable.max() < 0.8663) == (True, True)
+
+
+def test_massless_branch_ends_in_blow_up():
+    rock = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.Slip(),
+                        normal_memory=ss.LinkerDieterich(alpha=0.56))  # fmt: skip
+    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(30))
+    branch = ss.cycles(ss.Slider(friction=rock, contact=contact, stiffness=5e9, drive=ss.Steady(1e-6)))
+    assert branch.end.startswith("blow-up")
+    assert not branch["stable"].any()
+    assert (branch["value"] > branch.onset.value * (1 - 1e-7)).all()
+    assert branch["value"].max() > 1.005 * branch.onset.value
+
+
+def test_degenerate_edge_carries_the_closed_orbits_of_the_reference():
+    """Theory 10, orbits.csv and Gu's invariant: all cycles at one stiffness."""
+    branch = ss.cycles(unit_rig("slip", 0.5, 0.6), most_points=60)
+    assert branch["value"] == pytest.approx(np.full(len(branch), 0.5 * A), rel=1e-7)
+    assert (np.diff(branch["period"][20:40]) > 0).all()
+
+
+def test_another_parameter_leads_to_the_same_cycle(damped):
+    """Along the drive velocity, H and the cycles in its units are those along the stiffness."""
+    a_rig = unit_rig("slip", 0.5, 0.4, damping=1e-2)
+    along_velocity = ss.cycles(a_rig, "drive.velocity", between=(0.5, 12.0))
+    along_stiffness = ss.cycles(a_rig)
+    one = along_velocity.at(1.0)[0]
+    other = along_stiffness.at(0.4 * A)[0]
+    assert one.period == pytest.approx(other.period, rel=1e-8)
+    assert one.peak_velocity == pytest.approx(other.peak_velocity, rel=1e-7)
+    assert one.multipliers == pytest.approx(other.multipliers, rel=1e-4, abs=1e-8)
+
+
+def test_range_and_interruption(damped):
+    value = damped.onset.value
+    branch = ss.cycles(damped.rig, between=(0.9 * value, 1.1 * value))
+    assert branch["value"][-1] == pytest.approx(0.9 * value, rel=1e-7)
+    assert "end of the range" in branch.end
+
+    def stop(count, cycle):
+        if count == 7:
+            raise KeyboardInterrupt
+
+    partial = ss.cycles(damped.rig, progress=stop)
+    assert (len(partial), partial.end) == (7, "interrupted by the user")
+
+
+def test_files_and_figure(damped, tmp_path):
+    data = damped.to_xarray()
+    assert data.sizes["point"] == len(damped)
+    assert data["stress_drop"].attrs["units"] == "Pa"
+    damped.to_csv(tmp_path / "branch.csv")
+    head = (tmp_path / "branch.csv").read_text().splitlines()[0]
+    assert head.startswith("slider.stiffness (Pa/m),period (s)")
+    ax = damped.plot()
+    assert ax.get_xlabel() == "stiffness (mPa/m)"
+    assert "stable cycle" in ax.get_legend_handles_labels()[1]
+    plain = damped.to_dict()
+    assert len(plain["cycles"]) == len(damped)
+    assert plain["cycles"][0]["multipliers"][0] == [pytest.approx(1), 0]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"along": "stifness"}, "stiffness"),
+        ({"between": (1.0, 2.0)}, "must contain the edge"),
+        ({"between": (2.0, 1.0)}, "low < high"),
+        ({"amplitude": 3.0}, "above 0"),
+    ],
+)
+def test_bad_arguments_are_named(damped, options, message):
+    with pytest.raises(ss.SteadyslipError, match=message):
+        ss.cycles(damped.rig, **options)
+
+
+def test_prescribed_normal_stress_has_no_cycles_of_its_own():
+    contact = ss.Prescribed(preload=5e6, amplitude=1e5, period=3.0)
+    with pytest.raises(ss.NotAvailable, match="prescribed"):
+        ss.cycles(ss.Slider(friction=rate_state(), contact=contact, stiffness=1e9, drive=ss.Steady(1e-6)))
+
+
+def test_command_line_writes_branch_and_thresholds(tmp_path):
+    """Files by their ending, JSON that is JSON, and errors in words."""
+    import json
+
+    from test_command_line import EXAMPLE, run
+
+    stick_slip = EXAMPLE.with_name("stick-slip.toml")
+    files = [str(tmp_path / name) for name in ("b.nc", "b.csv", "b.svg")]
+    found = run("cycles", stick_slip, "--between", "20 GPa/m", "30 GPa/m", *(w for f in files for w in ("-o", f)))
+    assert found.returncode == 0, found.stderr
+    assert "end of the range, 20 GPa/m" in found.stdout
+    assert all(Path(file).stat().st_size > 500 for file in files)
+    data = json.loads(run("cycles", stick_slip, "--between", "24 GPa/m", "30 GPa/m", "--json").stdout)
+    assert data["cycles"][-1]["value"] == pytest.approx(24e9)
+    kicks = json.loads(
+        run("threshold", EXAMPLE, "--set", "stiffness=40 GPa/m", "--kick", "displacement", "--json").stdout
+    )
+    assert kicks[0]["unit"] == "m"
+    assert kicks[0]["bracket"][0] <= kicks[0]["size"] <= kicks[0]["bracket"][1]
+    bad = run("threshold", EXAMPLE, "--kick", "shove")
+    assert (bad.returncode, "unknown kick 'shove'" in bad.stderr) == (2, True)
+    bad = run("cycles", stick_slip, "-o", str(tmp_path / "b.doc"), "--between", "24 GPa/m", "30 GPa/m")
+    assert (bad.returncode, "allowed endings" in bad.stderr) == (2, True)

@@ -213,10 +213,7 @@ def test_two_state_law_doubles_its_period_where_theory_says():
 
 
 def test_massless_branch_ends_in_blow_up():
-    rock = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.Slip(),
-                        normal_memory=ss.LinkerDieterich(alpha=0.56))  # fmt: skip
-    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(30))
-    branch = ss.cycles(ss.Slider(friction=rock, contact=contact, stiffness=5e9, drive=ss.Steady(1e-6)))
+    branch = ss.cycles(paper(30))
     assert branch.end.startswith("blow-up")
     assert not branch["stable"].any()
     assert (branch["value"] > branch.onset.value * (1 - 1e-7)).all()
@@ -228,6 +225,42 @@ def test_degenerate_edge_carries_the_closed_orbits_of_the_reference():
     branch = ss.cycles(unit_rig("slip", 0.5, 0.6), most_points=60)
     assert branch["value"] == pytest.approx(np.full(len(branch), 0.5 * A), rel=1e-7)
     assert (np.diff(branch["period"][20:40]) > 0).all()
+
+
+def paper(angle, **more):
+    memory = ss.LinkerDieterich(alpha=0.56)
+    rock = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=memory, evolution=ss.Slip())
+    contact = ss.InclinedSpring(preload=5e6, angle=np.radians(angle))
+    return ss.Slider(friction=rock, contact=contact, stiffness=9e9, drive=ss.Steady(1e-6), **more)
+
+
+@pytest.mark.parametrize(
+    "a_rig",
+    [
+        paper(-45),
+        paper(30),
+        paper(60),
+        unit_rig("slip", 0.2, 0.2, damping=0.05),
+        unit_rig("aging", 1.0, 1.0, damping=0.3),
+        unit_rig("slip", 0.2, 0.2, mass=0.3),
+        unit_rig("aging", 0.2, 0.2, mass=0.02),
+        unit_rig("aging", 0.5, 0.5, mass=1.0),
+    ],
+    ids=["-45", "30", "60", "slip H=.05", "aging H=.3", "slip M=.3", "aging M=.02", "aging M=1"],
+)
+def test_small_cycles_have_the_predicted_amplitude_stable_or_not(a_rig):
+    """Theory 6 against the cycles themselves: velocity and stress, with an error that falls with the amplitude."""
+    branch = ss.cycles(a_rig, most_points=60, doublings=0)
+    errors = []
+    for low, high in ((0.1, 0.3), (0.02, 0.1)):
+        inside = np.flatnonzero((branch["amplitude"] > low) & (branch["amplitude"] < high))
+        cycle = branch.cycles[inside[len(inside) // 2]]
+        assert cycle.stable == (branch.onset.kind == "supercritical")
+        velocity = branch.onset.velocity_amplitude(cycle.value)
+        stress = branch.onset.stress_amplitude(cycle.value)
+        errors.append([abs(cycle.amplitude / velocity - 1), abs(0.5 * cycle.stress_drop / stress - 1)])
+    assert max(errors[0]) < 0.06
+    assert max(errors[1]) < 0.02
 
 
 def test_another_parameter_leads_to_the_same_cycle(damped):

@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.motion import History, simulate
+from steadyslip.motion.many import progress_bar
 from steadyslip.motion.setup import Options, prepare
 from steadyslip.nonlinear.branch import Cycle
 from steadyslip.nonlinear.cycles import cycles
@@ -75,6 +76,7 @@ def basin(
     along: str = "stiffness",
     rtol: float = 1e-8,
     threads: int | None = None,
+    progress: bool | None = None,
     branch: int = 0,
 ) -> Basin:
     """Start everywhere in the phase plane and see what returns to steady sliding.
@@ -90,8 +92,8 @@ def basin(
         memory variable follows from it; other memory variables start as in steady sliding.
     along : str, optional
         The parameter along which unstable cycles of this rig are looked for.
-    rtol, threads, branch
-        As for `threshold_map`.
+    rtol, threads, progress, branch
+        As for `threshold_map`. After Ctrl-C, points that were not finished are ``interrupted``.
 
     Returns
     -------
@@ -114,7 +116,8 @@ def basin(
     horizon = np.broadcast_to(horizon_of(leading), (count,))
     jobs = replace(jobs, segments=constant_inputs(horizon, np.full(count, drive), nothing, nothing), size=count)
     neutral = np.broadcast_to(np.abs(leading.real) <= NEUTRAL * np.abs(leading), (count,))
-    found = outcomes_of(jobs, neutral, threads)
+    with progress_bar(count, progress) as advanced:
+        found = outcomes_of(jobs, neutral, threads, advanced)
     outcome = np.array(OUTCOMES)[found].reshape(width.shape)
     return Basin(rig, across, up, outcome, _unstable_cycles(rig, along, branch))
 

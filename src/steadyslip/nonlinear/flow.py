@@ -146,7 +146,7 @@ class Flow:
         values = self._varied(np.array([value]))
         sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
         if not sigma[0] > 0:
-            raise Failure("steady sliding ceases to exist")
+            raise Failure("lock-up or lift-off: steady sliding ceases to exist")
         jobs = replace(self.base, values=values, sigma=sigma)
         constants, _, settings, _ = jobs.tables(self.machine, 0, 1, True, True)
         scales = settings[0, -self.size :]

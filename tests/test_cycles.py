@@ -1,6 +1,8 @@
 """Cycles and their continuation: against simulation, independent numbers, and laws of nature."""
 
 import csv
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -347,3 +349,33 @@ def test_command_line_writes_branch_and_thresholds(tmp_path):
     assert (bad.returncode, "unknown kick 'shove'" in bad.stderr) == (2, True)
     bad = run("cycles", stick_slip, "-o", str(tmp_path / "b.doc"), "--between", "24 GPa/m", "30 GPa/m")
     assert (bad.returncode, "allowed endings" in bad.stderr) == (2, True)
+
+
+# -- AUTO-07p: collocation, other variables, another program
+
+
+@pytest.mark.parametrize("angle", [30, -45])
+def test_branch_of_the_paper_s_rig_is_that_of_auto(angle):
+    """Numbers of AUTO-07p 0.9.2 (NTST = 300, NCOL = 6); its period in d_c/v0, x in d_c, found with tests/auto."""
+    branch = ss.cycles(paper(angle))
+    rows = [row for row in table("auto_branch.csv") if float(row["angle_deg"]) == angle]
+    for row in rows:
+        (cycle,) = branch.at(float(row["k_over_kcr"]) * branch.onset.value)
+        assert cycle.period == pytest.approx(float(row["period"]), rel=1e-9)
+        around = ss.orbit(branch.rig.with_values({"stiffness": cycle.value}), cycle)
+        assert around["x"].max() / 1e-6 == pytest.approx(float(row["x_max"]), rel=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("auto-07p") and shutil.which("gfortran")), reason="AUTO-07p is not installed")
+def test_auto_itself_agrees(tmp_path):
+    for name in ("paper.f90", "c.paper", "follow.auto"):
+        shutil.copy(Path(__file__).parent / "auto" / name, tmp_path)
+    subprocess.run(["auto-07p", "follow.auto"], cwd=tmp_path, check=True, capture_output=True, timeout=300)
+    lines = [line.split() for line in (tmp_path / "b.cycles").read_text().splitlines()]
+    found = {float(w[4]): float(w[8]) for w in lines if len(w) == 9 and w[2] == "-4"}
+    branch = ss.cycles(paper(30))
+    assert len(found) == 3
+    for ratio, period in found.items():
+        (cycle,) = branch.at(ratio * branch.onset.value)
+        assert cycle.period == pytest.approx(period, rel=1e-8)

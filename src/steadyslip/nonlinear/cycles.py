@@ -111,9 +111,8 @@ def cycles_at(branch: CycleBranch, value: float) -> tuple[Cycle, ...]:
     for low, high in zip(branch.cycles[:-1], branch.cycles[1:], strict=True):
         if (low.value - value) * (high.value - value) > 0 or high.value == value:
             continue
-        share = 0.5 if low.value == high.value else (value - low.value) / (high.value - low.value)
         try:
-            found.append(tracer.at(low, high, share, value))
+            found.append(tracer.at(low, high, value))
         except Failure:
             continue
     return tuple(found)
@@ -398,22 +397,32 @@ class _Tracer:
             return None
         return self.followed(shooting, first, size, doublings)
 
-    # -- from unknowns to a cycle
-
     def _state(self, cycle: Cycle) -> Array:
         """State variables at a cycle's start."""
         return np.array(cycle._state)
 
-    def at(self, low: Cycle, high: Cycle, share: float, value: float) -> Cycle:
-        """The cycle at a value of the parameter, between two neighbours."""
+    def at(self, low: Cycle, high: Cycle, value: float) -> Cycle:
+        """The cycle at a value of the parameter between two neighbours: along the branch, then at the value itself."""
         shooting = self.shooting(np.ones(1))
         ends = [shooting.packed(Orbit(self._state(c)[None], c.period, c.value)) for c in (low, high)]
-        guess = ends[0] + share * (ends[1] - ends[0])
-        guess[-1] = np.log(value / self.unit_of_value) if self.logarithmic else value / self.unit_of_value
-        tangent = np.zeros(len(guess))
-        tangent[-1] = 1.0
-        point = Curve(shooting.equations, tolerance=1e-11).corrected(guess, tangent, 0.0)
-        return self._known(shooting, point).cycle
+        target = np.log(value / self.unit_of_value) if self.logarithmic else value / self.unit_of_value
+        far = float(np.linalg.norm(ends[1] - ends[0]))
+        direction = (ends[1] - ends[0]) / far
+
+        def measure(point: Point) -> float:
+            return float(point.u[-1]) - target
+
+        curve = Curve(shooting.equations, tolerance=3e-8)
+        first, last = curve.corrected(ends[0], direction, 0.0), curve.corrected(ends[1], direction, far)
+        if measure(first) * measure(last) > 0:  # within rounding of one of them
+            near = min(first, last, key=lambda point: abs(measure(point)))
+        else:
+            flat = replace(first, tangent=direction)
+            near = curve.located(flat, last, measure, measure(first), measure(last), width=1e-7)[1]
+        guess = np.append(near.u[:-1], target)
+        return self._known(shooting, curve.corrected(guess, np.eye(len(guess))[-1], 0.0)).cycle
+
+    # -- from unknowns to a cycle
 
     def _known(self, shooting: Shooting, point: Point) -> _Known:
         """Everything about a cycle."""

@@ -1,0 +1,36 @@
+SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)
+  IMPLICIT NONE
+  INTEGER, INTENT(IN) :: NDIM, ICP(*), IJAC
+  DOUBLE PRECISION, INTENT(IN) :: U(NDIM), PAR(*)
+  DOUBLE PRECISION, INTENT(OUT) :: F(NDIM)
+  DOUBLE PRECISION, INTENT(INOUT) :: DFDU(NDIM,NDIM), DFDP(NDIM,*)
+  DOUBLE PRECISION a, b, mu, alpha, t, sss, k, s, TT, w
+  ! the inclined spring of the paper: X = x/d_c, time in d_c/v0, stress in preloads; PAR(1) = k/k_cr, PAR(2) = tan psi
+  a = .0145D0; b = .016D0; mu = .7D0; alpha = .56D0
+  t = PAR(2)
+  sss = 1D0/(1D0 + mu*t)
+  k = PAR(1)*sss*(b - a)/(1D0 + (mu - alpha)*t)
+  TT = mu*sss - k*U(1)
+  s = 1D0 - TT*t
+  w = (TT/s - mu - U(2) + alpha*LOG(s/sss))/a
+  F(1) = EXP(w) - 1D0
+  F(2) = -EXP(w)*(U(2) - alpha*LOG(s/sss) + b*w)
+END SUBROUTINE FUNC
+SUBROUTINE STPNT(NDIM,U,PAR,T)
+  IMPLICIT NONE
+  INTEGER, INTENT(IN) :: NDIM
+  DOUBLE PRECISION, INTENT(INOUT) :: U(NDIM), PAR(*)
+  DOUBLE PRECISION, INTENT(IN) :: T
+  PAR(1) = 1.2D0
+  PAR(2) = TAN(30D0*ACOS(-1D0)/180D0)
+  U(1) = 0D0
+  U(2) = 0D0
+END SUBROUTINE STPNT
+SUBROUTINE BCND
+END SUBROUTINE BCND
+SUBROUTINE ICND
+END SUBROUTINE ICND
+SUBROUTINE FOPT
+END SUBROUTINE FOPT
+SUBROUTINE PVLS
+END SUBROUTINE PVLS

@@ -202,3 +202,13 @@ def test_verdict_tells_the_kind_of_onset():
     data = ss.analyze(inclined(30)).to_dict()
     assert data["onset"]["kind"] == "subcritical"
     assert data["kicks"] == []
+
+
+def test_a_gain_stands_in_for_the_stiffness():
+    """A drive under position control has kp where others have a spring."""
+    friction = ss.RateState(a=0.01, b=0.016, d_c=4e-6, mu_ref=0.15, v_ref=1e-5, evolution=ss.Aging())
+    contact = ss.Constant(preload=150e3)
+    a_rig = ss.Slider(friction=friction, contact=contact, mass=2000.0, drive=ss.PD(velocity=2e-5, kp=1.5e8, kd=5e5))
+    onset = ss.hopf(a_rig)
+    assert onset.along == "drive.kp"
+    assert ss.analyze(a_rig).onset == onset

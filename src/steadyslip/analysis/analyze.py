@@ -16,7 +16,7 @@ from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
-from steadyslip.nonlinear.onset import Onset, onset_at
+from steadyslip.nonlinear.onset import Onset, onset_at, parameter_along
 from steadyslip.slider import Slider
 from steadyslip.steady import SteadySliding, steady_states
 from steadyslip.values import Values, axial_projection, model_values
@@ -192,10 +192,10 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
 
 
 def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | None:
-    """Kind of onset at the oscillatory edge in stiffness nearest to the rig's own."""
-    names = ("slider.stiffness", "slider.axial_stiffness")
+    """Kind of onset at the oscillatory edge in stiffness (or gain kp) nearest to the rig's own."""
+    name = parameter_along(rig, "slider.stiffness")
     for margin in distances:
-        if margin.parameter in names:
+        if margin.parameter == name:
             edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]
             if edges:
                 return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)

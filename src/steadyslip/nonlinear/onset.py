@@ -152,9 +152,11 @@ def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
 
 
 def parameter_along(rig: Slider, along: str) -> str:
-    """Full name of a parameter; the stiffness that the rig was given."""
+    """Full name of a parameter; for the stiffness, the one that the rig has: a spring's, a press's, or a gain kp."""
     name = rig.resolve(along)
-    return "slider.axial_stiffness" if name == "slider.stiffness" and rig.axial_stiffness is not None else name
+    if name != "slider.stiffness" or rig.stiffness is not None:
+        return name
+    return "drive.kp" if rig.axial_stiffness is None else "slider.axial_stiffness"
 
 
 def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:

@@ -20,8 +20,18 @@ EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN, TROUGH = 1, 2, 3, 
 EVENTS, V_MAX, V_MIN, LAST_BEGIN, LAST_DURATION, LAST_SLIP, LAST_DROP, LAST_PEAK, RECURRENCE, ARRESTS, PEAKS = (
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
 )  # fmt: skip
-PEAK_TIME, PEAK_PERIOD, ANY_BEGIN = 11, 12, 13
-NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, DECIDED = 14, 15, 16, 17, 18, 19, 20, 21
+PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 11, 12, 13
+NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, DECIDED, ANY_BEGIN = (
+    14,
+    15,
+    16,
+    17,
+    18,
+    19,
+    20,
+    21,
+    22,
+)
 LOG_COLUMNS = 8
 
 
@@ -171,6 +181,7 @@ def start_job(R, j, cursor, log, arrays, y, out):
     R[ROW_TALLY + V_MIN] = v
     R[ROW_TALLY + RECURRENCE] = math.nan
     R[ROW_TALLY + PEAK_PERIOD] = math.nan
+    R[ROW_TALLY + PEAK_GROWTH] = math.nan
     R[ROW_TALLY + NOW_BEGIN] = math.nan
     R[ROW_SLIPPING] = 1.0 if R[ROW_GAP] > 0.0 else 0.0
     R[ROW_RESTING] = 1.0 if abs(v) < own[S_V_LOW] else 0.0
@@ -325,12 +336,13 @@ def note(R, kind, tau, y, out, log, cursor):
 
 @njit(**PLAIN)
 def decide(R, out):
-    """Where asked for, end a run whose last two peaks are both small, or both the same."""
+    """Compare a peak with the last one; where asked for, end a run if both are small, or the same."""
     before = R[ROW_TALLY + PEAK_SIZE]
     now = math.log(abs(out[0] / out[5])) if out[5] != 0.0 else math.inf
+    R[ROW_TALLY + PEAK_GROWTH] = abs(now) - abs(before)
     if abs(before) < R[ROW_SETTLED] and abs(now) < R[ROW_SETTLED]:
         R[ROW_TALLY + DECIDED] = SETTLED
-    elif abs(now - before) < R[ROW_SAME] * (1.0 + abs(now)):
+    elif abs(now - before) < R[ROW_SAME] * (1e-3 + abs(now)):
         R[ROW_TALLY + DECIDED] = PERIODIC
 
 

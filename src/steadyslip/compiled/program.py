@@ -35,6 +35,7 @@ TALLY = (
     "velocity_peaks",
     "last_peak_time",
     "peak_period",
+    "peak_growth",
 )
 SETTINGS = ("rtol", "most_steps", "v_high", "v_low", "sigma_low", "watch", "record", "guess", "z_scale", "first_step",
             "settled", "same")  # fmt: skip

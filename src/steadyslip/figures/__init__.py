@@ -9,7 +9,7 @@ from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.motion import history, phase_plane
-from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve
+from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 
 __all__ = [
     "ANGLES",
@@ -21,4 +21,5 @@ __all__ = [
     "phase_plane",
     "root_locus",
     "stability_chart",
+    "threshold_map",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
+from steadyslip.errors import ParameterError, Problem
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -166,4 +167,51 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(labelled("slip ahead of the load point", length_unit))
     ax.set_ylabel(labelled("velocity", speed_unit))
     ax.legend(fontsize="small", loc="upper right")
+    return ax
+
+
+def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
+    """Thresholds over two parameters, as `steadyslip.threshold_map` gives them for DataArrays.
+
+    Hatched: steady sliding is unstable. White: no kick in the range is large enough, or no steady sliding.
+
+    Parameters
+    ----------
+    found : xarray.DataArray
+        With two dimensions that have coordinates; units of the axes from their attribute ``units``.
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If `found` is something else.
+    """
+    dims = getattr(found, "dims", ())
+    if len(dims) != 2 or not all(dim in found.coords for dim in dims):
+        raise ParameterError(
+            [Problem("found", "allowed: a DataArray with two dimensions that have coordinates; vary DataArrays")]
+        )
+    ax = axes_or_new(ax)
+    axes = []
+    for dim in dims[::-1]:
+        values = np.asarray(found[dim].values, dtype=float)
+        factor, unit = display_unit(found[dim].attrs.get("units", "1"), float(np.median(np.abs(values))))
+        axes.append((values / factor, labelled(str(dim).rpartition(".")[2].replace("_", " "), unit)))
+    size = np.where(np.isfinite(found.values) & (found.values > 0), found.values, np.nan)
+    (x, x_label), (y, y_label) = axes
+    mesh = ax.pcolormesh(x, y, size, cmap="cividis", shading="nearest", rasterized=True)
+    ax.figure.colorbar(mesh, ax=ax, label=f"{str(found.name or 'threshold').replace('_', ' ')} (1)")
+    if np.isfinite(size).sum() > 3:
+        lines = ax.contour(x, y, size, colors=BLACK, linewidths=0.7)
+        ax.clabel(lines, fontsize="small")
+    if np.any(found.values == 0):
+        ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
+        ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="//", label="steady sliding is unstable")
+        ax.legend(fontsize="small")
+    ax.set_xlabel(x_label)
+    ax.set_ylabel(y_label)
     return ax

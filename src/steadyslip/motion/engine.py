@@ -47,7 +47,7 @@ class Call:
         self.cursor = np.array([0, size, lanes, -1, 0, 0, 0, 0], dtype=np.int64)
         self.status = np.zeros(size, dtype=np.int64)
         self.final = np.full((size, 4 + text.size), np.nan)
-        self.tally = np.full((size, len(TALLY) + 1), np.nan)
+        self.tally = np.full((size, len(TALLY)), np.nan)
         self.samples = np.full((size, len(times), text.size), np.nan)
         self.log = np.zeros((0, 8))
         self.recorded = np.zeros((0, 2 + text.size))

@@ -22,7 +22,9 @@ from steadyslip.protocol import Protocol
 from steadyslip.records import resolve
 from steadyslip.slider import Slider
 
-EVENT_UNITS = dict(zip(TALLY, ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "1", "s", "s"), strict=True))
+EVENT_UNITS = dict(
+    zip(TALLY, ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "1", "s", "s", "1"), strict=True)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,8 @@ class Ensemble:
     events : dict of str to ndarray
         Per run: number of complete slip events, highest and lowest velocity, and of the last complete event
         begin, duration, slip, stress drop, peak velocity and recurrence; number of arrests and velocity peaks,
-        time of the last peak and the period between the last two. NaN where there is none; empty unless asked for.
+        time of the last peak, the period between the last two, and the growth of |ln(peak velocity/drive)|.
+        NaN where there is none; empty unless asked for.
     samples : dict of str to ndarray
         Observables at `times`, which is the last axis; NaN after the end of a run.
     times : ndarray

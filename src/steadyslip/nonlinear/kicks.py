@@ -26,7 +26,7 @@ from steadyslip.values import Values, model_values
 Array = np.ndarray
 SETTLED = 1e-3  # ln(peak velocity/drive) of two peaks in a row below which a motion has returned
 SAME = 1e-8  # relative change between peaks below which a motion repeats itself
-NEUTRAL = 1e-7  # growth per radian below which small motions neither grow nor decay
+NEUTRAL = 1e-8  # growth per radian below which small motions neither grow nor decay
 PERIODS = 12.0  # run at least for so many natural periods,
 DECAYS = 40.0  # and for so many decay times,
 MOST_PERIODS = 2000.0  # but no longer than this; on top of it,
@@ -254,8 +254,9 @@ def _judged(jobs: Jobs, outcome: Outcome, first: int, neutral: Array) -> Array:
     found[(status == code["periodic"]) | (status == code["too many steps"])] = OSCILLATION
     found[status >= len(STATUSES)] = INTERRUPTED
     done = status == code["done"]
-    if np.any(done):  # overdamped rigs return without a peak; slow ones are on their way
+    if np.any(done):  # overdamped rigs return without a peak; slow ones are on their way, their peaks shrinking
         peaks = outcome.tally[:, TALLY.index("velocity_peaks")]
+        shrinking = outcome.tally[:, TALLY.index("peak_growth")] < 0
         drive = jobs.segments.value[first : first + len(status), 0, 0]
         w = jobs.reduction.names.index("w") if "w" in jobs.reduction.names else None
         reference = np.asarray(
@@ -266,7 +267,7 @@ def _judged(jobs: Jobs, outcome: Outcome, first: int, neutral: Array) -> Array:
             near = np.abs(outcome.final[:, 4 + w] - np.log(np.abs(drive / reference))) < 0.1
         else:
             near = peaks < 2
-        found[done] = np.where(near[done], RETURNS, OSCILLATION)
+        found[done] = np.where(np.where(peaks < 2, near, shrinking)[done], RETURNS, OSCILLATION)
     bounded = (found == OSCILLATION) & neutral
     found[bounded] = RETURNS
     return found

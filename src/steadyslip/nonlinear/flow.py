@@ -48,6 +48,11 @@ def _restored(reduction: Reduction) -> Any:
     return array_function(arguments, list(reduction.restored))
 
 
+@lru_cache(maxsize=64)
+def _with_sensitivities(reduction: Reduction, method: str) -> Program:
+    return Program(with_sensitivities(reduction), Choice(method, dense=False, field=True))
+
+
 @dataclass(frozen=True, eq=False)
 class Setting:
     """A rig at one value of the free parameter, as kernels take it.
@@ -117,7 +122,7 @@ class Flow:
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
         self.machine = program(self.reduction.model, Choice(method), self.base.eliminate)
-        self.sensitive = Program(with_sensitivities(self.reduction), Choice(method, dense=False, field=True))
+        self.sensitive = _with_sensitivities(self.reduction, method)
         self._settings: dict[float, Setting] = {}
         row = self.setting(own).plain[1][0]
         self.scales = row[-self.size :] / self.options.rtol
@@ -247,13 +252,11 @@ class Flow:
         matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return values[:, :n], matrix, values[:, n + n * n :]
 
-    def watched(self, setting: Setting, state: Array, time: float, samples: int = 0) -> Outcome:
-        """One run with its events and steps, or with even samples."""
+    def watched(self, setting: Setting, state: Array, time: float) -> Outcome:
+        """One run with its events and steps."""
         initial = self._continuous(setting, state[None])
-        settings = setting.plain[1].copy()
-        settings[:, SETTINGS.index("record")] = float(samples == 0)
-        tables = (setting.plain[0], initial, settings, _segments(setting.drive, np.array([time])))
-        return run_tables(self.machine, tables, np.linspace(0, time, samples) if samples else np.empty(0))
+        tables = (*setting.plain[:1], initial, setting.plain[1], _segments(setting.drive, np.array([time])))
+        return run_tables(self.machine, tables, np.empty(0))
 
     def observed(self, setting: Setting, times: Array, states: Array) -> dict[str, Array]:
         """All observables at given states."""

@@ -112,7 +112,7 @@ def hopf_curve(
     *,
     between: Mapping[str, Sequence[Any]] | None = None,
     branch: int = 0,
-    finest: float = 0.05,
+    spacing: float = 0.05,
 ) -> HopfCurve:
     """Follow the oscillatory edge of stability through the plane of two parameters.
 
@@ -126,7 +126,7 @@ def hopf_curve(
         Ranges of the parameters; by default their domains, and six decades to each side of positive values.
     branch : int, optional
         Which steady sliding, where there are several.
-    finest : float, optional
+    spacing : float, optional
         Largest distance of points, in natural logarithms of positive parameters or radians of angles.
 
     Returns
@@ -156,11 +156,11 @@ def hopf_curve(
         start = curve.start(guess, np.array([1.0, 0.0, 0.0]))
     except Failure:
         start = curve.start(guess, np.array([0.0, 1.0, 0.0]))
-    forward, end = _followed(curve, start, plane, finest)
+    forward, end = _followed(curve, start, plane, spacing)
     backward: list[Point] = []
     begin = end
     if end != "closed":
-        backward, begin = _followed(curve, turned_round(start), plane, finest)
+        backward, begin = _followed(curve, turned_round(start), plane, spacing)
     points = [*(turned_round(p) for p in reversed(backward)), start, *forward]
     return _described(rig, plane, curve, points, (begin, end))
 
@@ -245,19 +245,19 @@ class _Plane:
         return ""
 
 
-def _followed(curve: Curve, start: Point, plane: _Plane, finest: float) -> tuple[list[Point], str]:
+def _followed(curve: Curve, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
     """Points one way, and why they end; the last lies on the limit of a range to within rounding."""
     found: list[Point] = []
     here = start
     try:
-        for point in curve.follow(start, 0.2 * finest, 1e-4 * finest, finest):
+        for point in curve.follow(start, 0.2 * spacing, 1e-4 * spacing, spacing):
             reason = plane.outside(point.u)
             if reason:
                 found += _on_the_limit(curve, here, point, plane)
                 return found, reason
             found.append(point)
             here = point
-            if len(found) > 20 and np.linalg.norm(point.u - start.u) < 0.6 * finest:
+            if len(found) > 20 and np.linalg.norm(point.u - start.u) < 0.6 * spacing:
                 return found, "closed"
             if len(found) >= 5000:
                 return found, "too many points; give ranges with between="

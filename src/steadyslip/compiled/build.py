@@ -33,6 +33,8 @@ ENTRIES = {
     "float64[:,::1], int64)",
     "observe": "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
     "field": "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
+    "through_table": "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], int64[:,::1], "
+    "float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
 }
 """Functions that are called from outside; not every kernel has all of them."""
 _MAGIC = b"steadyslip kernel 1\n"

@@ -62,10 +62,12 @@ class Choice:
 class KernelText:
     """Writes the source of one kernel."""
 
+    varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # the steady drive is a constant too
+
     def __init__(self, reduction: Reduction, choice: Choice) -> None:
         self.reduction, self.choice = reduction, choice
         self.method: Method = METHODS[choice.method]()
-        self.size = len(reduction.state)
+        self.size = self.counted = len(reduction.state)  # how many errors are averaged
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | _INPUT_NAMES | _SLOPE_NAMES
         variables = {*reduction.state, *reduction.continuous, *INPUTS, *SLOPES[:3], sp.Symbol("w", real=True)}
         if reduction.unknown is not None:
@@ -87,23 +89,26 @@ class KernelText:
     def _answers_to_constants(self) -> dict[int, sp.Expr]:
         """By position in the state: what a change of the constants adds to the rates of `Reduction.direction`."""
         reduction = self.reduction
-        if not reduction.direction:
-            return {}
-        residual = None if reduction.residual is None else self._fixed(reduction.residual)
-        known = [*self.constants.symbols.values(), V_LP]  # the steady drive is a constant too
-
-        def change(expression: sp.Expr) -> sp.Expr:
-            return sp.Add(*(sp.diff(expression, c) * self.constants.rate_of(c) for c in known if expression.has(c)))
-
-        found = {}
-        for i, symbol in enumerate(reduction.direction):
-            added = change(self.rates[i])
-            if residual is not None and reduction.unknown is not None:
-                slope = sp.diff(residual, reduction.unknown)
-                added -= sp.diff(self.rates[i], reduction.unknown) * change(residual) / slope
-            found[reduction.state.index(symbol)] = added
+        found = {
+            reduction.state.index(symbol): self._change(self.rates[i], direction)
+            for direction, symbols in enumerate(reduction.directions)
+            for i, symbol in enumerate(symbols)
+        }
         self.rates = [rate + found.get(k, 0) for k, rate in enumerate(self.rates)]
         return found
+
+    def _change(self, expression: sp.Expr, direction: int) -> sp.Expr:
+        """How fast an expression in constants and state changes with the constants, at a given state."""
+
+        def explicit(e: sp.Expr) -> sp.Expr:
+            known = [*self.constants.symbols.values(), *self.varied_inputs]
+            return sp.Add(*(sp.diff(e, c) * self.constants.rate_of(c, direction) for c in known if e.has(c)))
+
+        added = explicit(expression)
+        if self.reduction.residual is not None and self.reduction.unknown is not None:
+            residual, unknown = self._fixed(self.reduction.residual), self.reduction.unknown
+            added -= sp.diff(expression, unknown) * explicit(residual) / sp.diff(residual, unknown)
+        return added
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
         """An entry of the Jacobian, with what changing constants add."""
@@ -178,7 +183,8 @@ class KernelText:
             "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
             "FAILURES": 1, "ERROR": 1,
             "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
-            "SETTLED": 1, "SAME": 1, "SLIPPING": 1, "RESTING": 1, "TALLY": 24, "CONSTANT": len(self.constants.all),
+            "SETTLED": 1, "SAME": 1, "SLIPPING": 1, "RESTING": 1, "TALLY": 24, **self._further_rows(),
+            "CONSTANT": len(self.constants.all),
         }  # fmt: skip
         if choice.dense:
             groups |= {"OLD": n, "STAGE": n * self.method.stages, "DONE": 1, "TAU_OLD": 1, "OUT_OLD": 3}
@@ -188,6 +194,9 @@ class KernelText:
             self.rows[name] = position
             position += count
         self.row_count = position
+
+    def _further_rows(self) -> dict[str, int]:
+        return {}
 
     def cell(self, name: str, offset: int = 0) -> str:
         """Text of one quantity of lane l."""
@@ -258,7 +267,7 @@ class KernelText:
         for i in range(n):
             lines += [f"scaled = e{i}/(atol{i} + rtol*max(abs(b{i}), abs(y{i})))", "error += scaled*scaled"]
         lines += [
-            f"error = error*{1 / n!r}",
+            f"error = error*{1 / self.counted!r}",
             "good = error <= 1.0",
             "size = log(min(max(error, 1e-10), 1e30))",
             f"earlier = {self.cell('ERROR')}",

@@ -60,9 +60,10 @@ class Reduction:
         v, acceleration, sigma, tau, T and the memory variables.
     w_of_v : sympy.Expr
         The velocity variable from v and the memory.
-    direction : tuple of sympy.Symbol
-        State variables (see `steadyslip.compiled.variational`) that answer to a change of the constants; the
-        kernel adds that to their `rates`, in the order of the first variables of `state`.
+    directions : tuple of tuple of sympy.Symbol
+        State variables (see `steadyslip.compiled.variational`) that answer to changes of the constants, one tuple
+        for each independent change; the kernel adds that to their `rates`, in the order of the first variables
+        of `state`.
     """
 
     model: Model
@@ -78,7 +79,7 @@ class Reduction:
     restored: tuple[sp.Expr, ...]
     outputs: dict[str, sp.Expr]
     w_of_v: sp.Expr
-    direction: tuple[sp.Symbol, ...] = ()
+    directions: tuple[tuple[sp.Symbol, ...], ...] = ()
 
     @property
     def inputs(self) -> tuple[sp.Symbol, ...]:

@@ -7,9 +7,10 @@ subexpressions of the rest are computed once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -86,7 +87,7 @@ class Constants:
     def __init__(self, variables: Iterable[sp.Symbol]) -> None:
         self.variables = frozenset(variables)
         self.symbols: dict[sp.Expr, sp.Symbol] = {}
-        self.rates: dict[sp.Symbol, sp.Symbol] = {}
+        self.rates: dict[tuple[sp.Symbol, int], sp.Symbol] = {}
         self._seen: dict[sp.Expr, sp.Expr] = {}
 
     def lifted(self, expression: sp.Expr) -> sp.Expr:
@@ -124,9 +125,29 @@ class Constants:
         """Every constant, then the rates of change of some."""
         return [*self.symbols.values(), *self.rates.values()]
 
-    def rate_of(self, constant: sp.Symbol) -> sp.Symbol:
-        """A further constant: how fast `constant` changes with something that the caller varies."""
-        return self.rates.setdefault(constant, sp.Symbol(f"{constant}_rate", real=True))
+    def rate_of(self, constant: sp.Symbol, direction: int) -> sp.Symbol:
+        """A further constant: how fast `constant` changes with one of the things that the caller varies."""
+        return self.rates.setdefault((constant, direction), sp.Symbol(f"{constant}_rate_{direction}", real=True))
+
+    def with_rates(self, found: np.ndarray, rates: np.ndarray, inputs: Mapping[sp.Symbol, np.ndarray]) -> np.ndarray:
+        """Rows of all constants, from those of the constants and of their rates of change.
+
+        Parameters
+        ----------
+        found : ndarray (rigs, constants)
+        rates : ndarray (rigs, directions, constants)
+        inputs : mapping of symbol to ndarray (rigs, directions)
+            Rates of change of inputs, zero unless given.
+        """
+        order = {symbol: i for i, symbol in enumerate(self.symbols.values())}
+        table = np.zeros((len(found), len(self.all)))
+        table[:, : len(order)] = found
+        for column, (constant, direction) in enumerate(self.rates, start=len(order)):
+            if constant in order:
+                table[:, column] = rates[:, direction, order[constant]]
+            elif constant in inputs:
+                table[:, column] = inputs[constant][:, direction]
+        return table
 
     def function(self, arguments: Sequence[sp.Symbol]) -> Callable[..., list[Any]]:
         """A NumPy function from parameter values to the constants, not to their rates of change."""

@@ -1,8 +1,8 @@
 """A reduced Model together with its linearisation along the motion.
 
-Beside the state y, two things are integrated: the matrix S = ∂y(t)/∂y(0), S' = J(y) S, and the vector D = ∂y(t)/∂ε for
-constants c(ε) that change, D' = J(y) D + (∂f/∂c) c'. The result is a Reduction like any other, so that the same
-kernels, methods and step control serve cycles, their Floquet multipliers and their continuation.
+Beside the state y, further columns are integrated: S = ∂y(t)/∂y(0), S' = J(y) S, and for constants c(ε) that change
+in some direction, D = ∂y(t)/∂ε, D' = J(y) D + (∂f/∂c) c'. The result is a Reduction like any other, so that the
+same kernels, methods and step control serve cycles, their Floquet multipliers and continuation, and fits.
 """
 
 from __future__ import annotations
@@ -14,26 +14,43 @@ import sympy as sp
 
 from steadyslip.compiled.reduction import Reduction
 
+Column = tuple[sp.Symbol, ...]
+
 
 @lru_cache(maxsize=64)
 def with_sensitivities(reduction: Reduction) -> Reduction:
-    """The reduction whose state is y, then S column by column, then D."""
+    """The reduction whose state is y, then S column by column, then D in one direction."""
     n = len(reduction.state)
+    columns = tuple(_column(f"S_{k}", n) for k in range(n))
+    return _extended(reduction, columns, (_column("D", n),))
+
+
+@lru_cache(maxsize=64)
+def with_directions(reduction: Reduction, count: int) -> Reduction:
+    """The reduction whose state is y, then D in each of several directions."""
+    return _extended(reduction, (), tuple(_column(f"D_{k}", len(reduction.state)) for k in range(count)))
+
+
+def _column(name: str, size: int) -> Column:
+    return tuple(sp.Symbol(f"{name}_{i}", real=True) for i in range(size))
+
+
+def _extended(reduction: Reduction, free: tuple[Column, ...], driven: tuple[Column, ...]) -> Reduction:
+    """Add columns that follow the linearised equations, freely or driven by changing constants."""
     jacobian = reduction.jacobian()
-    columns = [[sp.Symbol(f"S_{i}_{k}", real=True) for i in range(n)] for k in range(n)]
-    columns.append([sp.Symbol(f"D_{i}", real=True) for i in range(n)])
-    rates = [
-        sp.Add(*(jacobian[i][j] * column[j] for j in range(n) if jacobian[i][j] != 0))
+    columns = free + driven
+    rates = tuple(
+        sp.Add(*(entry * variable for entry, variable in zip(row, column, strict=True) if entry != 0))
         for column in columns
-        for i in range(n)
-    ]
+        for row in jacobian
+    )
     extra = tuple(symbol for column in columns for symbol in column)
     return replace(
         reduction,
         state=reduction.state + extra,
         names=reduction.names + tuple(map(str, extra)),
         continuous=reduction.continuous + extra,
-        rates=reduction.rates + tuple(rates),
+        rates=reduction.rates + rates,
         restored=reduction.restored + extra,
-        direction=tuple(columns[-1]),
+        directions=driven,
     )

@@ -107,13 +107,15 @@ def run_many(
     threads: int | None = None,
     chunk: int = CHUNK,
     advanced: Callable[[int], None] | None = None,
+    lanes: int = LANES,
 ) -> bool:
     """Do `work` on consecutive chunks of jobs on all cores; False if Ctrl-C ended it early.
 
     At most two chunks per thread wait at any time, so that memory does not grow with the number of jobs.
     """
     count = threads or available_cores()
-    chunk = max(LANES, min(chunk, -(-size // (4 * count))))
+    chunk = max(lanes, min(chunk, -(-size // (4 * count))))
+    chunk = -(-chunk // lanes) * lanes
     stopped = threading.Event()
     starts = iter(range(0, size, chunk))
     pending: dict[Future[None], int] = {}

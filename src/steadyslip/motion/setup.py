@@ -118,7 +118,7 @@ class Jobs:
         """Constants, initial, settings and segment rows of some jobs."""
         arguments, sigma = self.part(start, stop)
         constants = machine.constants(arguments, sigma)
-        scales = _scales(self.reduction, arguments, sigma)
+        scales = natural_scales(self.reduction, arguments, sigma)
         rtol = self.options.rtol
         drive = dict(zip(self.values.model.parameters, arguments, strict=True))["drive.velocity"]
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
@@ -300,7 +300,7 @@ def _eliminable(values: Values, sigma: Any) -> int | None:
     return None
 
 
-def _scales(reduction: Reduction, arguments: tuple[Any, ...], sigma: Any) -> dict[str, Any]:
+def natural_scales(reduction: Reduction, arguments: tuple[Any, ...], sigma: Any) -> dict[str, Any]:
     """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance."""
     model = reduction.model
     numbers = _numbers(model, arguments, sigma)

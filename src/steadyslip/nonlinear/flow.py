@@ -171,10 +171,8 @@ class Flow:
             found = np.repeat(found, 2, axis=0)
         rates = (found[0] - found[1]) / (2 * DIFFERENCE)
         drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
-        table = self.sensitive.text.constants
-        named = dict(zip(table.symbols.values(), rates, strict=True))
-        named[V_LP] = (drive[0] - drive[1]) / (2 * DIFFERENCE)
-        return np.concatenate([constants[0], [named[c] for c in table.rates]])[None]
+        inputs = {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
+        return self.sensitive.text.constants.with_rates(constants, rates[None, None], inputs)
 
     def _varied(self, around: Array) -> Values:
         """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""

@@ -1,0 +1,112 @@
+"""The kernel that an experiment is compared with: friction, and its derivatives in several directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.compiled.build import compiled, interpreted
+from steadyslip.compiled.kernel import Choice
+from steadyslip.compiled.lockstep import LockstepText
+from steadyslip.compiled.reduction import Reduction, reduce_model
+from steadyslip.compiled.variational import with_directions
+from steadyslip.expressions import array_function
+from steadyslip.model import Model
+
+LANES = 8  # one vector of doubles: sensitivities fill the registers
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentProgram:
+    """One such kernel of one model.
+
+    Attributes
+    ----------
+    reduction : Reduction
+        Without sensitivities.
+    directions : int
+    method : str
+    """
+
+    reduction: Reduction
+    directions: int
+    method: str
+    plain: bool = False
+
+    @cached_property
+    def text(self) -> LockstepText:
+        friction = self.reduction.outputs["tau"] / self.reduction.outputs["sigma"]
+        extended = with_directions(self.reduction, self.directions)
+        choice = Choice(self.method, level="linear", lanes=1 if self.plain else LANES, dense=False)
+        return LockstepText(extended, choice, friction)
+
+    @cached_property
+    def module(self) -> ModuleType:
+        """Machine code, or plain Python if `plain`."""
+        return interpreted(self.text.text()) if self.plain else compiled(self.text.text())
+
+    @cached_property
+    def _parameters(self) -> list[sp.Symbol]:
+        model = self.reduction.model
+        return [*model.parameters.values(), model.sigma_ss]
+
+    @cached_property
+    def _start(self) -> list[sp.Expr]:
+        model = self.reduction.model
+        return [model.steady[symbol] for symbol in self.reduction.continuous]
+
+    @cached_property
+    def _values(self) -> Any:
+        constants = list(self.text.constants.symbols)
+        return array_function(self._parameters, [*constants, *self._start])
+
+    @cached_property
+    def _slopes(self) -> Any:
+        """Derivatives of constants and starting values in every parameter, σss following the parameters."""
+        model = self.reduction.model
+        expressions = [*self.text.constants.symbols, *self._start]
+        residual = model.steady_stress - model.sigma_ss
+        found = []
+        for symbol in model.parameters.values():
+            stress = -sp.diff(residual, symbol) / sp.diff(residual, model.sigma_ss)
+            for expression in expressions:
+                found.append(sp.diff(expression, symbol) + sp.diff(expression, model.sigma_ss) * stress)
+        return array_function(self._parameters, found)
+
+    def arrays(self, arguments: tuple[Any, ...], sigma: Any, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Constants with their rates of change, and starting states with theirs.
+
+        Parameters
+        ----------
+        arguments, sigma
+            Parameters of the model and steady normal stress, of every job.
+        chain : ndarray (jobs, directions, parameters)
+            How fast the parameters change in each direction.
+        """
+        jobs, directions, count = chain.shape
+        with np.errstate(all="ignore"):
+            values = _stacked(self._values(*arguments, sigma), jobs)
+            slopes = _stacked(self._slopes(*arguments, sigma), jobs).reshape(jobs, count, -1)
+        rates = np.matmul(chain, slopes)
+        table, size = self.text.constants, len(self.text.constants.symbols)
+        constants = table.with_rates(values[:, :size], rates[:, :, :size], {})
+        start = np.concatenate([values[:, None, size:], rates[:, :, size:]], axis=1)
+        return constants, np.ascontiguousarray(start.reshape(jobs, -1))
+
+
+def _stacked(columns: list[Any], jobs: int) -> np.ndarray:
+    table = np.empty((jobs, len(columns)))
+    for i, column in enumerate(columns):
+        table[:, i] = column
+    return table
+
+
+@lru_cache(maxsize=64)
+def experiment_program(model: Model, directions: int, method: str) -> ExperimentProgram:
+    """The kernel for a model; made once per process."""
+    return ExperimentProgram(reduce_model(model, None), directions, method)

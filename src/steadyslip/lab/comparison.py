@@ -1,0 +1,144 @@
+"""Records against the model: residuals and their derivatives in the free parameters, for many trials at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.lab.forward import Forward, Table
+from steadyslip.lab.inputs import ProtocolInputs
+from steadyslip.lab.record import Record
+from steadyslip.lab.unknowns import Space, Unknown
+from steadyslip.slider import Slider
+
+Array = np.ndarray
+LOSSES = ("linear", "soft-l1", "huber", "cauchy")
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One record and what it is compared with.
+
+    Attributes
+    ----------
+    record : Record
+    rig : Slider
+        As the record drives it: its own initial rate and normal stress.
+    forward : Forward
+    inputs : Table or ProtocolInputs
+    data : ndarray (n,)
+        What was observed.
+    weights : ndarray (n,)
+        One over the standard deviation of each sample, up to a common factor.
+    rig_places, time_places, trend_places : tuple of int
+        Where the parameters of rig, protocol and trend lie among the unknowns.
+    trend : ndarray (terms, n)
+        What multiplies the coefficients of the trend.
+    """
+
+    record: Record
+    rig: Slider
+    forward: Forward
+    inputs: Table | ProtocolInputs
+    data: Array
+    weights: Array
+    rig_places: tuple[int, ...]
+    time_places: tuple[int, ...]
+    trend_places: tuple[int, ...]
+    trend: Array
+
+    def table(self, values: Array) -> Table:
+        if isinstance(self.inputs, Table):
+            return self.inputs
+        return self.inputs.table({name: values[:, i] for name, i in zip(self.inputs.free, self.time_places, strict=True)})
+
+
+class Comparison:
+    """All records of a fit together.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+    space : Space
+    loss : str
+        ``linear`` (least squares) or a loss that outliers weigh less in.
+    width : float
+        Residual at which that begins.
+    """
+
+    def __init__(self, parts: tuple[Part, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
+        self.parts, self.space, self.loss, self.width = parts, space, loss, width
+        ends = np.cumsum([0, *(len(part.data) for part in parts)])
+        self.slices = tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        self.size = int(ends[-1])
+        self.data = np.concatenate([part.data for part in parts])
+        self.weights = np.concatenate([part.weights for part in parts])
+
+    def model(self, coordinates: Array) -> tuple[Array, Array]:
+        """What the model says, (m, n), and its derivatives, (m, p, n); not weighted."""
+        count = len(coordinates)
+        values, slopes = self.space.values(coordinates), self.space.slopes(coordinates)
+        seen = np.zeros((count, self.size))
+        jacobian = np.zeros((count, len(self.space), self.size))
+        for part, where in zip(self.parts, self.slices, strict=True):
+            places = list(part.rig_places)
+            found = part.forward.run(part.table(values), values[:, places], slopes[:, places])
+            seen[:, where] = found[:, 0]
+            for k, place in enumerate(places):
+                jacobian[:, place, where] = found[:, 1 + k]
+            for k, place in enumerate(part.time_places, start=len(places)):
+                jacobian[:, place, where] = found[:, 1 + k] * slopes[:, place, None]
+            for row, place in zip(part.trend, part.trend_places, strict=True):
+                seen[:, where] += values[:, place, None] * row
+                jacobian[:, place, where] = slopes[:, place, None] * row
+        return seen, jacobian
+
+    def residuals(self, coordinates: Array, data: Array | None = None) -> tuple[Array, Array]:
+        """Weighted residuals (data less model) and derivatives of the model, as the loss has them.
+
+        Parameters
+        ----------
+        coordinates : ndarray (m, p)
+        data : ndarray (m, n) or (n,), optional
+            Other data than the records' own.
+        """
+        seen, jacobian = self.model(coordinates)
+        r = (self.data if data is None else data) - seen
+        if np.any(self.weights != 1.0):
+            r *= self.weights
+            jacobian *= self.weights
+        if self.loss != "linear":
+            r, slope = lost(self.loss, r, self.width)
+            jacobian *= slope[:, None, :]
+        return r, jacobian
+
+
+def lost(loss: str, r: Array, width: float) -> tuple[Array, Array]:
+    """Residuals whose squares are the loss, and how fast they change with the residual itself."""
+    z = np.maximum((r / width) ** 2, 1e-20)
+    with np.errstate(all="ignore"):
+        if loss == "soft-l1":
+            rho, slope = 2 * (np.sqrt(1 + z) - 1), 1 / np.sqrt(1 + z)
+        elif loss == "huber":
+            root = np.sqrt(z)
+            rho, slope = np.where(z <= 1, z, 2 * root - 1), np.where(z <= 1, 1.0, 1 / root)
+        else:
+            rho, slope = np.log1p(z), 1 / (1 + z)
+        size = np.sqrt(rho)
+        return np.sign(r) * width * size, slope * np.sqrt(z) / size
+
+
+def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown]:
+    """Coefficients of a polynomial in the share of the record that has passed."""
+    names = (["offset"] if offset else []) + [f"trend.{k}" for k in range(1, order + 1)]
+    label = "" if record is None else f"@{record + 1}"
+    return [Unknown(f"{n}{label}", n, "1", record, False, 0.1, -np.inf, np.inf) for n in names]
+
+
+def trend_rows(record: Record, order: int, offset: bool, axis: str) -> Array:
+    """Powers of the share of displacement (or time) that has passed."""
+    along: Any = record.time if axis == "time" or record.displacement is None else record.displacement
+    share = (along - along[0]) / (along[-1] - along[0])
+    return np.array(([np.ones_like(share)] if offset else []) + [share**k for k in range(1, order + 1)]).reshape(-1, len(share))

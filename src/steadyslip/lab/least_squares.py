@@ -1,0 +1,148 @@
+"""Nonlinear least squares for many problems of one kind at once: Levenberg–Marquardt within bounds.
+
+Every lane is a problem of its own: other starts, other data (bootstrap), or other fixed values (profiles).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+Array = np.ndarray
+Residuals = Callable[[Array, Array], tuple[Array, Array]]
+"""From coordinates (m, p) and the lanes they belong to (m,): residuals (m, n) and their derivatives (m, p, n)."""
+
+CONVERGED = 1e-10  # reduction of the sum of squares that is still to be had, as a share of it
+STALLED = 1e-7  # the same, where no step succeeds any more: below this the sum is at its rounding
+STEEPEST = 1e10  # of the damping
+LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
+
+
+@dataclass
+class Minima:
+    """Where each problem ended.
+
+    Attributes
+    ----------
+    coordinates : ndarray (m, p)
+    ssq : ndarray (m,)
+        Sum of squares; inf where none could be computed.
+    converged : ndarray of bool (m,)
+    iterations : ndarray of int (m,)
+    """
+
+    coordinates: Array
+    ssq: Array
+    converged: Array
+    iterations: Array
+
+
+def minimise(
+    residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
+    tolerance: float = CONVERGED, race: bool = False,
+) -> Minima:  # fmt: skip
+    """Minimise the sum of squares of every problem.
+
+    Parameters
+    ----------
+    residuals : callable
+    start : ndarray (m, p)
+    low, high : ndarray (p,)
+        Bounds.
+    most : int
+        Iterations.
+    held : ndarray of bool (m, p), optional
+        Coordinates that stay where they are.
+    tolerance : float
+        Reduction still to be had, as a share of the sum, at which a problem is done.
+    race : bool
+        All problems are one, from several starts: once one is done, those that promise no better stop too.
+    """
+    count, size = start.shape
+    z = np.clip(start, low, high)
+    held = np.zeros((count, size), dtype=bool) if held is None else held
+    everyone = np.arange(count)
+    found = Minima(z.copy(), np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
+    r, jacobian = residuals(z, everyone)
+    ssq = _squares(r)
+    found.ssq[:] = ssq
+    normal, gradient = _normal(r, jacobian)
+    damping, scale = np.full(count, 1e-2), np.zeros((count, size))
+    active = everyone[np.isfinite(ssq)]
+    keep = np.isfinite(ssq)
+    normal, gradient = normal[keep], gradient[keep]
+    for iteration in range(1, most + 1):
+        if not len(active):
+            break
+        z = found.coordinates[active]
+        diagonal = np.einsum("mii->mi", normal)
+        scale[active] = np.maximum(scale[active] * 0.5, diagonal)
+        free = ~held[active] & ~(((z <= low) & (gradient < 0)) | ((z >= high) & (gradient > 0)))
+        promise = _promise(normal, gradient, free)
+        over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | (damping[active] > STEEPEST)
+        if race and np.any(found.converged):
+            over |= found.ssq[active] - promise > (1 - 1e-9) * np.min(found.ssq[found.converged])
+        if np.any(over):
+            ended = active[over]
+            found.converged[ended] = promise[over] <= STALLED * np.maximum(found.ssq[ended], 1e-300)
+            rest = ~over
+            active, normal, gradient, z, free = active[rest], normal[rest], gradient[rest], z[rest], free[rest]
+            if not len(active):
+                break
+        step = _step(normal, gradient, free, damping[active], scale[active])
+        step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
+        trial = np.clip(z + step, low, high)
+        taken = trial - z
+        expected = np.einsum("mi,mi->m", gradient, taken) * 2 - np.einsum("mi,mij,mj->m", taken, normal, taken)
+        r, jacobian = residuals(trial, active)
+        after = _squares(r)
+        good = after < found.ssq[active]
+        with np.errstate(all="ignore"):
+            ratio = np.where(expected > 0, (found.ssq[active] - after) / expected, 0.0)
+        factor = np.where(good, np.where(ratio > 0.75, 0.1, np.where(ratio > 0.25, 0.5, 2.0)), 5.0)
+        damping[active] = np.clip(damping[active] * factor, 1e-12, None)
+        better = active[good]
+        found.coordinates[better], found.ssq[better] = trial[good], after[good]
+        found.iterations[active] = iteration
+        if np.any(good):
+            normal[good], gradient[good] = _normal(r[good], jacobian[good])
+    return found
+
+
+def _squares(r: Array) -> Array:
+    with np.errstate(all="ignore"):
+        total = np.einsum("mn,mn->m", r, r)
+    return np.asarray(np.where(np.isfinite(total), total, np.inf))
+
+
+def _normal(r: Array, jacobian: Array) -> tuple[Array, Array]:
+    """JᵀJ and −Jᵀr, r being data minus model and J the model's derivative."""
+    return np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
+
+
+def _solved(normal: Array, gradient: Array, free: Array, extra: Array) -> Array:
+    """Solutions of (JᵀJ + extra) step = gradient in the free coordinates, scaled to a unit diagonal."""
+    size = normal.shape[1]
+    size_of = np.sqrt(np.maximum(np.einsum("mii->mi", normal) + extra, 1e-300))
+    matrix = normal / (size_of[:, :, None] * size_of[:, None, :])
+    mask = free[:, :, None] & free[:, None, :]
+    matrix = np.where(mask, matrix, 0.0)
+    step = np.arange(size)
+    matrix[:, step, step] = np.where(free, (np.einsum("mii->mi", normal) + extra) / size_of**2, 1.0)
+    matrix[:, step, step] += 1e-14
+    right = np.where(free, gradient / size_of, 0.0)
+    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0] / size_of)
+
+
+def _step(normal: Array, gradient: Array, free: Array, damping: Array, scale: Array) -> Array:
+    largest = np.max(scale, axis=1, keepdims=True)
+    return _solved(normal, gradient, free, damping[:, None] * np.maximum(scale, 1e-12 * largest))
+
+
+def _promise(normal: Array, gradient: Array, free: Array) -> Array:
+    """How much the sum of squares would fall if the problem were linear."""
+    largest = np.max(np.einsum("mii->mi", normal), axis=1, keepdims=True)
+    step = _solved(normal, gradient, free, 1e-12 * largest)
+    return np.einsum("mi,mi->m", step, np.where(free, gradient, 0.0))

@@ -57,9 +57,15 @@ class Estimate:
         return bool(np.isfinite(self.error))
 
     def __str__(self) -> str:
-        if not self.determined:
-            return f"{self.name} = {shown(self.value, self.unit)} (not determined)"
-        return f"{self.name} = {shown(self.value, self.unit)} ± {shown(self.error, self.unit, 2)}"
+        return f"{self.name} = {self.shown()}"
+
+    def shown(self) -> str:
+        """Value and error for people."""
+        if self.unit == "s":  # a time on the record's clock
+            value, error = f"{self.value:.7g} s", f"{self.error:.2g} s"
+        else:
+            value, error = shown(self.value, self.unit), shown(self.error, self.unit, 2)
+        return f"{value} ± {error}" if self.determined else f"{value} (not determined)"
 
 
 @dataclass(frozen=True)
@@ -106,6 +112,8 @@ class Fit:
         Of the coordinates; infinite where a parameter is not determined.
     unidentified : tuple of Combination
         What the records cannot tell.
+    bounds : tuple of two ndarray (p,)
+        Where the coordinates were searched.
     version : str
     """
 
@@ -116,6 +124,7 @@ class Fit:
     noise: tuple[Noise, ...] = field(repr=False)
     covariance: Array = field(repr=False)
     unidentified: tuple[Combination, ...]
+    bounds: tuple[Array, Array] = field(repr=False)
     version: str = field(repr=False)
 
     @cached_property
@@ -181,6 +190,18 @@ class Fit:
         """Every fitted parameter with its error."""
         return tuple(self[name] for name in self.names)
 
+    @cached_property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Parameters that ran to the end of what was searched, each in a sentence."""
+        low, high = self.bounds
+        found = []
+        for i, one in enumerate(self.space.unknowns):
+            for bound, word in ((low[i], "smallest"), (high[i], "largest")):
+                if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
+                    end = shown(float(one.value(bound)), one.unit)
+                    found.append(f"{one.name} ended at the {word} value that was searched, {end}")
+        return tuple(found)
+
     @property
     def samples(self) -> int:
         return self.comparison.size
@@ -235,21 +256,26 @@ class Fit:
         }
         return driven.with_values(own)
 
-    @cached_property
-    def deviance(self) -> float:
-        """−2 ln(likelihood) of the residuals, their correlation taken out, up to a constant."""
-        return sum(len(self.part(self.residuals, i)) * float(np.log(noise.innovation)) for i, noise in enumerate(self.noise))
-
     @property
     def aic(self) -> float:
         """Akaike's criterion; of fits to the same records the one with less is to be preferred."""
-        return self.deviance + 2 * len(self.space)
+        return self.criteria(self.noise)[0]
 
     @property
     def bic(self) -> float:
-        """Schwarz's criterion, with as many samples as are independent."""
-        independent = sum(len(self.part(self.residuals, i)) / noise.inflation for i, noise in enumerate(self.noise))
-        return self.deviance + len(self.space) * float(np.log(max(independent, 2.0)))
+        """Schwarz's criterion."""
+        return self.criteria(self.noise)[1]
+
+    def criteria(self, noise: Sequence[Noise]) -> tuple[float, float]:
+        """AIC and BIC, counting as many samples as are independent with a given noise."""
+        deviance = independent = 0.0
+        for i, one in enumerate(noise):
+            r = self.part(self.residuals * self.comparison.weights, i)
+            worth = len(r) / max(one.inflation, 1.0)
+            deviance += worth * float(np.log(np.mean(r**2)))
+            independent += worth
+        size = len(self.space)
+        return deviance + 2 * size, deviance + size * float(np.log(max(independent, 2.0)))
 
     def __str__(self) -> str:
         from steadyslip.lab.words import words
@@ -294,6 +320,7 @@ def fit(
     *,
     fixed: Sequence[str] = (),
     separate: Sequence[str] = (),
+    drive: str = "measured",
     protocol: Any = None,
     trend: int = 0,
     trend_axis: str = "displacement",
@@ -325,6 +352,9 @@ def fit(
         Parameters that keep the rig's value.
     separate : sequence of str, optional
         Free parameters that every record has to itself; all others are shared.
+    drive : str, optional
+        ``measured``: the load point moves as measured, exactly at the samples; ``smoothed``: along straight lines
+        between the places where the measured displacement changes its slope, without the noise of its sensor.
     protocol : Protocol, Piece or sequence of Piece, optional
         What moves the load point, on the records' clock, instead of the measured displacement.
     trend : int, optional
@@ -359,22 +389,22 @@ def fit(
         If the model cannot follow the records from any start.
     """
     plan = make_plan(
-        rig, records, free, fixed=fixed, separate=separate, protocol=protocol, trend=trend, trend_axis=trend_axis,
-        offset=offset, loss=loss, width=width, weights=weights,
+        rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
+        trend_axis=trend_axis, offset=offset, loss=loss, width=width, weights=weights,
     )  # fmt: skip
     if errors not in ERRORS:
         raise ParameterError([Problem("errors", unknown_name("choice", errors, ERRORS))])
     if not (isinstance(starts, int) and starts >= 1):
         raise ParameterError([Problem("starts", f"got {starts!r}; allowed: a whole number >= 1")])
     if plan.loss != "linear" and plan.width is None:
-        first, _ = _searched(replace(plan, loss="linear"), starts, threads)
+        first, _, _ = _searched(replace(plan, loss="linear"), starts, threads)
         comparison = replace(plan, loss="linear").comparison(threads)
         plan = check_width(plan, comparison.residuals(first.coordinates[:1])[0][0])
-    found, search = _searched(plan, starts, threads)
-    return _finished(plan, plan.comparison(threads), found.coordinates[0], search, errors)
+    found, search, bounds = _searched(plan, starts, threads)
+    return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
 
 
-def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Search]:
+def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Search, tuple[Array, Array]]:
     """The best minimum: many starts on few samples, the best of them on all."""
     space = plan.space()
     thin = _thinned(plan)
@@ -388,16 +418,36 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
             "the model cannot follow these records from any start; is the rig's law and drive that of the experiment?"
         )
     chosen = _distinct(rough, FINALISTS)
-    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, race=True)
+    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=True)
     order = np.argsort(found.ssq, kind="stable")
     best = found.ssq[order[0]]
     if not np.isfinite(best):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     others = sorted({round(float(s / best), 4) for s in found.ssq if np.isfinite(s) and s > best * (1 + 1e-4)})
     arrived = int(np.sum(rough.ssq <= rough.ssq[chosen[order[0]]] * (1 + 1e-2)))
+    found.coordinates = _ordered(found.coordinates, space)
     minima = Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
     search = Search(starts, arrived, tuple(others), int(minima.iterations[0]), bool(minima.converged[0]))
-    return minima, search
+    return minima, search, (low, high)
+
+
+def _ordered(coordinates: Array, space: Space) -> Array:
+    """States by rising slip distance, so that equal minima look equal."""
+    members: dict[tuple[str, str], dict[str, int]] = {}
+    for i, one in enumerate(space.unknowns):
+        if one.parameter.startswith("friction.states."):
+            _, _, number, last = one.parameter.split(".")
+            members.setdefault((str(one.record), number), {})[last] = i
+    found = coordinates.copy()
+    for label in dict.fromkeys(record for record, _ in members):
+        states = [places for (record, _), places in members.items() if record == label]
+        if len(states) < 2 or any(set(s) != set(states[0]) or "d_c" not in s for s in states):
+            continue
+        ranks = np.argsort(coordinates[:, [s["d_c"] for s in states]], axis=1)
+        for last in states[0]:
+            columns = [s[last] for s in states]
+            found[:, columns] = np.take_along_axis(coordinates[:, columns], ranks, axis=1)
+    return found
 
 
 def _thinned(plan: Plan) -> Plan:
@@ -422,7 +472,9 @@ def _distinct(rough: Minima, most: int) -> Array:
     return np.array(chosen)
 
 
-def _finished(plan: Plan, comparison: Comparison, z: Array, search: Search, errors: str) -> Fit:
+def finished(
+    plan: Plan, comparison: Comparison, z: Array, search: Search, errors: str, bounds: tuple[Array, Array]
+) -> Fit:
     """Errors and everything else that belongs to a minimum."""
     from steadyslip import __version__
 
@@ -439,4 +491,4 @@ def _finished(plan: Plan, comparison: Comparison, z: Array, search: Search, erro
         spread += noise.spread(rows[:, where])
     covariance, lost = combinations(information, spread, comparison.space)
     ssq = float(residuals @ residuals)
-    return Fit(plan, z, ssq, search, tuple(noises), covariance, lost, __version__)
+    return Fit(plan, z, ssq, search, tuple(noises), covariance, lost, bounds, __version__)

@@ -67,16 +67,20 @@ class Forward:
     shifts : int
         How many free times of the table there are besides.
     threads : int, optional
+    sensitive : bool
+        Whether derivatives are wanted.
     """
 
     def __init__(
-        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, threads: int | None = None
-    ) -> None:
+        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, threads: int | None = None,
+        sensitive: bool = True,
+    ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.threads = rig, tuple(names), rtol, shifts, threads
         own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
         self.model = model_values(rig, own).model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
-        self.program = experiment_program(self.model, len(names) + shifts, automatic_method(reduction))
+        self.directions = len(names) + shifts if sensitive else 0
+        self.program = experiment_program(self.model, self.directions, automatic_method(reduction))
 
     def values(self, parameters: Array) -> Values:
         """The model's parameters for rows of the free ones, (jobs, names)."""
@@ -85,7 +89,9 @@ class Forward:
     def _chain(self, parameters: Array, values: Values) -> Array:
         """How the model's parameters change with the free ones."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
-        chain = np.zeros((len(parameters), len(self.names) + self.shifts, len(order)))
+        chain = np.zeros((len(parameters), self.directions, len(order)))
+        if not self.directions:
+            return chain
         for i, name in enumerate(self.names):
             if name in order:
                 chain[:, i, order[name]] = 1.0
@@ -118,7 +124,7 @@ class Forward:
 
         Returns
         -------
-        ndarray (jobs, 1 + names + shifts, samples)
+        ndarray (jobs, 1 + directions, samples)
             Friction, then its derivatives; NaN from where a motion cannot be continued, or where there is no
             steady sliding to start from.
         """
@@ -126,7 +132,8 @@ class Forward:
         values = self.values(parameters)
         sigma = np.broadcast_to(np.asarray(steady_stress(values), dtype=float), (jobs,))
         chain = self._chain(parameters, values)
-        chain[:, : len(self.names)] *= units[:, :, None]
+        if self.directions:
+            chain[:, : len(self.names)] *= units[:, :, None]
         constants, start = self.program.arrays(values.arguments, sigma, chain)
         settings = self._settings(table, values, sigma, jobs)
         good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
@@ -155,12 +162,13 @@ class Forward:
         reduction = self.program.reduction
         scales = natural_scales(reduction, values.arguments, sigma)
         size = len(reduction.names)
-        settings = np.empty((jobs, 4 + size * (1 + len(self.names) + self.shifts)))
+        settings = np.empty((jobs, 4 + size * (1 + self.directions)))
         settings[:, 0] = self.rtol
         settings[:, 1] = 0.0
         settings[:, 2] = scales["z"]
         settings[:, 3] = MOST_STEPS * table.samples.shape[1] + 1000
         for i, name in enumerate(reduction.names):
             settings[:, 4 + i] = self.rtol * scales[name]
-            settings[:, 4 + size + i :: size] = (LOOSE * np.asarray(scales[name]) * np.ones(jobs))[:, None]
+            if self.directions:
+                settings[:, 4 + size + i :: size] = (LOOSE * np.asarray(scales[name]) * np.ones(jobs))[:, None]
         return settings

@@ -8,6 +8,7 @@ import numpy as np
 
 from steadyslip.lab.forward import Table
 from steadyslip.lab.record import Record
+from steadyslip.lab.steps import smoothed
 from steadyslip.protocol import Protocol, Segments, pack
 from steadyslip.records import parameters, twin
 
@@ -16,15 +17,19 @@ PER_PERIOD = 200  # rows per period of a sine wave, on which it becomes straight
 _SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
 
 
-def measured_table(record: Record, pressed: Array | None = None) -> Table:
-    """A record's own load point, and its change of normal stress (Pa), as straight lines between samples."""
+def measured_table(record: Record, pressed: Array | None = None, smooth: bool = False) -> Table:
+    """A record's own load point, and its change of normal stress (Pa), as straight lines between samples.
+
+    With `smooth` the load point moves without the noise of the measured displacement.
+    """
     time = record.time - record.time[0]
     rows = len(time) - 1
     segments = np.zeros((1, rows, 9))
     segments[0, :, 0], segments[0, :, 1] = time[:-1], time[1:]
     spacing = np.diff(time)
     assert record.displacement is not None
-    segments[0, :, 3] = np.diff(record.displacement) / spacing
+    displacement = smoothed(record.time, record.displacement) if smooth else record.displacement
+    segments[0, :, 3] = np.diff(displacement) / spacing
     if record.integrated and record.velocity is not None:  # the rate itself is the straight line
         segments[0, :, 3] = record.velocity[:-1]
         segments[0, :, 6] = np.diff(record.velocity) / spacing
@@ -61,12 +66,14 @@ class ProtocolInputs:
         self.free, self.directions = dict(free or {}), directions
         self._plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
 
-    def table(self, values: Mapping[str, Array]) -> Table:
+    def table(self, values: Mapping[str, Array], sensitive: bool = True) -> Table:
         """Tables for arrays of the free times, one job each."""
         if not self.free:
             return self._table(self._packed({}), None)
         jobs = len(next(iter(values.values())))
         segments = self._packed(values)
+        if not sensitive:
+            return self._table(segments, None, jobs)
         moved = {}
         for name, direction in self.free.items():
             ends = [self._packed({**values, name: values[name] + sign * _SHIFT}) for sign in (1.0, -1.0)]

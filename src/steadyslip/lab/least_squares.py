@@ -86,7 +86,7 @@ def minimise(
             over |= found.ssq[active] - promise > (1 - 1e-9) * np.min(found.ssq[found.converged])
         if np.any(over):
             ended = active[over]
-            found.converged[ended] = promise[over] <= STALLED * np.maximum(found.ssq[ended], 1e-300)
+            found.converged[ended] = promise[over] <= max(STALLED, tolerance) * np.maximum(found.ssq[ended], 1e-300)
             rest = ~over
             active, normal, gradient, z, free = active[rest], normal[rest], gradient[rest], z[rest], free[rest]
             if not len(active):

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
-from scipy.signal import lfilter
 
 Array = np.ndarray
 DETECTED = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise
@@ -47,13 +46,6 @@ class Noise:
         """How many correlated samples are worth one independent one, for slow changes."""
         total = self.covariance[0] + 2 * float(np.sum(self.covariance[1:]))
         return max(total / self.covariance[0], 1e-3)
-
-    def whitened(self, values: Array) -> Array:
-        """What is new in each sample of (..., n), scaled to unit variance."""
-        scale = 1 / np.sqrt(self.innovation)
-        if not len(self.coefficients):
-            return np.asarray(values * scale)
-        return np.asarray(lfilter(np.concatenate([[1.0], -self.coefficients]), [1.0], values, axis=-1) * scale)
 
     def spread(self, rows: Array) -> Array:
         """rows · C · rowsᵀ with C the covariance of all samples, for rows (p, n)."""

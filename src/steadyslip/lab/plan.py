@@ -23,6 +23,7 @@ from steadyslip.slider import Slider
 
 Array = np.ndarray
 AXES = ("displacement", "time")
+DRIVES = ("measured", "smoothed", "protocol")
 NEVER_FREE = ("drive.velocity", "slider.area", "friction.v_ref")
 
 
@@ -39,8 +40,10 @@ class Plan:
         Full names of the free parameters of the rig, and of free times ``protocol.pieces.1.at``.
     separate : tuple of str
         Those of them that every record has to itself.
+    drive : str
+        What moves the load point: the ``measured`` displacement, that ``smoothed``, or the ``protocol``.
     protocol : Protocol or None
-        What drives the load point, on the records' clock; the measured displacement unless given.
+        On the records' clock.
     trend : int
         Order of a polynomial that is added to friction.
     trend_axis : str
@@ -57,6 +60,7 @@ class Plan:
     records: tuple[Record, ...]
     free: tuple[str, ...]
     separate: tuple[str, ...] = ()
+    drive: str = "measured"
     protocol: Protocol | None = None
     trend: int = 0
     trend_axis: str = "displacement"
@@ -81,7 +85,7 @@ class Plan:
         if name.startswith("protocol."):
             assert self.protocol is not None
             address = parameters(self.protocol, "protocol.")[name]
-            return unknown(address, record, scale=float(np.median(np.diff(self.records[record or 0].time))))
+            return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)
 
     def comparison(self, threads: int | None = None) -> Comparison:
@@ -102,7 +106,7 @@ class Plan:
         forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads)
         inputs: Any
         if self.protocol is None:
-            inputs = measured_table(record, pressed)
+            inputs = measured_table(record, pressed, self.drive == "smoothed" and not record.integrated)
         else:
             free = {name: len(names) + k for k, name in enumerate(times)}
             own_stress = any(piece.channel == NORMAL_STRESS for piece in self.protocol.pieces)
@@ -165,7 +169,9 @@ def make_plan(
         options["weights"] = _checked_weights(weights, many, problems)
     if problems:
         raise ParameterError(problems)
-    plan = Plan(rig, many, tuple(names), tuple(apart), plan_protocol, **options)
+    if plan_protocol is not None:
+        options["drive"] = "protocol"
+    plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
     _check_records(plan)
     return plan
 
@@ -201,7 +207,7 @@ def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> lis
 
 def _bad_options(options: dict[str, Any]) -> list[Problem]:
     problems = []
-    choices = {"trend_axis": AXES, "loss": LOSSES}
+    choices = {"trend_axis": AXES, "drive": DRIVES[:2], "loss": LOSSES}
     for name, allowed in choices.items():
         if options.get(name, allowed[0]) not in allowed:
             problems.append(Problem(name, unknown_name("choice", options[name], allowed)))

@@ -56,12 +56,25 @@ class Step:
         return f"{self.kind} at {self.time:.6g} s: {values}{lasting}"
 
 
+def smoothed(time: Array, displacement: Array) -> Array:
+    """A displacement without its noise: straight between the places where its slope changes."""
+    from scipy.interpolate import LSQUnivariateSpline
+
+    ends = _split(time, displacement, _displacement_noise(displacement), linear=True)
+    knots = [float(time[i]) for i, _ in ends[1:]]
+    return np.asarray(LSQUnivariateSpline(time, displacement, knots, k=1)(time))
+
+
+def _displacement_noise(displacement: Array) -> float:
+    return max(_noise(np.diff(displacement, 2)) / np.sqrt(6.0), RESOLUTION * float(np.ptp(displacement)))
+
+
 def velocity_steps(time: Array, displacement: Array) -> tuple[Step, ...]:
     """Changes of the load-point rate: kinks of a displacement that is made of straight lines."""
     if len(time) < 2 * FEWEST:
         return ()
-    noise = max(_noise(np.diff(displacement, 2)) / np.sqrt(6.0), RESOLUTION * float(np.ptp(displacement)))
-    ends = _without_wander(time, displacement, _split(time, displacement, noise, linear=True))
+    ends = _split(time, displacement, _displacement_noise(displacement), linear=True)
+    ends = _without_wander(time, displacement, ends)
     rates = np.array([_line(time[i:j], displacement[i:j])[1] for i, j in ends])
     rest = AT_REST * float(np.max(np.abs(rates)))
     rates = np.where(np.abs(rates) < rest, 0.0, rates)

@@ -1,0 +1,134 @@
+"""A fit in words and as plain data."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.quantities import shown
+
+if TYPE_CHECKING:
+    from steadyslip.lab.fit import Fit
+
+WIDTH = 100
+
+
+def words(fit: Fit) -> str:
+    """Estimates, how good the fit is, and what to beware of."""
+    names = short_names(fit.names)
+    wide = max(len(name) for name in names)
+    rows = []
+    for name, one in zip(names, fit.estimates, strict=True):
+        interval = f"   95 %: {_end(one, one.low)} to {_end(one, one.high)}" if one.determined else ""
+        rows.append(f"  {name:<{wide}}  {one.shown()}{interval}")
+    sources = ", ".join(record.source for record in fit.plan.records)
+    friction = type(fit.plan.rig.friction).__name__
+    lines = [f"{friction} friction fitted to {fit.samples} samples of {sources}", *rows, "", *_quality(fit)]
+    for warning in warnings(fit):
+        lines += textwrap.wrap(f"! {warning}", WIDTH, subsequent_indent="  ")
+    return "\n".join(lines)
+
+
+def short_names(names: tuple[str, ...]) -> list[str]:
+    """Dotted names without middle parts, where that stays unique."""
+    found = []
+    for name in names:
+        first, *_, last = name.split(".")
+        brief = f"{first}.{last}" if first not in ("protocol",) and ".states." not in name else name
+        found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
+    return found
+
+
+def _end(one: Any, value: float) -> str:
+    return f"{value:.7g} s" if one.unit == "s" else shown(value, one.unit)
+
+
+def _quality(fit: Fit) -> list[str]:
+    search = fit.search
+    lag = max((noise.lag1 for noise in fit.noise), key=abs)
+    independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
+    reached = f"{search.arrived} of {search.starts} starts lead here"
+    if search.others:
+        reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
+    return [
+        f"residuals       rms {fit.rms:.3g}, sum of squares {fit.ssq:.6g}, lag-1 autocorrelation {lag:.2g}",
+        f"errors          one standard deviation, {independent}",
+        f"minimum         {reached}",
+    ]
+
+
+def warnings(fit: Fit) -> list[str]:
+    """What a reader must know before using the numbers."""
+    found = [str(one) for one in fit.unidentified]
+    if not fit.search.converged:
+        found.append("the search had not come to its end; treat the numbers as a rough fit")
+    close = [ratio for ratio in fit.search.others if ratio < 1.05]
+    if close:
+        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
+    found += list(fit.at_bounds)
+    if fit.plan.drive == "measured":
+        found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
+    return found
+
+
+def _noisy_drive(fit: Fit, part: Any) -> str | None:
+    """Whether the noise of the measured displacement moves the model about as much as the data scatter."""
+    from steadyslip.lab.steps import smoothed
+
+    record = part.record
+    if record.integrated or record.displacement is None:
+        return None
+    noise = float(np.std(record.displacement - smoothed(record.time, record.displacement)))
+    rig = fit.rig(0)
+    stiffness = rig.stiffness if rig.stiffness is not None else rig.axial_stiffness
+    if stiffness is None or record.normal is None:
+        return None
+    moved = noise * stiffness / float(record.normal[0])
+    if moved < 0.3 * fit.rms:
+        return None
+    return (
+        f"{record.source}: the load point is measured to {shown(noise, 'm')} only, which moves the model by {moved:.2g} in "
+        "friction; that makes the stiffness come out too low; compare with drive='smoothed'"
+    )
+
+
+def as_dict(fit: Fit) -> dict[str, Any]:
+    """SI units; what does not exist is None."""
+    return {
+        "version": fit.version,
+        "records": [record.source for record in fit.plan.records],
+        "samples": fit.samples,
+        "parameters": {
+            e.name: {
+                "value": e.value,
+                "error": e.error if e.determined else None,
+                "low": e.low if np.isfinite(e.low) and e.determined else None,
+                "high": e.high if np.isfinite(e.high) and e.determined else None,
+                "unit": e.unit,
+                "determined": e.determined,
+            }
+            for e in fit.estimates
+        },
+        "correlation": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.correlation],
+        "ssq": fit.ssq,
+        "rms": fit.rms,
+        "lag1": [noise.lag1 for noise in fit.noise],
+        "correlated": fit.correlated,
+        "aic": fit.aic,
+        "bic": fit.bic,
+        "search": {
+            "starts": fit.search.starts,
+            "arrived": fit.search.arrived,
+            "other_minima": list(fit.search.others),
+            "iterations": fit.search.iterations,
+            "converged": fit.search.converged,
+        },
+        "unidentified": [
+            {"weights": one.weights, "deviation": one.deviation if np.isfinite(one.deviation) else None}
+            for one in fit.unidentified
+        ],
+        "warnings": warnings(fit),
+        "notes": {record.source: list(record.notes) for record in fit.plan.records},
+    }

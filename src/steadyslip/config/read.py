@@ -96,14 +96,28 @@ def read_text(
     if not text.strip():
         names = ", ".join(f"[{section.name}]" for section in sections())
         raise _failed(source, f"is empty; a rig file has the tables {names}")
+    tables, lines, problems = parsed(text, source, changes)
+    return from_tables(tables, lines, source, problems, rig_needed)
+
+
+def parsed(text: str, source: str, changes: Iterable[str]) -> tuple[Table, dict[str, int], list[Problem]]:
+    """The tables of a text with changes made, the lines of their keys, and what is wrong with the changes."""
     try:
         tables = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise _failed(source, f"is not TOML: {error}") from error
-    reader = Reader(tables)
-    lines = key_lines(text)
+    lines, problems = key_lines(text), []
     for change in [changes] if isinstance(changes, str) else changes:
-        reader.problems += apply(change, tables, lines)
+        problems += apply(change, tables, lines)
+    return tables, lines, problems
+
+
+def from_tables(
+    tables: Table, lines: dict[str, int], source: str, problems: list[Problem], rig_needed: bool = True
+) -> tuple[Slider | None, Protocol | None]:
+    """The rig and the protocol that tables describe, as `read_text`; `problems` are reported with theirs."""
+    reader = Reader(tables)
+    reader.problems += problems
     alone = not rig_needed and set(tables) == {PROTOCOL.name}
     rig = None if alone else reader.rig()
     protocol = reader.protocol()

@@ -1,0 +1,343 @@
+"""The file that says how to fit: a rig file in which what is to be fitted may be missing, and two more tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from typing import Any
+
+from steadyslip.config.lines import line_of
+from steadyslip.config.read import from_tables, parsed, text_of
+from steadyslip.errors import NotAvailable, ParameterError, Problem, RigFileError, unknown_name
+from steadyslip.lab.columns import ROLES
+from steadyslip.lab.compare import Comparison, compare_laws
+from steadyslip.lab.fit import Fit, fit
+from steadyslip.lab.plan import AXES, DRIVES
+from steadyslip.lab.record import Record, read_record
+from steadyslip.lab.starts import STARTS
+from steadyslip.protocol import Protocol
+from steadyslip.records import checked_number, Parameter, positive
+from steadyslip.slider import Slider
+
+RECORD_KEYS = (*ROLES, "area", "normal_stress", "table", "between", "skip_bad_lines", "decimate")
+FIT_KEYS = ("free", "fixed", "separate", "states", "trend", "trend_axis", "offset", "drive", "loss", "width", "errors",
+            "starts", "windows", "compare")  # fmt: skip
+_STANDING = {
+    "friction.a": 0.01,
+    "friction.b": 0.01,
+    "friction.d_c": 1e-5,
+    "friction.mu_ref": 0.6,
+    "slider.stiffness": 1e10,
+}
+"""Values that stand for parameters that a file leaves to the fit; they have no influence."""
+_SETTINGS = {"friction.v_ref": 1e-6, "drive.velocity": 1e-6, "contact.steady_normal_stress": 1e6}
+"""The same for what each record determines."""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """How to read records and what to fit to them.
+
+    Attributes
+    ----------
+    rig : Slider
+    protocol : Protocol or None
+    record : dict
+        Arguments of `read_record`, and ``decimate``.
+    options : dict
+        Arguments of `fit`.
+    laws : tuple of str
+        Laws to compare; none unless asked for.
+    windows : bool
+        Whether every step of a record is a record of its own.
+    v_ref_given : bool
+        Whether the file says at which rate mu_ref holds; the rate at the start of the first record unless given.
+    """
+
+    rig: Slider
+    protocol: Protocol | None = None
+    record: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
+    laws: tuple[str, ...] = ()
+    windows: bool = False
+    v_ref_given: bool = False
+
+    def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
+        """Read a record as the file says."""
+        options = dict(self.record)
+        decimate = options.pop("decimate", None)
+        options["skip_bad_lines"] = skip_bad_lines or options.get("skip_bad_lines", False)
+        record = read_record(path, **options)
+        return record if decimate is None else record.decimated(decimate)
+
+    def fit(self, records: Sequence[Record], **changes: Any) -> Fit:
+        """Fit the records as the file says."""
+        rig, parts = self._for(records)
+        return fit(rig, parts, **self.options, protocol=self.protocol, **changes)
+
+    def compare(self, records: Sequence[Record], **changes: Any) -> Comparison:
+        """Fit all laws that the file lists."""
+        rig, parts = self._for(records)
+        options = {k: v for k, v in self.options.items() if k not in ("free", "separate")}
+        return compare_laws(rig, parts, self.laws, **options, protocol=self.protocol, **changes)
+
+    def _for(self, records: Sequence[Record]) -> tuple[Slider, tuple[Record, ...]]:
+        parts = tuple(w for r in records for w in (r.windows() if self.windows else (r,)))
+        rate = parts[0].initial_rate
+        known = "friction.v_ref" in self.rig.parameters()
+        if self.v_ref_given or not known or not rate or not rate > 0:
+            return self.rig, parts
+        return self.rig.with_values({"friction.v_ref": rate}), parts
+
+
+def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
+    """Read the file of a fit.
+
+    It is a rig file. What is to be fitted may be missing: a, b, d_c, α, mu_ref, the stiffness; so may what records
+    determine: contact, drive, v_ref. The table ``[record]`` says how to read records, ``[fit]`` what to fit.
+
+    Parameters
+    ----------
+    path : path
+    changes : iterable of str
+        Values that replace or complete those of the file, as ``"fit.trend=2"``.
+
+    Raises
+    ------
+    RigFileError
+        Listing everything that is wrong.
+    """
+    return spec_from_text(text_of(path), str(path), changes)
+
+
+def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec:
+    """Read the text of such a file; see `read_spec`."""
+    tables, lines, problems = parsed(text, source, ())
+    own, others = _sorted_changes(changes)
+    record = _table(tables, "record", RECORD_KEYS, problems)
+    options = _table(tables, "fit", FIT_KEYS, problems)
+    for target, name, raw in own:
+        (record if target == "record" else options)[name] = raw
+    for target, found, keys in (("record", record, RECORD_KEYS), ("fit", options, FIT_KEYS)):
+        problems += [Problem(f"{target}.{k}", unknown_name("key", k, keys)) for k in found if k not in keys]
+    problems += _checked_record(record) + _checked_fit(options)
+    v_ref_given = isinstance(tables.get("friction"), dict) and "v_ref" in tables["friction"]
+    missing = _completed(tables, options.pop("states", None), problems)
+    from steadyslip.config.changes import apply
+
+    for change in others:
+        problems += apply(change, tables, lines)
+        missing.discard(change.partition("=")[0].strip())
+    try:
+        rig, protocol = from_tables(tables, lines, source, [])
+    except RigFileError as error:
+        raise RigFileError([*_placed(problems, lines), *error.problems], title=source) from None
+    if problems:
+        raise RigFileError(_placed(problems, lines), title=source)
+    assert rig is not None
+    laws = options.pop("compare", ())
+    windows = options.pop("windows", False)
+    if "free" not in options and missing:
+        options["free"] = sorted(name for name in missing if name in rig.parameters())
+        if "friction.mu_ref" not in missing and "friction.mu_ref" in rig.parameters():
+            options["fixed"] = [*options.get("fixed", []), "friction.mu_ref"]
+    return Spec(rig, protocol, record, options, tuple(laws), windows, v_ref_given)
+
+
+def default_spec(evolution: str = "slip") -> Spec:
+    """One-state rate-and-state friction at the measured normal stress, everything free."""
+    return spec_from_text(f"[friction]\nevolution = {evolution!r}\n", "default")
+
+
+def lab_rig(
+    evolution: str = "slip", *, states: int = 1, normal_memory: str = "none", stiffness: Any = None, v_ref: Any = "1 um/s"
+) -> Slider:
+    """A rig for fits: rate-and-state friction in a press, whose numbers stand for what is to be fitted.
+
+    Parameters
+    ----------
+    evolution : str
+        ``slip``, ``aging`` or ``prz``.
+    states : int
+    normal_memory : str
+        ``none``, ``linker-dieterich`` or ``prakash-clifton``.
+    stiffness : float or str, optional
+        Of the machine, Pa/m, where it is known; name it in ``fixed`` of `fit`.
+    v_ref : float or str
+        Rate at which mu_ref holds.
+    """
+    text = f"[friction]\nevolution = {evolution!r}\nv_ref = {v_ref!r}\n[friction.normal_memory]\nlaw = {normal_memory!r}\n"
+    spec = spec_from_text(f"{text}[fit]\nstates = {states}\n", "lab_rig")
+    if stiffness is None:
+        return spec.rig
+    value = checked_number(Parameter("Pa/m", positive, "stiffness"), stiffness)
+    return replace(spec.rig, stiffness=value)
+
+
+def _sorted_changes(changes: Iterable[str]) -> tuple[list[tuple[str, str, Any]], list[str]]:
+    """Changes of the tables of a fit, and those of the rig."""
+    from steadyslip.config.changes import value_of
+
+    own, others = [], []
+    for change in [changes] if isinstance(changes, str) else changes:
+        name, equals, raw = (part.strip() for part in change.partition("="))
+        target, _, key = name.partition(".")
+        if target in ("record", "fit") and equals and key:
+            own.append((target, key, value_of(raw)))
+        else:
+            others.append(change)
+    return own, others
+
+
+def _table(tables: dict[str, Any], name: str, keys: Sequence[str], problems: list[Problem]) -> dict[str, Any]:
+    raw = tables.pop(name, {})
+    if not isinstance(raw, dict):
+        problems.append(Problem(name, f"got {raw!r}; allowed: a table [{name}]"))
+        return {}
+    return dict(raw)
+
+
+def _checked_record(record: dict[str, Any]) -> list[Problem]:
+    problems = []
+    between = record.get("between")
+    if between is not None and not (isinstance(between, list) and len(between) == 2):
+        problems.append(Problem("record.between", f"got {between!r}; allowed: [start, end] in s"))
+    count = record.get("decimate")
+    if count is not None and not (isinstance(count, int) and count >= 50):
+        problems.append(Problem("record.decimate", f"got {count!r}; allowed: a whole number >= 50"))
+    skip = record.get("skip_bad_lines", False)
+    if not isinstance(skip, bool):
+        problems.append(Problem("record.skip_bad_lines", f"got {skip!r}; allowed: true or false"))
+    return problems
+
+
+def _checked_fit(options: dict[str, Any]) -> list[Problem]:
+    """Kinds of values; what they mean is checked by the fit itself."""
+    problems = []
+    for name in ("free", "fixed", "separate", "compare"):
+        value = options.get(name)
+        if isinstance(value, str):
+            options[name] = [value]
+        elif value is not None and not (isinstance(value, list) and all(isinstance(x, str) for x in value)):
+            problems.append(Problem(f"fit.{name}", f"got {value!r}; allowed: a list of names"))
+    for name, allowed in (("trend_axis", AXES), ("drive", DRIVES[:2])):
+        if options.get(name, allowed[0]) not in allowed:
+            problems.append(Problem(f"fit.{name}", unknown_name("choice", options[name], allowed)))
+    for name, least, default in (("trend", 0, 0), ("starts", 1, STARTS), ("states", 1, 1)):
+        value = options.get(name, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            problems.append(Problem(f"fit.{name}", f"got {value!r}; allowed: a whole number >= {least}"))
+    for name in ("offset", "windows"):
+        if not isinstance(options.get(name, False), bool):
+            problems.append(Problem(f"fit.{name}", f"got {options[name]!r}; allowed: true or false"))
+    return problems
+
+
+def _completed(tables: dict[str, Any], states: Any, problems: list[Problem]) -> set[str]:
+    """Put values where the file has none, and say which of them are to be fitted."""
+    friction = tables.setdefault("friction", {})
+    if not isinstance(friction, dict):
+        return set()
+    friction.setdefault("law", "rate-state")
+    tables.setdefault("contact", {"law": "constant"})
+    tables.setdefault("drive", {})
+    tables.setdefault("slider", {})
+    missing: set[str] = set()
+    if any(not isinstance(tables[name], dict) for name in ("contact", "drive", "slider")):
+        return missing
+    if friction["law"] == "rate-state":
+        missing |= _completed_friction(friction, states, problems)
+    elif isinstance(states, int) and states > 1:
+        problems.append(Problem("fit.states", f"got {states!r}; the law {friction['law']!r} has no number of states"))
+    slider, drive, contact = tables["slider"], tables["drive"], tables["contact"]
+    if not {"stiffness", "axial_stiffness"} & set(slider) and not drive.get("kp"):
+        slider["stiffness"] = _STANDING["slider.stiffness"]
+        missing.add("slider.stiffness")
+    drive.setdefault("velocity", _SETTINGS["drive.velocity"])
+    if contact.get("law") == "constant" and not {"preload", "steady_normal_stress"} & set(contact):
+        contact["steady_normal_stress"] = _SETTINGS["contact.steady_normal_stress"]
+    return missing
+
+
+def _completed_friction(friction: dict[str, Any], states: Any, problems: list[Problem]) -> set[str]:
+    missing: set[str] = set()
+
+    def complete(table: dict[str, Any], key: str, name: str, value: float) -> None:
+        if key not in table:
+            table[key] = value
+            missing.add(name)
+
+    friction.setdefault("v_ref", _SETTINGS["friction.v_ref"])
+    complete(friction, "a", "friction.a", _STANDING["friction.a"])
+    complete(friction, "mu_ref", "friction.mu_ref", _STANDING["friction.mu_ref"])
+    members = friction.get("states")
+    if members is None and isinstance(states, int) and states > 1:
+        if {"b", "d_c"} & set(friction):
+            problems.append(Problem("fit.states", "friction has b or d_c of a single state; leave them away"))
+            return missing
+        members = friction["states"] = [{} for _ in range(states)]
+    if isinstance(members, list) and all(isinstance(member, dict) for member in members):
+        for i, member in enumerate(members, start=1):
+            complete(member, "b", f"friction.states.{i}.b", _STANDING["friction.b"] / i)
+            complete(member, "d_c", f"friction.states.{i}.d_c", _STANDING["friction.d_c"] * 10.0 ** (i - 1))
+    else:
+        complete(friction, "b", "friction.b", _STANDING["friction.b"])
+        complete(friction, "d_c", "friction.d_c", _STANDING["friction.d_c"])
+    memory = friction.get("normal_memory")
+    if memory == "linker-dieterich":
+        memory = friction["normal_memory"] = {"law": "linker-dieterich"}
+    if isinstance(memory, dict) and memory.get("law") == "linker-dieterich":
+        given = isinstance(members, list) and any("alpha" in m for m in members if isinstance(m, Mapping))
+        if not given:
+            complete(memory, "alpha", "friction.normal_memory.alpha", 0.3)
+    return missing
+
+
+def _placed(problems: Iterable[Problem], lines: dict[str, int]) -> list[Problem]:
+    return [Problem(p.name, p.message, p.line or line_of(p.name, lines)) for p in problems]
+
+
+def fit_files(
+    paths: Sequence[str | PathLike[str]], spec: str | PathLike[str] | None = None, changes: Iterable[str] = (),
+    *, skip_bad_lines: bool = False,
+) -> tuple[Fit, Comparison | None]:  # fmt: skip
+    """Read records and fit them, as the command line does.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Records, fitted together.
+    spec : path, optional
+        The file of the fit; one-state slip law at the measured normal stress unless given.
+    changes : iterable of str
+        As for `read_spec`.
+    skip_bad_lines : bool
+
+    Returns
+    -------
+    fit : Fit
+        The best, where laws are compared.
+    comparison : Comparison or None
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong with the files: of all records, and of the file of the fit.
+    """
+    text = "[friction]\n" if spec is None else text_of(spec)
+    plan = spec_from_text(text, "default" if spec is None else str(spec), changes)
+    records, faults = [], []
+    for path in paths:
+        try:
+            records.append(plan.read(path, skip_bad_lines))
+        except (ParameterError, NotAvailable) as error:
+            faults.append(error)
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise NotAvailable("\n".join(map(str, faults)))
+    if plan.laws:
+        found = plan.compare(records)
+        return found.fits[found.best], found
+    return plan.fit(records), None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.lab.forward import Forward, Table
-from steadyslip.lab.inputs import ProtocolInputs
+from steadyslip.lab.inputs import MeasuredInputs, ProtocolInputs, Sharp
 from steadyslip.lab.record import Record
 from steadyslip.lab.unknowns import Space, Unknown
 from steadyslip.slider import Slider
@@ -28,13 +28,13 @@ class Part:
     rig : Slider
         As the record drives it: its own initial rate and normal stress.
     forward : Forward
-    inputs : Table or ProtocolInputs
+    inputs : MeasuredInputs or ProtocolInputs
     data : ndarray (n,)
         What was observed.
     weights : ndarray (n,)
         One over the standard deviation of each sample, up to a common factor.
     rig_places, time_places, trend_places : tuple of int
-        Where the parameters of rig, protocol and trend lie among the unknowns.
+        Where the parameters of the rig, free times and the trend lie among the unknowns.
     trend : ndarray (terms, n)
         What multiplies the coefficients of the trend.
     """
@@ -42,7 +42,7 @@ class Part:
     record: Record
     rig: Slider
     forward: Forward
-    inputs: Table | ProtocolInputs
+    inputs: MeasuredInputs | ProtocolInputs
     data: Array
     weights: Array
     rig_places: tuple[int, ...]
@@ -51,10 +51,9 @@ class Part:
     trend: Array
 
     def table(self, values: Array, sensitive: bool = True) -> Table:
-        if isinstance(self.inputs, Table):
-            return self.inputs
-        times = {name: values[:, i] for name, i in zip(self.inputs.free, self.time_places, strict=True)}
-        return self.inputs.table(times, sensitive)
+        first = len(self.rig_places)
+        directions = first + len(self.time_places) if sensitive else 0
+        return self.inputs.table(values[:, list(self.time_places)], first, directions)
 
     @cached_property
     def plain(self) -> Forward:
@@ -151,6 +150,15 @@ def lost(loss: str, r: Array, width: float) -> tuple[Array, Array]:
             rho, slope = np.log1p(z), 1 / (1 + z)
         size = np.sqrt(rho)
         return np.sign(r) * width * size, slope * np.sqrt(z) / size
+
+
+def jump_unknowns(record: int | None, sharp: Sharp) -> list[Unknown]:
+    """When, between two samples, something jumped."""
+    label = "" if record is None else f"@{record + 1}"
+    return [
+        Unknown(f"jump.{k}{label}", f"jump.{k}", "s", record, False, late - early, early, late)
+        for k, (early, late) in enumerate(sharp.jumps, start=1)
+    ]
 
 
 def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown]:

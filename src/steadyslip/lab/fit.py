@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.lab.comparison import Comparison
-from steadyslip.lab.identify import Combination, combinations
+from steadyslip.lab.identify import Combination, combinations, prior_information
 from steadyslip.lab.least_squares import Minima, minimise
 from steadyslip.lab.noise import Noise, describe, white
 from steadyslip.lab.plan import Plan, check_width, make_plan
@@ -196,6 +196,8 @@ class Fit:
         low, high = self.bounds
         found = []
         for i, one in enumerate(self.space.unknowns):
+            if one.parameter.startswith("jump."):  # bounded by the samples on both sides
+                continue
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
                     end = shown(float(one.value(bound)), one.unit)
@@ -252,7 +254,7 @@ class Fit:
         own = {
             one.parameter: self.values[one.name]
             for one in self.space.unknowns
-            if one.record in (None, record) and not one.parameter.startswith(("protocol.", "trend.", "offset"))
+            if one.record in (None, record) and one.parameter in driven.parameters()
         }
         return driven.with_values(own)
 
@@ -453,7 +455,10 @@ def _ordered(coordinates: Array, space: Space) -> Array:
 def _thinned(plan: Plan) -> Plan:
     """The same plan on few samples of every record."""
     count = max(THIN // len(plan.records), 100)
-    rows = [transient_rows(r, count) if len(r) > count else np.arange(len(r)) for r in plan.records]
+    rows = []
+    for record, sharp in zip(plan.records, plan.sharp, strict=True):
+        few = transient_rows(record, count) if len(record) > count else np.arange(len(record))
+        rows.append(np.union1d(few, sharp.rows(record.time)))
     thin = tuple(r._taken(k, "thinned") for r, k in zip(plan.records, rows, strict=True))
     weights = None if plan.weights is None else tuple(w[k] for w, k in zip(plan.weights, rows, strict=True))
     return replace(plan, records=thin, weights=weights)
@@ -489,6 +494,8 @@ def finished(
         noise = white(own, share) if errors == "independent" else describe(own, share, errors == "correlated")
         noises.append(noise)
         spread += noise.spread(rows[:, where])
-    covariance, lost = combinations(information, spread, comparison.space)
+    known = prior_information(comparison.space)
+    scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
+    covariance, lost = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
     ssq = float(residuals @ residuals)
     return Fit(plan, z, ssq, search, tuple(noises), covariance, lost, bounds, __version__)

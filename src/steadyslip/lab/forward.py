@@ -49,9 +49,13 @@ class Table:
 
     def part(self, rows: Array | slice) -> Table:
         """That of some jobs."""
-        if len(self.segments) == 1:
-            return self
-        return Table(self.segments[rows], self.samples[rows], self.count, self.node_rates[rows], self.input_rates[rows])
+
+        def own(array: Array) -> Array:
+            return array if len(array) == 1 else np.ascontiguousarray(array[rows])
+
+        return Table(
+            own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates)
+        )
 
 
 class Forward:

@@ -11,6 +11,7 @@ from steadyslip.lab.unknowns import Space
 Array = np.ndarray
 UNDETERMINED = 0.5  # standard deviation along a direction, in e-folds or natural sizes
 MENTIONED = 0.15  # weight in a direction from which on a parameter is named
+FELT = 0.1  # the same, of its change along one standard deviation
 NOTHING = 1e-13  # share of the largest information that is rounding
 
 
@@ -82,5 +83,15 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
 
 def _named(direction: Array, deviation: float, space: Space) -> Combination:
     weights = direction / direction[np.argmax(np.abs(direction))]
-    order = [i for i in np.argsort(-np.abs(weights)) if abs(weights[i]) >= MENTIONED]
+    least = min(MENTIONED, max(FELT / deviation, 0.01))
+    order = [i for i in np.argsort(-np.abs(weights)) if abs(weights[i]) >= least]
     return Combination({space.unknowns[i].name: float(weights[i]) for i in order}, deviation)
+
+
+def prior_information(space: Space) -> Array:
+    """What is known of times between two samples beforehand: they lie between them, evenly likely."""
+    known = np.zeros((len(space), len(space)))
+    for i, one in enumerate(space.unknowns):
+        if one.parameter.startswith("jump."):
+            known[i, i] = 12.0  # one over the variance of a number between 0 and 1, which is the coordinate's unit
+    return known

@@ -2,41 +2,179 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from steadyslip.lab.forward import Table
 from steadyslip.lab.record import Record
-from steadyslip.lab.steps import smoothed
+from steadyslip.lab.steps import LEAST_RATE, LEAST_STRESS, smoothed
 from steadyslip.protocol import Protocol, Segments, pack
 from steadyslip.records import parameters, twin
 
 Array = np.ndarray
 PER_PERIOD = 200  # rows per period of a sine wave, on which it becomes straight: 1e-4 of its amplitude
+MOST_JUMPS = 20
 _SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
 
 
-def measured_table(record: Record, pressed: Array | None = None, smooth: bool = False) -> Table:
-    """A record's own load point, and its change of normal stress (Pa), as straight lines between samples.
+@dataclass(frozen=True)
+class Sharp:
+    """Changes that happen at once, between two samples of a record.
 
-    With `smooth` the load point moves without the noise of the measured displacement.
+    Attributes
+    ----------
+    jumps : tuple of (float, float)
+        Times of the samples between which the normal stress, or a measured rate, jumped.
+    kinks : tuple of (float, float, float)
+        Times of the samples between which the displacement has a kink, and of the kink itself.
     """
-    time = record.time - record.time[0]
-    rows = len(time) - 1
-    segments = np.zeros((1, rows, 9))
-    segments[0, :, 0], segments[0, :, 1] = time[:-1], time[1:]
-    spacing = np.diff(time)
-    assert record.displacement is not None
-    displacement = smoothed(record.time, record.displacement) if smooth else record.displacement
-    segments[0, :, 3] = np.diff(displacement) / spacing
-    if record.integrated and record.velocity is not None:  # the rate itself is the straight line
-        segments[0, :, 3] = record.velocity[:-1]
-        segments[0, :, 6] = np.diff(record.velocity) / spacing
-    if pressed is not None:
-        segments[0, :, 5] = pressed[:-1]
-        segments[0, :, 8] = np.diff(pressed) / spacing
-    return Table(segments, np.arange(rows + 1)[None], rows + 1)
+
+    jumps: tuple[tuple[float, float], ...] = ()
+    kinks: tuple[tuple[float, float, float], ...] = ()
+
+    def rows(self, time: Array) -> Array:
+        """Samples around all of them, which a thinned record must keep."""
+        places = [int(np.searchsorted(time, change[0])) for change in (*self.jumps, *self.kinks)]
+        around = [np.arange(i - 3, i + 5) for i in places]
+        return np.unique(np.clip(np.concatenate([np.empty(0, dtype=int), *around]), 0, len(time) - 1))
+
+
+def sharp_changes(record: Record, smooth: bool = False) -> Sharp:
+    """Find the changes of a record that straight lines between samples would smear.
+
+    A change counts if it stands out of those before and after it. When exactly a displacement bends follows from the
+    lines on both sides; when a stress jumps does not, and is left to the fit.
+    """
+    jumps: set[int] = set()
+    if record.normal is not None:
+        jumps |= set(_jumps(record.time, record.normal, LEAST_STRESS))
+    kinks: list[tuple[int, float]] = []
+    if record.integrated and record.velocity is not None:
+        jumps |= set(_jumps(record.time, record.velocity, LEAST_RATE))
+    elif record.displacement is not None and not smooth:
+        kinks = _kinks(record.time, record.displacement)
+    t = record.time
+    return Sharp(
+        tuple((float(t[i]), float(t[i + 1])) for i in sorted(jumps)[:MOST_JUMPS]),
+        tuple((float(t[i]), float(t[i + 1]), moment) for i, moment in kinks if i not in jumps),
+    )
+
+
+def _jumps(time: Array, values: Array, least: float) -> Array:
+    """Places where a change from one sample to the next stands alone; `least` is a share of the values."""
+    size, spacing = np.abs(np.diff(values)), np.diff(time)
+    if len(size) < 5:
+        return np.empty(0, dtype=int)
+    usual = 1.4826 * float(np.median(size))
+    padded = np.pad(size / spacing, 2)
+    rates = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)  # of the two on both sides
+    alone = size > 8 * rates * spacing
+    return np.flatnonzero(alone & (size > least * float(np.max(np.abs(values)))) & (size > 20 * usual))
+
+
+def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
+    """Intervals within which two straight lines meet, and where."""
+    slopes = np.diff(displacement) / np.diff(time)
+    if len(slopes) < 7:
+        return []
+    before, after = np.full(len(slopes), np.nan), np.full(len(slopes), np.nan)
+    unlike = np.full(len(slopes), np.inf)
+    before[2:], after[:-2] = 0.5 * (slopes[1:-1] + slopes[:-2]), 0.5 * (slopes[1:-1] + slopes[2:])
+    unlike[2:-2] = np.abs(slopes[1:-3] - slopes[:-4]) + np.abs(slopes[4:] - slopes[3:-1])
+    change = np.abs(after - before)
+    with np.errstate(all="ignore"):
+        share = (slopes - after) / (before - after)  # of the interval that lies before the kink
+        clear = (change > 20 * unlike) & (change > 1e-3 * np.max(np.abs(slopes))) & (share > 1e-6) & (share < 1 - 1e-6)
+    return [(int(i), float(time[i] + share[i] * (time[i + 1] - time[i]))) for i in np.flatnonzero(clear)]
+
+
+class MeasuredInputs:
+    """A record's own load point and normal stress: straight lines between samples, and what happens at once.
+
+    Parameters
+    ----------
+    record : Record
+    sharp : Sharp
+    pressed : ndarray (n,), optional
+        Change of the normal stress at the samples, Pa.
+    smooth : bool
+        Whether the load point moves without the noise of the measured displacement.
+    """
+
+    def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None, smooth: bool = False) -> None:
+        time = record.time
+        self.origin = float(time[0])
+        extra = sorted([*((float(np.mean(j)), j[0]) for j in sharp.jumps), *((k[2], k[0]) for k in sharp.kinks)])
+        places = np.array([int(np.searchsorted(time, first)) for _, first in extra], dtype=int)
+        nodes = np.insert(time, places + 1, [moment for moment, _ in extra]) - self.origin
+        self.samples = np.insert(np.arange(len(time)), places + 1, -1)[None]
+        self.count = len(time)
+        old = np.maximum.accumulate(np.where(self.samples[0] >= 0, self.samples[0], 0))[:-1]  # interval of each row
+        rows = np.zeros((1, len(nodes) - 1, 9))
+        rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
+        self._measured(rows[0], record, old, pressed, smooth)
+        cut = np.flatnonzero(self.samples[0][:-1] < 0)  # second halves of cut intervals
+        jumping = {first for first, _ in sharp.jumps}
+        self.moving = np.array([row for row, (_, first) in zip(cut, extra, strict=True) if first in jumping], dtype=int)
+        for row, (_, first) in zip(cut, extra, strict=True):
+            self._cut(rows[0], int(row), record, int(np.searchsorted(time, first)), first in jumping, pressed)
+        self.rows = rows
+
+    def _measured(self, rows: Array, record: Record, old: Array, pressed: Array | None, smooth: bool) -> None:
+        spacing = np.diff(record.time)
+        if record.displacement is not None:
+            moved = smoothed(record.time, record.displacement) if smooth else record.displacement
+            rows[:, 3] = (np.diff(moved) / spacing)[old]
+        if record.integrated and record.velocity is not None:  # the rate itself is the straight line
+            rows[:, 3] = record.velocity[old]
+            rows[:, 6] = (np.diff(record.velocity) / spacing)[old]
+        if pressed is not None:
+            rows[:, 5] = pressed[old]
+            rows[:, 8] = (np.diff(pressed) / spacing)[old]
+
+    def _cut(self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None) -> None:
+        """Two rows in place of one interval: levels where something jumps, two slopes where the displacement bends."""
+        if not jumps:
+            early, late = rows[row - 1, 1] - rows[row - 1, 0], rows[row, 1] - rows[row, 0]
+            assert record.displacement is not None
+            rate = (record.displacement[i] - record.displacement[i - 2]) / (record.time[i] - record.time[i - 2])
+            gone = record.displacement[i + 1] - record.displacement[i]
+            rows[row - 1, 3], rows[row, 3] = rate, (gone - rate * early) / late
+            if pressed is not None:
+                rows[row, 5] += rows[row, 8] * early
+            return
+        if pressed is not None:
+            rows[row - 1, 5], rows[row, 5] = pressed[i], pressed[i + 1]
+            rows[row - 1 : row + 1, 8] = 0.0
+        if record.integrated and record.velocity is not None:
+            rows[row - 1, 3], rows[row, 3] = record.velocity[i], record.velocity[i + 1]
+            rows[row - 1 : row + 1, 6] = 0.0
+
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+        """The table for the times of the jumps.
+
+        Parameters
+        ----------
+        times : ndarray (jobs, jumps)
+            On the record's clock, s.
+        first : int
+            Direction of the first of them.
+        directions : int
+            How many directions there are; none are wanted if zero.
+        """
+        if not len(self.moving):
+            return Table(self.rows, self.samples, self.count)
+        rows = np.repeat(self.rows, len(times), axis=0)
+        rows[:, self.moving, 0] = rows[:, self.moving - 1, 1] = times - self.origin
+        if not directions:
+            return Table(rows, self.samples, self.count)
+        rates = np.zeros((1, directions, rows.shape[1]))
+        for k, row in enumerate(self.moving):
+            rates[0, first + k, row] = 1.0
+        return Table(rows, self.samples, self.count, rates)
 
 
 class ProtocolInputs:
@@ -50,42 +188,41 @@ class ProtocolInputs:
         Of the drive, m/s.
     time : ndarray
         Of the samples, s.
-    free : mapping of str to int
-        Names of free times, ``protocol.pieces.1.at``, and the direction of each.
-    directions : int
-        How many directions there are.
+    free : sequence of str
+        Names of free times, ``protocol.pieces.1.at``.
     pressed : ndarray (n,), optional
         Measured change of normal stress at the samples, Pa.
     """
 
     def __init__(
-        self, protocol: Protocol, velocity: float, time: Array, free: Mapping[str, int] | None = None,
-        directions: int = 0, pressed: Array | None = None,
-    ) -> None:  # fmt: skip
+        self, protocol: Protocol, velocity: float, time: Array, free: Sequence[str] = (), pressed: Array | None = None
+    ) -> None:
         self.protocol, self.velocity, self.time, self.pressed = protocol, velocity, time, pressed
-        self.free, self.directions = dict(free or {}), directions
+        self.free = tuple(free)
         self._plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
 
-    def table(self, values: Mapping[str, Array], sensitive: bool = True) -> Table:
-        """Tables for arrays of the free times, one job each."""
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+        """Tables for the free times (jobs, free); see `MeasuredInputs.table`."""
         if not self.free:
-            return self._table(self._packed({}), None)
-        jobs = len(next(iter(values.values())))
-        segments = self._packed(values)
-        if not sensitive:
-            return self._table(segments, None, jobs)
-        moved = {}
-        for name, direction in self.free.items():
-            ends = [self._packed({**values, name: values[name] + sign * _SHIFT}) for sign in (1.0, -1.0)]
-            moved[direction] = ends
-        return self._table(segments, moved, jobs)
+            return self._once
+        segments = self._packed(times)
+        moved = []
+        for k in range(len(self.free)) if directions else ():
+            shift = _SHIFT * np.eye(len(self.free))[k]
+            moved.append((first + k, self._packed(times + shift), self._packed(times - shift)))
+        return self._table(segments, moved, directions, len(times))
 
-    def _packed(self, values: Mapping[str, Array]) -> Segments:
-        until = float(self.time[-1])
-        plan = twin(self.protocol, self._plain | dict(values), "protocol.") if values else self.protocol
-        return pack(plan, self.velocity, until)
+    @cached_property
+    def _once(self) -> Table:
+        return self._table(pack(self.protocol, self.velocity, float(self.time[-1])), [], 0, 1)
 
-    def _table(self, segments: Segments, moved: Mapping[int, list[Segments]] | None, jobs: int = 1) -> Table:
+    def _packed(self, times: Array) -> Segments:
+        values = {name: times[:, i] for i, name in enumerate(self.free)}
+        return pack(twin(self.protocol, self._plain | values, "protocol."), self.velocity, float(self.time[-1]))
+
+    def _table(
+        self, segments: Segments, moved: Sequence[tuple[int, Segments, Segments]], directions: int, jobs: int
+    ) -> Table:
         first, last = float(self.time[0]), float(self.time[-1])
         starts = np.broadcast_to(segments.start, (jobs, segments.start.shape[1]))
         extra = _wave_nodes(segments, first, last)
@@ -109,12 +246,12 @@ class ProtocolInputs:
         rows[:, :, 3:6] = before
         rows[:, :, 6:9] = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
         table = Table(rows, np.ascontiguousarray(samples), len(self.time))
-        if moved is None:
+        if not moved:
             return table
-        node_rates = np.zeros((jobs, self.directions, rows.shape[1]))
-        input_rates = np.zeros((jobs, self.directions, rows.shape[1], 3))
+        node_rates = np.zeros((jobs, directions, rows.shape[1]))
+        input_rates = np.zeros((jobs, directions, rows.shape[1], 3))
         middle = 0.5 * (rows[:, :, 0] + rows[:, :, 1])
-        for direction, (plus, minus) in moved.items():
+        for direction, plus, minus in moved:
             shift = (plus.start - minus.start) / (2 * _SHIFT)
             node_rates[:, direction] = np.where(inside[:, :-1], _of(shift, own, jobs), 0.0)
             change = _at(plus, own, middle, jobs) - _at(minus, own, middle, jobs)

@@ -11,9 +11,9 @@ import numpy as np
 from steadyslip.contact import Constant
 from steadyslip.contact.basic import Prescribed
 from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.lab.comparison import LOSSES, Comparison, Part, trend_rows, trend_unknowns
+from steadyslip.lab.comparison import LOSSES, Comparison, Part, jump_unknowns, trend_rows, trend_unknowns
 from steadyslip.lab.forward import Forward
-from steadyslip.lab.inputs import ProtocolInputs, measured_table
+from steadyslip.lab.inputs import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.lab.record import Record
 from steadyslip.lab.unknowns import Space, Unknown, unknown
 from steadyslip.protocol import Protocol
@@ -54,6 +54,10 @@ class Plan:
     width : float or None
         Residual from which on outliers weigh less.
     weights : tuple of ndarray or None
+    rtol : float
+        Error allowed per step of the model.
+    sharp : tuple of Sharp
+        What happens at once in each record.
     """
 
     rig: Slider
@@ -69,6 +73,7 @@ class Plan:
     width: float | None = None
     weights: tuple[Array, ...] | None = field(default=None, repr=False)
     rtol: float = 1e-7
+    sharp: tuple[Sharp, ...] = field(default=(), repr=False)
 
     def space(self) -> Space:
         """The unknowns: shared ones, separate ones record by record, trends."""
@@ -78,6 +83,7 @@ class Plan:
             for record in range(len(self.records)) if name in self.separate and several else [None]:
                 found.append(self._unknown(name, record))
         for i in range(len(self.records)):
+            found += jump_unknowns(i if several else None, self.sharp[i])
             found += trend_unknowns(i if several else None, self.trend, self.offset)
         return Space(tuple(found))
 
@@ -99,23 +105,20 @@ class Plan:
         places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
         for place, one in enumerate(space.unknowns):
             if one.record in (None, i):
-                kind = "time" if one.parameter.startswith("protocol.") else "rig"
-                places["trend" if one.parameter.startswith(("trend.", "offset")) else kind].append(place)
+                kinds = {"protocol": "time", "jump": "time", "trend": "trend", "offset": "trend"}
+                places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
         forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads)
         inputs: Any
         if self.protocol is None:
-            inputs = measured_table(record, pressed, self.drive == "smoothed" and not record.integrated)
+            smooth = self.drive == "smoothed" and not record.integrated
+            inputs = MeasuredInputs(record, self.sharp[i], pressed, smooth)
         else:
-            free = {name: len(names) + k for k, name in enumerate(times)}
             own_stress = any(piece.channel == NORMAL_STRESS for piece in self.protocol.pieces)
             inputs = ProtocolInputs(
-                self.protocol, rig.drive.velocity, record.time, free, len(names) + len(times),
-                None if own_stress else pressed,
-            )  # fmt: skip
-            if not free:
-                inputs = inputs.table({})
+                self.protocol, rig.drive.velocity, record.time, times, None if own_stress else pressed
+            )
         weights = np.ones(len(record)) if self.weights is None else self.weights[i]
         return Part(
             record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
@@ -173,7 +176,16 @@ def make_plan(
         options["drive"] = "protocol"
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
     _check_records(plan)
-    return plan
+    return with_sharp_changes(plan)
+
+
+def with_sharp_changes(plan: Plan) -> Plan:
+    """The plan knowing what happens at once in its records; with a protocol that says it, nothing else does."""
+    if plan.protocol is not None:
+        return replace(plan, sharp=tuple(Sharp() for _ in plan.records))
+    imposed = isinstance(plan.rig.contact, (Constant, Prescribed))
+    drivers = (record if imposed else replace(record, normal=None) for record in plan.records)
+    return replace(plan, sharp=tuple(sharp_changes(driver, plan.drive == "smoothed") for driver in drivers))
 
 
 def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:

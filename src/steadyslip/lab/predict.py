@@ -48,7 +48,7 @@ class Prediction:
         By kind of kick, sizes as in `Threshold`, of the first draws.
     shares : dict of str to float
         Share of the spread of the critical stiffness (of the growth rate, where there is none) that goes away once a
-        parameter is known exactly.
+        parameter, or b − a, is known exactly.
     """
 
     rig: Slider
@@ -199,7 +199,7 @@ def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tupl
     few = {name: values[:KICKED] for name, values in vary.items()}
     thresholds = {kick: np.asarray(threshold_map(target, few, kick, precision=1e-3, progress=False)) for kick in kicks}
     exists = (states != ABSENT) & (states != UNKNOWN)
-    shares = _shares(draws, vary, critical, growth)
+    shares = _shares(vary | _difference(target, vary), critical, growth)
     return Prediction(target, draws, states == STABLE, exists, critical, growth, thresholds, shares)
 
 
@@ -220,7 +220,17 @@ def _own_stiffness(rig: Slider) -> Any:
     return model_values(rig).named()["slider.stiffness"] + rig.drive.proportional()
 
 
-def _shares(draws: Draws, vary: dict[str, Array], critical: Array, growth: Array) -> dict[str, float]:
+def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
+    """b − a, which decides where b and a do not by themselves."""
+    known = {n: a.value for n, a in rig.parameters().items() if n == "friction.a" or n.rpartition(".")[2] == "b"}
+    if "friction.a" not in known or len(known) < 2 or not set(known) & set(vary):
+        return {}
+    values = {name: vary.get(name, value) for name, value in known.items()}
+    direct = values.pop("friction.a")
+    return {"friction.b − friction.a": np.asarray(sum(values.values()) - direct)}
+
+
+def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str, float]:
     """Squared correlation of the result with every parameter: the largest first."""
     result = critical if np.mean(np.isfinite(critical)) > 0.5 else growth
     good = np.isfinite(result)

@@ -16,7 +16,7 @@ from steadyslip.lab.comparison import Part
 from steadyslip.lab.inputs import ProtocolInputs
 from steadyslip.lab.record import Record
 from steadyslip.lab.steps import Step
-from steadyslip.lab.unknowns import Space
+from steadyslip.lab.unknowns import Space, Unknown
 from steadyslip.steady import steady_state
 
 Array = np.ndarray
@@ -135,7 +135,6 @@ def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS) ->
     from scipy.stats import qmc
 
     found = [features(part.record, part.rig.drive.velocity) for part in parts]
-    first = found[0]
     grid = qmc.Sobol(6, rng=12345).random(64)[:count] if count <= 64 else qmc.Sobol(6, rng=12345).random(count)
     shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
     d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
@@ -154,7 +153,7 @@ def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS) ->
     for i, unknown in enumerate(space.unknowns):
         part = parts[unknown.record or 0]
         own = found[unknown.record or 0]
-        values[:, i] = _start(unknown.parameter, part, own, first, (d_c, a, b, steepness, alpha, grid[:, 5]))
+        values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, grid[:, 5]))
     return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
 
 
@@ -183,8 +182,9 @@ def search_bounds(parts: Sequence[Part], space: Space) -> tuple[Array, Array]:
     return low, high
 
 
-def _start(name: str, part: Part, own: Features, first: Features, design: tuple[Array, ...]) -> Array:
+def _start(unknown: Unknown, part: Part, own: Features, design: tuple[Array, ...]) -> Array:
     """Starting values of one parameter."""
+    name = unknown.parameter
     d_c, a, b, steepness, alpha, spare = design
     rig = part.rig
     last = name.rpartition(".")[2]
@@ -207,6 +207,8 @@ def _start(name: str, part: Part, own: Features, first: Features, design: tuple[
         return steepness * _stress(part)
     if name.startswith(("trend.", "offset")):
         return np.zeros_like(a)
+    if name.startswith("jump."):
+        return unknown.low + (unknown.high - unknown.low) * spare
     present = float(rig.parameters()[name].value or 0.0) if name in rig.parameters() else None
     if present is None:
         return np.full_like(a, _time_of(name, part))

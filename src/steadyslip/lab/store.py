@@ -16,7 +16,7 @@ from steadyslip.errors import NotAvailable
 from steadyslip.lab.fit import Fit, Search
 from steadyslip.lab.identify import Combination
 from steadyslip.lab.noise import Noise
-from steadyslip.lab.plan import Plan
+from steadyslip.lab.plan import Plan, with_sharp_changes
 from steadyslip.lab.record import Record
 
 _COLUMNS = ("time", "friction", "normal", "shear", "displacement", "velocity")
@@ -115,13 +115,13 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     weights = None
     if "weight_1" in dataset:
         weights = tuple(dataset[f"weight_{i}"].values for i in range(1, len(records) + 1))
-    plan = Plan(
+    plan = with_sharp_changes(Plan(
         rig=rig_from_text(text, str(path)),
         records=records,
         protocol=protocol_from_text(text, str(path)) if attributes["has_protocol"] else None,
         weights=weights,
         **{name: tuple(value) if isinstance(value, list) else value for name, value in options.items()},
-    )
+    ))
     noises = tuple(
         Noise(lag1, bool(correlated), dataset[f"noise_coefficients_{i}"].values, innovation,
               dataset[f"noise_covariance_{i}"].values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from steadyslip.records import parameters, twin
 Array = np.ndarray
 PER_PERIOD = 200  # rows per period of a sine wave, on which it becomes straight: 1e-4 of its amplitude
 MOST_JUMPS = 20
+STRAIGHT = 5e-4  # of the range of the normal stress: what straight lines may miss of a smooth curve
 _SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
 
 
@@ -91,8 +93,46 @@ def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
     return [(int(i), float(time[i] + share[i] * (time[i + 1] - time[i]))) for i in np.flatnonzero(clear)]
 
 
+def _through(time: Array, values: Array, jumping: set[float]) -> Any:
+    """A smooth curve through samples: local cubics; straight where something jumps."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    slopes = np.gradient(values, time)
+    for first in jumping:
+        i = int(np.searchsorted(time, first))
+        slopes[max(i - 1, 0) : i + 3] = 0.0
+    return CubicHermiteSpline(time, values, slopes)
+
+
+def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Array]:
+    """Intervals on which a straight line would miss a smooth curve, and times that cut them finely enough.
+
+    The curve has to stand out of the noise: a sample is missed by the cubic through its neighbours by less than the
+    straight line misses the curve.
+    """
+    if len(time) < 8:
+        return np.empty(0, dtype=int), np.empty(0)
+    spacing = np.diff(time)
+    middle = 0.5 * (time[1:] + time[:-1])
+    misses = np.abs(_through(time, values, jumping)(middle) - 0.5 * (values[1:] + values[:-1]))
+    even, odd = np.arange(0, len(time), 2), np.arange(1, len(time) - 1, 2)
+    noise = float(np.median(np.abs(_through(time[even], values[even], set())(time[odd]) - values[odd])))
+    least = max(STRAIGHT * float(np.ptp(values)), 3 * noise)
+    for first in jumping:
+        i = int(np.searchsorted(time, first))
+        misses[max(i - 3, 0) : i + 4] = 0.0
+    places = np.flatnonzero(misses > least)
+    pieces = np.ceil(np.sqrt(misses[places] / least)).astype(int)
+    places, pieces = places[pieces > 1], np.minimum(pieces[pieces > 1], 20)
+    cuts = np.repeat(places, pieces - 1)
+    number = np.concatenate([np.arange(1, n) for n in pieces]) if len(pieces) else np.empty(0)
+    return cuts, time[cuts] + spacing[cuts] * number / np.repeat(pieces, pieces - 1)
+
+
 class MeasuredInputs:
-    """A record's own load point and normal stress: straight lines between samples, and what happens at once.
+    """A record's own load point and normal stress between its samples, and what happens at once.
+
+    The load point moves along straight lines, the normal stress too unless it is clearly curved.
 
     Parameters
     ----------
@@ -106,34 +146,46 @@ class MeasuredInputs:
 
     def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None, smooth: bool = False) -> None:
         time = record.time
-        self.origin = float(time[0])
-        extra = sorted([*((float(np.mean(j)), j[0]) for j in sharp.jumps), *((k[2], k[0]) for k in sharp.kinks)])
-        places = np.array([int(np.searchsorted(time, first)) for _, first in extra], dtype=int)
-        nodes = np.insert(time, places + 1, [moment for moment, _ in extra]) - self.origin
+        self.origin, self.count = float(time[0]), len(time)
+        jumping, bending = {first for first, _ in sharp.jumps}, {first for first, _, _ in sharp.kinks}
+        curved, bent = _curved(time, pressed, jumping) if pressed is not None else (np.empty(0, dtype=int), np.empty(0))
+        moments = [*(float(np.mean(j)) for j in sharp.jumps), *(k[2] for k in sharp.kinks), *bent]
+        cuts = [*(int(np.searchsorted(time, j[0])) for j in sharp.jumps),
+                *(int(np.searchsorted(time, k[0])) for k in sharp.kinks), *curved]  # fmt: skip
+        order = np.argsort(moments, kind="stable")
+        places = np.array(cuts, dtype=int)[order]
+        nodes = np.insert(time, places + 1, np.array(moments, dtype=float)[order]) - self.origin
         self.samples = np.insert(np.arange(len(time)), places + 1, -1)[None]
-        self.count = len(time)
         old = np.maximum.accumulate(np.where(self.samples[0] >= 0, self.samples[0], 0))[:-1]  # interval of each row
         rows = np.zeros((1, len(nodes) - 1, 9))
         rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
-        self._measured(rows[0], record, old, pressed, smooth)
-        cut = np.flatnonzero(self.samples[0][:-1] < 0)  # second halves of cut intervals
-        jumping = {first for first, _ in sharp.jumps}
-        self.moving = np.array([row for row, (_, first) in zip(cut, extra, strict=True) if first in jumping], dtype=int)
-        for row, (_, first) in zip(cut, extra, strict=True):
-            self._cut(rows[0], int(row), record, int(np.searchsorted(time, first)), first in jumping, pressed)
+        self._measured(rows[0], record, old, pressed, smooth, jumping)
+        halves = np.flatnonzero(self.samples[0][:-1] < 0)  # second parts of cut intervals
+        self.moving = np.array([row for row in halves if float(time[old[row]]) in jumping], dtype=int)
+        for row in halves:
+            first = float(time[old[row]])
+            if first in jumping or first in bending:
+                self._cut(rows[0], int(row), record, int(old[row]), first in jumping, pressed)
         self.rows = rows
 
-    def _measured(self, rows: Array, record: Record, old: Array, pressed: Array | None, smooth: bool) -> None:
+    def _measured(
+        self, rows: Array, record: Record, old: Array, pressed: Array | None, smooth: bool, jumping: set[float]
+    ) -> None:
         spacing = np.diff(record.time)
         if record.displacement is not None:
             moved = smoothed(record.time, record.displacement) if smooth else record.displacement
             rows[:, 3] = (np.diff(moved) / spacing)[old]
         if record.integrated and record.velocity is not None:  # the rate itself is the straight line
-            rows[:, 3] = record.velocity[old]
-            rows[:, 6] = (np.diff(record.velocity) / spacing)[old]
+            slope = (np.diff(record.velocity) / spacing)[old]
+            rows[:, 3] = record.velocity[old] + slope * (rows[:, 0] - (record.time[old] - self.origin))
+            rows[:, 6] = slope
         if pressed is not None:
-            rows[:, 5] = pressed[old]
-            rows[:, 8] = (np.diff(pressed) / spacing)[old]
+            curve = _through(record.time, pressed, jumping)
+            before, after = curve(rows[:, 0] + self.origin), curve(rows[:, 1] + self.origin)
+            ends = np.append(self.samples[0][1:], 0)[: len(rows)] >= 0
+            before = np.where(self.samples[0][:-1] >= 0, pressed[old], before)
+            after = np.where(ends, pressed[old + 1], after)
+            rows[:, 5], rows[:, 8] = before, (after - before) / (rows[:, 1] - rows[:, 0])
 
     def _cut(self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None) -> None:
         """Two rows in place of one interval: levels where something jumps, two slopes where the displacement bends."""
@@ -143,8 +195,6 @@ class MeasuredInputs:
             rate = (record.displacement[i] - record.displacement[i - 2]) / (record.time[i] - record.time[i - 2])
             gone = record.displacement[i + 1] - record.displacement[i]
             rows[row - 1, 3], rows[row, 3] = rate, (gone - rate * early) / late
-            if pressed is not None:
-                rows[row, 5] += rows[row, 8] * early
             return
         if pressed is not None:
             rows[row - 1, 5], rows[row, 5] = pressed[i], pressed[i + 1]

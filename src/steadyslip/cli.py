@@ -49,12 +49,19 @@ def analyze(
             "--kick", help="also find the smallest kick not survived: velocity, displacement, ...; repeatable"
         ),
     ] = None,
+    fitted: Annotated[
+        Path | None,
+        typer.Option("--fit", metavar="FIT", help="a fit (.nc): judge with its friction, and how sure that is"),
+    ] = None,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.analysis import analyze as run
     from steadyslip.config import read_rig
     from steadyslip.errors import NotAvailable
 
+    if fitted is not None:
+        _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable)
+        return
     result = run(read_rig(rig, changes or ()), branch=branch, kick=kick or ())
     if as_json:
         data = result.to_dict()
@@ -79,6 +86,76 @@ def analyze(
                 typer.echo(f"\nNo formula: {reason}")
     if require_stable and not result.stable:
         raise typer.Exit(1)
+
+
+def _predicted(
+    rig: Path, changes: Sequence[str], fitted: Path, kick: Sequence[str], as_json: bool, require_stable: bool
+) -> None:
+    """The verdict with the friction of a fit: that of the best values, and its probability."""
+    from steadyslip.analysis import analyze as run
+    from steadyslip.config import read_rig
+    from steadyslip.lab import load_fit, predict
+
+    found = predict(read_rig(rig, changes), load_fit(fitted), kick=kick)
+    best = run(found.rig)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(best.to_dict() | {"prediction": found.to_dict()}, indent=2, allow_nan=False))
+    else:
+        typer.echo(f"{found}\n\nWith the best values\n{best}")
+    if require_stable and not found.probability_stable >= 0.95:
+        raise typer.Exit(1)
+
+
+@app.command()
+def fit(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="RECORD... [SPEC.toml]", help="records of experiments, and how to fit them")
+    ],
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="change a value of SPEC, such as fit.trend=2; repeatable"),
+    ] = None,
+    skip_bad_lines: Annotated[
+        bool, typer.Option("--skip-bad-lines", help="leave damaged lines out, and say so")
+    ] = False,
+    bootstrap: Annotated[int, typer.Option(min=0, help="also refit this many resampled records")] = 0,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("-o", "--output", help="write .nc, .html, .json, .png, .svg or .pdf; repeatable"),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+) -> None:
+    """Which friction do these records show, and how sure is that?"""
+    from steadyslip.lab import bootstrap as resample, fit_files
+    from steadyslip.lab.commands import ENDINGS, as_json as plain, split_files, write_fit
+    from steadyslip.output import check_output
+    from steadyslip.report import fit_report
+
+    check_output(output or (), ENDINGS)
+    records, spec = split_files(files)
+    found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
+    for path in output or ():
+        write_fit(found, comparison, path, fit_report)
+    draws = resample(found, bootstrap) if bootstrap >= 2 else None
+    if as_json:
+        import json
+
+        data = plain(found, comparison)
+        if draws is not None:
+            data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
+        typer.echo(json.dumps(data, indent=2, allow_nan=False))
+        return
+    for record in found.plan.records:
+        typer.echo(f"{record}\n")
+    if comparison is not None:
+        typer.echo(f"{comparison}\n")
+    typer.echo(str(found))
+    if draws is not None:
+        typer.echo(f"\n{draws}")
+    for path in output or ():
+        typer.echo(f"wrote {path}")
 
 
 @app.command()
@@ -107,8 +184,10 @@ def simulate(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """What does this rig do, under the protocol of its file and of the command line?"""
-    from steadyslip.motion.commands import run_file, write_history
+    from steadyslip.motion.commands import ENDINGS, run_file, write_history
+    from steadyslip.output import check_output
 
+    check_output(output or (), ENDINGS)
     history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol)
     for path in output or ():
         write_history(history, path, "phase" if phase else "history")
@@ -137,8 +216,10 @@ def cycles(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
-    from steadyslip.nonlinear.commands import cycles_of_file, write_branch
+    from steadyslip.nonlinear.commands import ENDINGS, cycles_of_file, write_branch
+    from steadyslip.output import check_output
 
+    check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings)
     _given(branch, output or (), as_json, write_branch)
 
@@ -165,7 +246,9 @@ def threshold(
 ) -> None:
     """How large a kick does steady sliding survive?"""
     from steadyslip.nonlinear.commands import thresholds_of_file, write_basin
+    from steadyslip.output import FIGURES, check_output
 
+    check_output(output or (), FIGURES)
     found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
     _given(found, output or (), as_json, write_basin)
 

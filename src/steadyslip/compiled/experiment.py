@@ -88,7 +88,7 @@ class ExperimentProgram:
         chain : ndarray (jobs, directions, parameters)
             How fast the parameters change in each direction.
         """
-        jobs, directions, count = chain.shape
+        jobs, _, count = chain.shape
         with np.errstate(all="ignore"):
             values = _stacked(self._values(*arguments, sigma), jobs)
             slopes = _stacked(self._slopes(*arguments, sigma), jobs).reshape(jobs, count, -1)

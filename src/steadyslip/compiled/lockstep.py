@@ -89,7 +89,7 @@ class LockstepText(KernelText):
         if self.reduction.unknown is not None:
             rates.append(f"{self.cell('Z')} = z")
         seen = [*self.seen_lines, *(f"{self.cell('SEEN', i)} = seen{i}" for i in range(1 + directions))]
-        step = f"\n\n@njit(**FLAT)\ndef step_lanes(S):\n    for l in range(W):\n" + indented(self.step(), 2)
+        step = "\n\n@njit(**FLAT)\ndef step_lanes(S):\n    for l in range(W):\n" + indented(self.step(), 2)
         driver = files("steadyslip.compiled").joinpath("lockstep_driver.py").read_text(encoding="utf-8")
         return constants + self._lanes("rates_lanes", rates) + self._lanes("see_lanes", seen) + step + "\n\n" + driver
 

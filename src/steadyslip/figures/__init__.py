@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
+from steadyslip.figures.lab import corner, fit, prediction, record
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
@@ -14,11 +15,15 @@ from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, thresh
 __all__ = [
     "ANGLES",
     "basin",
+    "corner",
     "critical_stiffness_against_mass",
     "cycle_branch",
+    "fit",
     "history",
     "hopf_curve",
     "phase_plane",
+    "prediction",
+    "record",
     "root_locus",
     "stability_chart",
     "threshold_map",

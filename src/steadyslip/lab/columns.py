@@ -151,16 +151,16 @@ def assigned(
     taken = {place for place, _ in chosen.values()}
     guesses: dict[str, list[int]] = {}
     for i, (head, _) in enumerate(bare):
-        role = _guessed_role(head, units[i])
-        if role is not None and i not in taken:
-            guesses.setdefault(role, []).append(i)
+        guess = _guessed_role(head, units[i])
+        if guess is not None and i not in taken:
+            guesses.setdefault(guess, []).append(i)
     for role in ROLES:
         if role in chosen and chosen[role][0] >= 0:
             continue
         candidates = _preferred(role, guesses.get(role, []), names)
         if len(candidates) > 1:
-            found = ", ".join(repr(names[i]) for i in candidates)
-            problems.append(Problem(role, f"several columns could be it: {found}; say which with {role}=NAME"))
+            several = ", ".join(repr(names[i]) for i in candidates)
+            problems.append(Problem(role, f"several columns could be it: {several}; say which with {role}=NAME"))
         elif candidates:
             chosen[role] = (candidates[0], chosen.get(role, (0, None))[1])
         elif role in chosen:

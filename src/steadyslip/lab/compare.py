@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import ParameterError, Problem
-from steadyslip.friction import Aging, PRZ, RateState, Slip, State
-from steadyslip.lab.fit import Fit, fit
+from steadyslip.friction import PRZ, Aging, RateState, Slip, State
+from steadyslip.lab.fit import fit
+from steadyslip.lab.result import Fit
 from steadyslip.slider import Slider
 
 EVOLUTIONS = {"slip": Slip, "aging": Aging, "prz": PRZ}
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class LawComparison:
     """Fits of several models to the same records, the best first.
 
     Attributes
@@ -50,13 +51,13 @@ class Comparison:
         for label, one in self.fits.items():
             mine = self.criteria[label]
             lines.append(
-                f"{label:<{wide}}  {len(one.space):>10}  {one.ssq:>14.6g}  {mine[0] - aic:>4.1f}  {mine[1] - bic:>5.1f}  "
-                f"{self.weights[label]:>6.3f}"
+                f"{label:<{wide}}  {len(one.space):>10}  {one.ssq:>14.6g}  {mine[0] - aic:>4.1f}  "
+                f"{mine[1] - bic:>5.1f}  {self.weights[label]:>6.3f}"
             )
         return "\n".join(lines)
 
 
-def compare(fits: Mapping[str, Fit]) -> Comparison:
+def compare(fits: Mapping[str, Fit]) -> LawComparison:
     """Compare fits to the same records by information criteria.
 
     Samples count as many times as they are independent. How many that is, the residuals of the fit with the least sum
@@ -79,16 +80,16 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
             np.array_equal(a.friction, b.friction) for a, b in zip(one.plan.records, first.plan.records, strict=True)
         )
         if not same:
-            raise ParameterError([Problem(label, "is a fit to other records; criteria compare fits to the same ones only")])
+            raise ParameterError([Problem(label, "is a fit to other records; allowed: the same")])
     best = min(fits.values(), key=lambda f: f.ssq)
     criteria = {label: one.criteria(best.noise) for label, one in fits.items()}
     order = sorted(fits, key=lambda label: criteria[label][0])
-    return Comparison({label: fits[label] for label in order}, {label: criteria[label] for label in order})
+    return LawComparison({label: fits[label] for label in order}, {label: criteria[label] for label in order})
 
 
 def compare_laws(
     rig: Slider, records: Any, laws: Sequence[str] = ("slip", "aging", "prz", "slip, two states"), **options: Any
-) -> Comparison:
+) -> LawComparison:
     """Fit several rate-and-state laws to the same records.
 
     Parameters
@@ -120,7 +121,8 @@ def with_law(rig: Slider, label: str) -> Slider:
     if not isinstance(friction, RateState):
         raise ParameterError([Problem("rig", f"has {type(friction).__name__} friction; allowed: RateState")])
     b, d_c = (friction.b, friction.d_c) if not friction.states else (friction.states[0].b, friction.states[0].d_c)
-    assert d_c is not None and b is not None
+    assert d_c is not None
+    assert b is not None
     evolution = EVOLUTIONS[word]()
     if states:
         pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ class Comparison:
     def __init__(self, parts: tuple[Part, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
         self.parts, self.space, self.loss, self.width = parts, space, loss, width
         ends = np.cumsum([0, *(len(part.data) for part in parts)])
-        self.slices = tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        self.slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         self.size = int(ends[-1])
         self.data = np.concatenate([part.data for part in parts])
         self.weights = np.concatenate([part.weights for part in parts])
@@ -120,7 +121,6 @@ class Comparison:
             r, slope = lost(self.loss, r, self.width)
             jacobian *= slope[:, None, :]
         return r, jacobian
-
 
     def misfit(self, coordinates: Array) -> Array:
         """Sums of squares, as the loss has them, (m,); no derivatives are computed."""
@@ -172,4 +172,6 @@ def trend_rows(record: Record, order: int, offset: bool, axis: str) -> Array:
     """Powers of the share of displacement (or time) that has passed."""
     along: Any = record.time if axis == "time" or record.displacement is None else record.displacement
     share = (along - along[0]) / (along[-1] - along[0])
-    return np.array(([np.ones_like(share)] if offset else []) + [share**k for k in range(1, order + 1)]).reshape(-1, len(share))
+    return np.array(([np.ones_like(share)] if offset else []) + [share**k for k in range(1, order + 1)]).reshape(
+        -1, len(share)
+    )

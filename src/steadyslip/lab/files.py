@@ -58,7 +58,8 @@ def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = Fa
     if path.is_dir():
         raise NotAvailable(f"{str(path)!r} is a folder; give a file of columns")
     reader = {
-        ".h5": _hdf5, ".hdf5": _hdf5, ".hdf": _hdf5, ".nc": _hdf5, ".mat": _matlab, ".parquet": _parquet, ".pq": _parquet,
+        ".h5": _hdf5, ".hdf5": _hdf5, ".hdf": _hdf5, ".nc": _hdf5, ".mat": _matlab, ".parquet": _parquet,
+        ".pq": _parquet,
     }.get(path.suffix.lower())  # fmt: skip
     try:
         if reader is not None:
@@ -115,7 +116,9 @@ def _format(rows: list[tuple[int, str]]) -> tuple[str | None, bool]:
         cells = [line.split(",") for line in sample]
         if all(_number(c, False) is not None or c.strip().lower() in MISSING for row in cells for c in row):
             return ",", False
-        if all(re.fullmatch(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?(\s+[-+]?\d+(,\d+)?([eE][-+]?\d+)?)+\s*", x) for x in sample):
+        if all(
+            re.fullmatch(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?(\s+[-+]?\d+(,\d+)?([eE][-+]?\d+)?)+\s*", x) for x in sample
+        ):
             return None, True
         return ",", False
     return None, False
@@ -287,7 +290,9 @@ def _from_datasets(path: Path, found: dict[str, tuple[Array, str | None]]) -> Co
             vectors[name] = (array, unit)
         elif array.ndim == 2:
             matrix = array if array.shape[0] > array.shape[1] else array.T
-            numbered = {f"{name}.{i}" if len(found) > 1 else str(i): matrix[:, i - 1] for i in range(1, matrix.shape[1] + 1)}
+            numbered = {
+                f"{name}.{i}" if len(found) > 1 else str(i): matrix[:, i - 1] for i in range(1, matrix.shape[1] + 1)
+            }
             vectors |= {key: (column, None) for key, column in numbered.items()}
     if not vectors:
         raise NotAvailable(f"{str(path)!r} has no columns of numbers in it")
@@ -320,7 +325,9 @@ def _matlab(path: Path, table: str | None) -> Columns:
     for name, value in content.items():
         array = np.asarray(value)
         if array.dtype.names:
-            flat |= {column: (np.asarray(array[column].item()), None) for column in array.dtype.names if array.size == 1}
+            flat |= {
+                column: (np.asarray(array[column].item()), None) for column in array.dtype.names if array.size == 1
+            }
         elif array.dtype.kind in "iuf":
             flat[name] = (array, None)
     return _from_datasets(path, {n: p for n, p in flat.items() if np.asarray(p[0]).dtype.kind in "iuf"})
@@ -337,7 +344,7 @@ def _parquet(path: Path, table: str | None) -> Columns:
         content = parquet.read_table(path)
     except (ValueError, OSError) as error:
         raise NotAvailable(f"cannot read {str(path)!r} as Parquet: {error}") from error
-    numeric = {}
+    numeric: dict[str, tuple[Array, str | None]] = {}
     for name in content.column_names:
         column = content.column(name).to_numpy()
         if column.dtype.kind in "iuf":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -53,9 +52,7 @@ class Table:
         def own(array: Array) -> Array:
             return array if len(array) == 1 else np.ascontiguousarray(array[rows])
 
-        return Table(
-            own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates)
-        )
+        return Table(own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates))
 
 
 class Forward:

@@ -145,4 +145,4 @@ def _promise(normal: Array, gradient: Array, free: Array) -> Array:
     """How much the sum of squares would fall if the problem were linear."""
     largest = np.max(np.einsum("mii->mi", normal), axis=1, keepdims=True)
     step = _solved(normal, gradient, free, 1e-12 * largest)
-    return np.einsum("mi,mi->m", step, np.where(free, gradient, 0.0))
+    return np.asarray(np.einsum("mi,mi->m", step, np.where(free, gradient, 0.0)))

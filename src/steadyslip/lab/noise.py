@@ -45,7 +45,7 @@ class Noise:
     def inflation(self) -> float:
         """How many correlated samples are worth one independent one, for slow changes."""
         total = self.covariance[0] + 2 * float(np.sum(self.covariance[1:]))
-        return max(total / self.covariance[0], 1e-3)
+        return max(float(total / self.covariance[0]), 1e-3)
 
     def spread(self, rows: Array) -> Array:
         """rows · C · rowsᵀ with C the covariance of all samples, for rows (p, n)."""

@@ -154,7 +154,9 @@ def make_plan(
         raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig or lab_rig gives")])
     many = (records,) if isinstance(records, Record) else tuple(records)
     if not many or not all(isinstance(record, Record) for record in many):
-        raise ParameterError([Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")])
+        raise ParameterError(
+            [Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
+        )
     plan_protocol = None if protocol is None else Protocol.of(protocol)
     problems: list[Problem] = []
     known = _can_be_free(rig, plan_protocol)
@@ -166,7 +168,9 @@ def make_plan(
     apart = _resolved("separate", separate, dict.fromkeys(names), problems)
     problems += _bad_options(options)
     if not names and not problems:
-        problems.append(Problem("free", "nothing is free; name parameters such as friction.a, friction.b, friction.d_c"))
+        problems.append(
+            Problem("free", "nothing is free; name parameters such as friction.a, friction.b, friction.d_c")
+        )
     weights = options.get("weights")
     if weights is not None and not problems:
         options["weights"] = _checked_weights(weights, many, problems)
@@ -201,7 +205,7 @@ def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
 def _default_free(rig: Slider) -> list[str]:
     """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
     found = [name for name in _can_be_free(rig, None) if name.startswith("friction.")]
-    return found + ["slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
+    return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
 
 
 def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
@@ -212,7 +216,9 @@ def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> lis
         try:
             found.append(resolve(name, known))
         except (UnknownNameError, AttributeError) as error:
-            message = str(error) if isinstance(error, UnknownNameError) else f"got {name!r}; allowed: names of parameters"
+            message = (
+                str(error) if isinstance(error, UnknownNameError) else f"got {name!r}; allowed: names of parameters"
+            )
             problems.append(Problem(what, message))
     return found
 
@@ -252,17 +258,19 @@ def _check_records(plan: Plan) -> None:
     for i, record in enumerate(plan.records, start=1):
         where = "record" if len(plan.records) == 1 else f"record {i}"
         if plan.protocol is None and record.displacement is None:
-            problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or velocity; "
+            problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or rate; "
                                     "name it, or give the protocol of the experiment"))  # fmt: skip
         elif plan.protocol is None and not (record.initial_rate or 0.0) > 0:
             problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
-                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding, so cut the record "
+                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding, so cut it "
                                     "with between=(start, end)"))  # fmt: skip
         if plan.protocol is not None and not drives and record.displacement is not None:
-            problems.append(Problem("protocol", "does not move the load point, but the record does; leave the protocol "
+            problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "
                                     "away, or give it a velocity-step, hold or velocity-table"))  # fmt: skip
         if plan.protocol is not None and record.time[0] < 0:
-            problems.append(Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s"))
+            problems.append(
+                Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
+            )
         needed = len(plan.free) + plan.trend + plan.offset
         if len(record) <= needed:
             problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))

@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.lab.identify import Combination, combinations
 from steadyslip.lab.plan import make_plan
-from steadyslip.lab.record import record_from_arrays
+from steadyslip.lab.read import record_from_arrays
 from steadyslip.protocol import (
     NormalStressHarmonic,
     NormalStressPulse,
@@ -60,7 +60,9 @@ class Precision:
         wide = max(map(len, self.errors))
         for name, error in self.errors.items():
             if np.isfinite(error):
-                lines.append(f"  {name:<{wide}}  ± {shown(error, self.units[name], 2)} ({100 * self.relative[name]:.2g} %)")
+                lines.append(
+                    f"  {name:<{wide}}  ± {shown(error, self.units[name], 2)} ({100 * self.relative[name]:.2g} %)"
+                )
             else:
                 lines.append(f"  {name:<{wide}}  not determined")
         lines += [f"! {one}" for one in self.unidentified]
@@ -194,7 +196,7 @@ def best_protocol(
 
 
 def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Protocol]:
-    """Changes of the normal stress by a share of it, in several shapes, over times that suit the rig's slip distance."""
+    """Changes of the normal stress by a share of it, in several shapes and over times that suit the rig."""
     level = steady_state(rig).normal_stress
     size = share * level
     unit = _slip_time(rig)

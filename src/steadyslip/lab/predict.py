@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.friction import RateState
 from steadyslip.friction.normal_memory import NoMemory
-from steadyslip.lab.fit import Fit
+from steadyslip.lab.result import Fit
 from steadyslip.lab.uncertainty import Draws, normal_draws
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate
@@ -225,9 +225,9 @@ def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
     known = {n: a.value for n, a in rig.parameters().items() if n == "friction.a" or n.rpartition(".")[2] == "b"}
     if "friction.a" not in known or len(known) < 2 or not set(known) & set(vary):
         return {}
-    values = {name: vary.get(name, value) for name, value in known.items()}
+    values = {name: np.asarray(vary.get(name, value), dtype=float) for name, value in known.items()}
     direct = values.pop("friction.a")
-    return {"friction.b − friction.a": np.asarray(sum(values.values()) - direct)}
+    return {"friction.b − friction.a": np.sum(np.broadcast_arrays(*values.values()), axis=0) - direct}
 
 
 def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str, float]:

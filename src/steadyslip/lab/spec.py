@@ -11,13 +11,15 @@ from steadyslip.config.lines import line_of
 from steadyslip.config.read import from_tables, parsed, text_of
 from steadyslip.errors import NotAvailable, ParameterError, Problem, RigFileError, unknown_name
 from steadyslip.lab.columns import ROLES
-from steadyslip.lab.compare import Comparison, compare_laws
-from steadyslip.lab.fit import Fit, fit
+from steadyslip.lab.compare import LawComparison, compare_laws
+from steadyslip.lab.fit import fit
 from steadyslip.lab.plan import AXES, DRIVES
-from steadyslip.lab.record import Record, read_record
+from steadyslip.lab.read import read_record
+from steadyslip.lab.record import Record
+from steadyslip.lab.result import Fit
 from steadyslip.lab.starts import STARTS
 from steadyslip.protocol import Protocol
-from steadyslip.records import checked_number, Parameter, positive
+from steadyslip.records import Parameter, checked_number, positive
 from steadyslip.slider import Slider
 
 RECORD_KEYS = (*ROLES, "area", "normal_stress", "table", "between", "skip_bad_lines", "decimate")
@@ -76,7 +78,7 @@ class Spec:
         rig, parts = self._for(records)
         return fit(rig, parts, **self.options, protocol=self.protocol, **changes)
 
-    def compare(self, records: Sequence[Record], **changes: Any) -> Comparison:
+    def compare(self, records: Sequence[Record], **changes: Any) -> LawComparison:
         """Fit all laws that the file lists."""
         rig, parts = self._for(records)
         options = {k: v for k, v in self.options.items() if k not in ("free", "separate")}
@@ -151,7 +153,12 @@ def default_spec(evolution: str = "slip") -> Spec:
 
 
 def lab_rig(
-    evolution: str = "slip", *, states: int = 1, normal_memory: str = "none", stiffness: Any = None, v_ref: Any = "1 um/s"
+    evolution: str = "slip",
+    *,
+    states: int = 1,
+    normal_memory: str = "none",
+    stiffness: Any = None,
+    v_ref: Any = "1 um/s",
 ) -> Slider:
     """A rig for fits: rate-and-state friction in a press, whose numbers stand for what is to be fitted.
 
@@ -167,7 +174,9 @@ def lab_rig(
     v_ref : float or str
         Rate at which mu_ref holds.
     """
-    text = f"[friction]\nevolution = {evolution!r}\nv_ref = {v_ref!r}\n[friction.normal_memory]\nlaw = {normal_memory!r}\n"
+    text = (
+        f"[friction]\nevolution = {evolution!r}\nv_ref = {v_ref!r}\n[friction.normal_memory]\nlaw = {normal_memory!r}\n"
+    )
     spec = spec_from_text(f"{text}[fit]\nstates = {states}\n", "lab_rig")
     if stiffness is None:
         return spec.rig
@@ -301,7 +310,7 @@ def _placed(problems: Iterable[Problem], lines: dict[str, int]) -> list[Problem]
 def fit_files(
     paths: Sequence[str | PathLike[str]], spec: str | PathLike[str] | None = None, changes: Iterable[str] = (),
     *, skip_bad_lines: bool = False,
-) -> tuple[Fit, Comparison | None]:  # fmt: skip
+) -> tuple[Fit, LawComparison | None]:  # fmt: skip
     """Read records and fit them, as the command line does.
 
     Parameters
@@ -318,7 +327,7 @@ def fit_files(
     -------
     fit : Fit
         The best, where laws are compared.
-    comparison : Comparison or None
+    comparison : LawComparison or None
 
     Raises
     ------

@@ -191,8 +191,8 @@ def _start(unknown: Unknown, part: Part, own: Features, design: tuple[Array, ...
     if name == "friction.a":
         return a
     if name == "friction.mu_ref":
-        velocity_share = np.log(rig.drive.velocity / rig.value("friction.v_ref"))
-        return own.friction - (a - b) * velocity_share
+        reference = rig.parameters()["friction.v_ref"].value or 1.0
+        return np.asarray(own.friction - (a - b) * np.log(rig.drive.velocity / reference))
     if last == "b":
         if ".states." in name:  # the first state takes up what the others leave
             member = int(name.split(".")[2])

@@ -66,7 +66,8 @@ def smoothed(time: Array, displacement: Array) -> Array:
 
 
 def _displacement_noise(displacement: Array) -> float:
-    return max(_noise(np.diff(displacement, 2)) / np.sqrt(6.0), RESOLUTION * float(np.ptp(displacement)))
+    white = _noise(np.diff(displacement, 2)) / 6.0**0.5
+    return float(max(white, RESOLUTION * float(np.ptp(displacement))))
 
 
 def velocity_steps(time: Array, displacement: Array) -> tuple[Step, ...]:
@@ -132,7 +133,8 @@ def _line(time: Array, values: Array) -> tuple[float, float]:
 
 def _split(time: Array, values: Array, noise: float, linear: bool) -> list[tuple[int, int]]:
     """Ranges of samples on which a line (or a level) fits to within the noise: halved where that helps most."""
-    waiting, done = [(0, len(time))], []
+    waiting = [(0, len(time))]
+    done: list[tuple[int, int]] = []
     while waiting:
         i, j = waiting.pop()
         cut, gain = _best_cut(time[i:j], values[i:j], linear)
@@ -152,7 +154,9 @@ def _without_wander(time: Array, values: Array, ends: list[tuple[int, int]]) -> 
     ends = list(ends)
     while len(ends) > 1:
         lines = [_line(time[i:j], values[i:j]) for i, j in ends]
-        strays = np.concatenate([values[i:j] - y - s * (time[i:j] - time[i]) for (i, j), (y, s) in zip(ends, lines, strict=True)])
+        strays = np.concatenate(
+            [values[i:j] - y - s * (time[i:j] - time[i]) for (i, j), (y, s) in zip(ends, lines, strict=True)]
+        )
         usual = float(np.quantile(np.abs(strays), 0.95))
         lengths = np.array([time[j - 1] - time[i] for i, j in ends])
         slopes = np.array([slope for _, slope in lines])
@@ -199,7 +203,7 @@ def _misfits(t: Array, y: Array, linear: bool) -> Array:
 def _rates_differ(a: float, b: float) -> bool:
     if a <= 0 or b <= 0:
         return a != b
-    return abs(np.log(a / b)) > LEAST_RATE
+    return bool(abs(np.log(a / b)) > LEAST_RATE)
 
 
 def _levels_differ(a: float, b: float) -> bool:

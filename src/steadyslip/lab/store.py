@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from contextlib import suppress
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from steadyslip.errors import NotAvailable
-from steadyslip.lab.fit import Fit, Search
 from steadyslip.lab.identify import Combination
 from steadyslip.lab.noise import Noise
 from steadyslip.lab.plan import Plan, with_sharp_changes
 from steadyslip.lab.record import Record
+from steadyslip.lab.result import Fit, Search
+from steadyslip.output import write_dataset
 
 _COLUMNS = ("time", "friction", "normal", "shear", "displacement", "velocity")
 _OPTIONS = ("free", "separate", "drive", "trend", "trend_axis", "offset", "loss", "width", "rtol")
@@ -76,16 +73,7 @@ def save(fit: Fit, path: str | PathLike[str]) -> None:
     NotAvailable
         If the file cannot be written.
     """
-    target, temporary = Path(path), ""
-    try:
-        descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=".nc")
-        os.close(descriptor)
-        to_dataset(fit).to_netcdf(temporary, engine="netcdf4")
-        os.replace(temporary, target)
-    except OSError as error:
-        with suppress(OSError):
-            os.unlink(temporary)
-        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    write_dataset(to_dataset(fit), path)
 
 
 def load_fit(path: str | PathLike[str]) -> Fit:
@@ -109,19 +97,22 @@ def load_fit(path: str | PathLike[str]) -> Fit:
 
     attributes = dataset.attrs
     text = str(attributes["rig"])
-    options = json.loads(attributes["options"])
+    stored = json.loads(attributes["options"])
+    options: dict[str, Any] = {n: tuple(value) if isinstance(value, list) else value for n, value in stored.items()}
     described = json.loads(attributes["records"])
     records = tuple(_record(dataset, i, *about) for i, about in enumerate(described, start=1))
     weights = None
     if "weight_1" in dataset:
         weights = tuple(dataset[f"weight_{i}"].values for i in range(1, len(records) + 1))
-    plan = with_sharp_changes(Plan(
-        rig=rig_from_text(text, str(path)),
-        records=records,
-        protocol=protocol_from_text(text, str(path)) if attributes["has_protocol"] else None,
-        weights=weights,
-        **{name: tuple(value) if isinstance(value, list) else value for name, value in options.items()},
-    ))
+    plan = with_sharp_changes(
+        Plan(
+            rig=rig_from_text(text, str(path)),
+            records=records,
+            protocol=protocol_from_text(text, str(path)) if attributes["has_protocol"] else None,
+            weights=weights,
+            **options,
+        )
+    )
     noises = tuple(
         Noise(lag1, bool(correlated), dataset[f"noise_coefficients_{i}"].values, innovation,
               dataset[f"noise_covariance_{i}"].values)
@@ -143,5 +134,7 @@ def load_fit(path: str | PathLike[str]) -> Fit:
 
 
 def _record(dataset: Any, i: int, source: str, notes: list[str], integrated: bool) -> Record:
-    columns = {name: dataset[f"{name}_{i}"].values if f"{name}_{i}" in dataset else None for name in _COLUMNS}
+    columns: dict[str, Any] = {
+        name: dataset[f"{name}_{i}"].values if f"{name}_{i}" in dataset else None for name in _COLUMNS
+    }
     return Record(**columns, source=source, notes=tuple(notes), integrated=bool(integrated))

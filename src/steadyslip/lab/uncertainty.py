@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.lab.fit import Fit
 from steadyslip.lab.least_squares import minimise
+from steadyslip.lab.result import Fit
 from steadyslip.quantities import shown
 
 Array = np.ndarray
@@ -294,7 +294,11 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     kept = sampler.get_chain(discard=steps // 3, thin=max(1, int(time / 2)), flat=True)
-    details = {"acceptance": float(np.mean(sampler.acceptance_fraction)), "autocorrelation": time, "steps": float(steps)}
+    details = {
+        "acceptance": float(np.mean(sampler.acceptance_fraction)),
+        "autocorrelation": time,
+        "steps": float(steps),
+    }
     return _draws(fit, "posterior", kept, details)
 
 
@@ -306,7 +310,7 @@ def _stretch(fit: Fit) -> Array:
     _, jacobian = fit.comparison.residuals(fit.coordinates[None])
     information = jacobian[0] @ jacobian[0].T / (fit.ssq / max(fit.degrees, 1))
     known = np.isfinite(np.diag(fit.covariance))
-    stretch = np.eye(size) / np.sqrt(np.mean([noise.inflation for noise in fit.noise]))
+    stretch: Array = np.eye(size) / np.sqrt(np.mean([noise.inflation for noise in fit.noise]))
     inner = np.ix_(known, known)
     root = np.linalg.cholesky(information[inner])
     wanted = np.linalg.cholesky(np.linalg.inv(fit.covariance[inner]))

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from steadyslip.config import piece_from_text, read_protocol, read_rig
-from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.errors import ParameterError, Problem
 from steadyslip.motion.result import History
 from steadyslip.motion.single import simulate
+from steadyslip.output import FIGURES, write_by_ending
 from steadyslip.protocol import Protocol
 from steadyslip.records import Parameter, checked_number, positive
 
-FIGURES = (".png", ".svg", ".pdf")
+ENDINGS = (".nc", ".csv", *FIGURES)
 
 
 def run_file(
@@ -101,16 +102,5 @@ def write_history(history: History, path: Path, kind: str = "history") -> None:
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    ending = path.suffix.lower()
-    if ending == ".nc":
-        history.save(path)
-    elif ending == ".csv":
-        history.to_csv(path)
-    elif ending in FIGURES:
-        axes = np.atleast_1d(np.asarray(history.plot(kind), dtype=object))
-        try:
-            axes[0].figure.savefig(path, dpi=150)
-        except OSError as error:
-            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
-    else:
-        raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are .nc, .csv, {', '.join(FIGURES)}")
+    writers = {".nc": history.save, ".csv": history.to_csv}
+    write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind), dtype=object)))

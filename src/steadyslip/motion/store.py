@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from contextlib import suppress
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from steadyslip.errors import NotAvailable
 from steadyslip.motion.events import Event
+from steadyslip.output import write_dataset
 
 if TYPE_CHECKING:
     from steadyslip.motion.result import History
@@ -57,17 +54,7 @@ def save(history: History, path: str | PathLike[str]) -> None:
     NotAvailable
         If the file cannot be written.
     """
-    target = Path(path)
-    temporary = ""
-    try:
-        descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=".nc")
-        os.close(descriptor)
-        to_dataset(history).to_netcdf(temporary, engine="netcdf4")
-        os.replace(temporary, target)
-    except OSError as error:
-        with suppress(OSError):
-            os.unlink(temporary)
-        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    write_dataset(to_dataset(history), path)
 
 
 def load_history(path: str | PathLike[str]) -> History:

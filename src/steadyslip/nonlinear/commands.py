@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.config import read_rig
-from steadyslip.errors import NotAvailable
 from steadyslip.nonlinear.basin import basin
 from steadyslip.nonlinear.branch import Cycle, CycleBranch
 from steadyslip.nonlinear.cycles import cycles
 from steadyslip.nonlinear.threshold import Threshold, threshold
+from steadyslip.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
 
-FIGURES = (".png", ".svg", ".pdf")
+ENDINGS = (".nc", ".csv", *FIGURES)
 
 
 def cycles_of_file(
@@ -47,18 +47,8 @@ def write_branch(branch: CycleBranch, path: Path) -> None:
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    ending = path.suffix.lower()
-    try:
-        if ending == ".nc":
-            branch.to_xarray().to_netcdf(path)
-        elif ending == ".csv":
-            branch.to_csv(path)
-        elif ending in FIGURES:
-            branch.plot().figure.savefig(path, dpi=150)
-        else:
-            raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are .nc, .csv, {', '.join(FIGURES)}")
-    except OSError as error:
-        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    writers = {".nc": lambda p: write_dataset(branch.to_xarray(), p), ".csv": branch.to_csv}
+    write_by_ending(path, writers, branch.plot)
 
 
 @dataclass(frozen=True)
@@ -99,9 +89,4 @@ def write_basin(thresholds: Thresholds, path: Path) -> None:
     NotAvailable
         If the ending is not that of a figure, or the file cannot be written.
     """
-    if path.suffix.lower() not in FIGURES:
-        raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are {', '.join(FIGURES)}")
-    try:
-        basin(thresholds.rig).plot().figure.savefig(path, dpi=150)
-    except OSError as error:
-        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    write_by_ending(path, {}, lambda: basin(thresholds.rig).plot())

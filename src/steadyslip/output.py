@@ -1,0 +1,74 @@
+"""Files that results are written to: which endings there are, refused before anything is computed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from steadyslip.errors import NotAvailable
+
+FIGURES = (".png", ".svg", ".pdf")
+
+
+def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
+    """Refuse files that could not be written.
+
+    Raises
+    ------
+    NotAvailable
+        If an ending is unknown, or the folder does not exist.
+    """
+    for path in paths:
+        if path.suffix.lower() not in allowed:
+            raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are {', '.join(allowed)}")
+        if not path.absolute().parent.is_dir():
+            raise NotAvailable(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
+
+
+def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]], figure: Callable[[], Any]) -> None:
+    """Write with the writer of a file's ending, or the figure, an Axes or an array of them.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is unknown or the file cannot be written.
+    """
+    check_output([path], (*writers, *FIGURES))
+    ending = path.suffix.lower()
+    try:
+        if ending in writers:
+            writers[ending](path)
+            return
+        axes = figure()
+        first = axes.flat[0] if hasattr(axes, "flat") else axes
+        first.figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+
+
+def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
+    """Write an xarray.Dataset as netCDF; a file of that name is replaced only once the new one is whole.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    target, temporary = Path(path), ""
+    try:
+        descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=".nc")
+        os.close(descriptor)
+        dataset.to_netcdf(temporary, engine="netcdf4")
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)  # temporary files are the owner's alone
+        os.replace(temporary, target)
+    except OSError as error:
+        with suppress(OSError):
+            os.unlink(temporary)
+        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error

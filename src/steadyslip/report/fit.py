@@ -1,0 +1,85 @@
+"""A fit as one HTML page."""
+
+from __future__ import annotations
+
+import html
+import io
+from typing import TYPE_CHECKING, Any
+
+from steadyslip.errors import NotAvailable
+from steadyslip.quantities import shown
+
+if TYPE_CHECKING:
+    from steadyslip.lab import Fit
+    from steadyslip.lab.compare import LawComparison
+
+_STYLE = (
+    "body{font-family:sans-serif;max-width:60em;margin:2em auto;padding:0 1em;line-height:1.4}"
+    "table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}"
+    "svg{max-width:100%;height:auto}.warning{background:#fff3d6;padding:.5em 1em;margin:.5em 0}pre{overflow:auto}"
+)
+
+
+def fit_report(fit: Fit, comparison: LawComparison | None = None) -> str:
+    """The page of a fit: estimates, warnings, figures, what was done to the records, and the rig file.
+
+    Parameters
+    ----------
+    fit : Fit
+    comparison : LawComparison, optional
+        Of this fit with others.
+
+    Returns
+    -------
+    str
+        HTML that refers to nothing outside itself.
+    """
+    from steadyslip.config import rig_to_text
+    from steadyslip.lab.words import warnings
+
+    sources = ", ".join(record.source for record in fit.plan.records)
+    parts = [f"<h1>Fit to {html.escape(sources)}</h1>", _estimates(fit)]
+    parts += [f'<p class="warning">{html.escape(text)}</p>' for text in warnings(fit)]
+    if comparison is not None:
+        parts.append(f"<h2>Laws compared</h2><pre>{html.escape(str(comparison))}</pre>")
+    parts += [_figure(fit, "fit", record=i) for i in range(len(fit.plan.records))]
+    parts.append(_figure(fit, "corner"))
+    parts.append(f"<h2>Details</h2><pre>{html.escape(str(fit))}</pre>")
+    for record in fit.plan.records:
+        parts.append(f"<h2>Record</h2><pre>{html.escape(str(record))}</pre>")
+    parts.append(f"<h2>Rig with the fitted values</h2><pre>{html.escape(rig_to_text(fit.rig()))}</pre>")
+    parts.append(f"<p>steadyslip {html.escape(fit.version)}</p>")
+    title = f"<title>Fit to {html.escape(sources)}</title>"
+    head = f'<!doctype html><html lang="en"><head><meta charset="utf-8">{title}<style>{_STYLE}</style></head>'
+    return f"{head}<body>{''.join(parts)}</body></html>\n"
+
+
+def _estimates(fit: Fit) -> str:
+    rows = ["<tr><th>parameter</th><th>value</th><th>95 %</th></tr>"]
+    for one in fit.estimates:
+        ends = f"{shown(one.low, one.unit)} to {shown(one.high, one.unit)}" if one.determined else "not determined"
+        rows.append(
+            f"<tr><td>{html.escape(one.name)}</td><td>{html.escape(one.shown())}</td><td>{html.escape(ends)}</td></tr>"
+        )
+    return f"<table>{''.join(rows)}</table>"
+
+
+def _figure(fit: Fit, kind: str, **options: Any) -> str:
+    """A figure as SVG text."""
+    from matplotlib.figure import Figure
+
+    from steadyslip import figures
+
+    drawn = Figure(figsize=(7.5, 5.0) if kind == "fit" else (8.0, 8.0), layout="constrained")
+    try:
+        if kind == "fit":
+            figures.fit(fit, drawn.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0)), **options)
+        else:
+            count = sum(one.determined for one in fit.estimates)
+            figures.corner(fit, drawn.subplots(count, count, squeeze=False))
+    except (NotAvailable, ValueError):
+        return ""
+    text = io.StringIO()
+    drawn.savefig(text, format="svg", dpi=100, metadata={"Date": None})
+    svg = text.getvalue()
+    return svg[svg.index("<svg") :]

@@ -22,6 +22,9 @@ from steadyslip.slider import Slider
 
 Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
+SAME = 1e-2  # difference of rough sums of squares, as a share, between starts that lead to one minimum
+ENOUGH = 3  # starts that lead to the best minimum: with fewer, another round of starts may find a better one
+ROUNDS = 4
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 
 ERRORS = ("auto", "correlated", "independent")
@@ -124,9 +127,13 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
     thin = _thinned(plan)
     quick = replace(thin, rtol=1e-5).comparison(threads)
     whole = plan.comparison(threads)
-    begin = starting_points(whole.parts, space, starts)
     low, high = search_bounds(whole.parts, space)
-    rough = minimise(lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4)
+    rough = Minima(np.empty((0, len(space))), np.empty(0), np.empty(0, dtype=bool), np.empty(0, dtype=int))
+    for again in range(ROUNDS):
+        begin = starting_points(whole.parts, space, starts, again)
+        rough = rough + minimise(lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4)
+        if np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)) >= ENOUGH:
+            break
     if not np.any(np.isfinite(rough.ssq)):
         raise NotAvailable(
             "the model cannot follow these records from any start; is the rig's law and drive that of the experiment?"
@@ -138,10 +145,10 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
     if not np.isfinite(best):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     others = sorted({round(float(s / best), 4) for s in found.ssq if np.isfinite(s) and s > best * (1 + 1e-4)})
-    arrived = int(np.sum(rough.ssq <= rough.ssq[chosen[order[0]]] * (1 + 1e-2)))
+    arrived = int(np.sum(rough.ssq <= rough.ssq[chosen[order[0]]] * (1 + SAME)))
     found.coordinates = _ordered(found.coordinates, space)
     minima = Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
-    search = Search(starts, arrived, tuple(others), int(minima.iterations[0]), bool(minima.converged[0]))
+    search = Search(len(rough.ssq), arrived, tuple(others), int(minima.iterations[0]), bool(minima.converged[0]))
     return minima, search, (low, high)
 
 

@@ -38,6 +38,15 @@ class Minima:
     converged: Array
     iterations: Array
 
+    def __add__(self, other: Minima) -> Minima:
+        """Those of both."""
+        return Minima(
+            np.concatenate([self.coordinates, other.coordinates]),
+            np.concatenate([self.ssq, other.ssq]),
+            np.concatenate([self.converged, other.converged]),
+            np.concatenate([self.iterations, other.iterations]),
+        )
+
 
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,

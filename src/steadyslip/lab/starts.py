@@ -59,7 +59,7 @@ def features(record: Record, rate: float) -> Features:
     level = float(np.median(mu[:first]))
     steps = [s for s in record.steps if s.kind == "velocity step"]
     steps.sort(key=lambda s: -abs(np.log(s.after / s.before)))
-    slope = max((_steepest(record, moved, s, rate) for s in record.steps), default=_steepest_anywhere(moved, mu))
+    slope = max((_steepest(record, moved, s) for s in record.steps), default=_steepest_anywhere(moved, mu))
     total = max(float(moved[-1]), 1e-12)
     spacing = float(np.median(np.diff(time))) * max(rate, *(s.after for s in steps), 0.0) if steps else total / len(mu)
     shortest = max(min(0.5 * spacing, total / 50), total * 1e-5)
@@ -108,11 +108,14 @@ def _smoothed(values: Array, width: int = 3) -> Array:
     return np.convolve(values, np.ones(width) / width, mode="valid")
 
 
-def _steepest(record: Record, moved: Array, step: Step, rate: float) -> float:
-    """Rise of friction with displacement right after a step, over windows from three samples on."""
-    begin = int(np.searchsorted(record.time, step.time)) - 1
-    count = min(200, len(record.time) - max(begin, 0))
-    part = slice(max(begin, 0), max(begin, 0) + count)
+def _steepest(record: Record, moved: Array, step: Step) -> float:
+    """Rise of friction with displacement right after a step; without the jump of friction at one of normal stress."""
+    begin = max(int(np.searchsorted(record.time, step.time)) - 1, 0)
+    if step.unit == "Pa":
+        begin = int(np.searchsorted(record.time, step.time + step.duration, side="right")) + 1
+    part = slice(begin, begin + 200)
+    if len(record.time[part]) < 3:
+        return 0.0
     return _steepest_anywhere(moved[part], record.friction[part])
 
 
@@ -130,12 +133,12 @@ def _steepest_anywhere(moved: Array, mu: Array) -> float:
     return max(best, float(np.ptp(mu)) / max(float(np.ptp(moved)), 1e-12))
 
 
-def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS) -> Array:
-    """Coordinates to start from, (count, p): a design over what the records leave open."""
+def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, again: int = 0) -> Array:
+    """Coordinates to start from, (count, p): a design over what the records leave open, another one each time."""
     from scipy.stats import qmc
 
     found = [features(part.record, part.rig.drive.velocity) for part in parts]
-    grid = qmc.Sobol(6, rng=12345).random(64)[:count] if count <= 64 else qmc.Sobol(6, rng=12345).random(count)
+    grid = qmc.Halton(6, rng=12345).random((again + 1) * count)[again * count :]
     shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
     d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
     directs = [f.direct for f in found if f.direct is not None]

@@ -13,7 +13,7 @@ import sympy as sp
 from steadyslip.compiled.build import compiled, interpreted
 from steadyslip.compiled.kernel import Choice
 from steadyslip.compiled.lockstep import LockstepText
-from steadyslip.compiled.reduction import Reduction, reduce_model
+from steadyslip.compiled.reduction import Reduction, W, reduce_model
 from steadyslip.compiled.variational import with_directions
 from steadyslip.expressions import array_function
 from steadyslip.model import Model
@@ -58,7 +58,8 @@ class ExperimentProgram:
     @cached_property
     def _start(self) -> list[sp.Expr]:
         model = self.reduction.model
-        return [model.steady[symbol] for symbol in self.reduction.continuous]
+        steady = model.steady | {W: self.reduction.w_of_v.xreplace(model.steady)}
+        return [steady[symbol] for symbol in self.reduction.continuous]
 
     @cached_property
     def _values(self) -> Any:

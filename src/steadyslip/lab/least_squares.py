@@ -75,9 +75,9 @@ def minimise(
     everyone = np.arange(count)
     found = Minima(z.copy(), np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
     r, jacobian = residuals(z, everyone)
-    ssq = _squares(r)
-    found.ssq[:] = ssq
     normal, gradient = _normal(r, jacobian)
+    ssq = np.where(_usable(normal, gradient), _squares(r), np.inf)
+    found.ssq[:] = ssq
     damping, scale = np.full(count, 1e-2), np.zeros((count, size))
     active = everyone[np.isfinite(ssq)]
     keep = np.isfinite(ssq)
@@ -106,7 +106,8 @@ def minimise(
         taken = trial - z
         expected = np.einsum("mi,mi->m", gradient, taken) * 2 - np.einsum("mi,mij,mj->m", taken, normal, taken)
         r, jacobian = residuals(trial, active)
-        after = _squares(r)
+        new_normal, new_gradient = _normal(r, jacobian)
+        after = np.where(_usable(new_normal, new_gradient), _squares(r), np.inf)
         good = after < found.ssq[active]
         with np.errstate(all="ignore"):
             ratio = np.where(expected > 0, (found.ssq[active] - after) / expected, 0.0)
@@ -115,8 +116,7 @@ def minimise(
         better = active[good]
         found.coordinates[better], found.ssq[better] = trial[good], after[good]
         found.iterations[active] = iteration
-        if np.any(good):
-            normal[good], gradient[good] = _normal(r[good], jacobian[good])
+        normal[good], gradient[good] = new_normal[good], new_gradient[good]
     return found
 
 
@@ -128,7 +128,14 @@ def _squares(r: Array) -> Array:
 
 def _normal(r: Array, jacobian: Array) -> tuple[Array, Array]:
     """JᵀJ and −Jᵀr, r being data minus model and J the model's derivative."""
-    return np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
+    with np.errstate(all="ignore"):
+        return np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
+
+
+def _usable(normal: Array, gradient: Array) -> Array:
+    """Whether a motion gave numbers at all, and none near the end of floating point."""
+    size = np.max(np.abs(normal), axis=(1, 2), initial=0.0) + np.max(np.abs(gradient), axis=1, initial=0.0)
+    return np.asarray(size < 1e100)
 
 
 def _solved(normal: Array, gradient: Array, free: Array, extra: Array) -> Array:

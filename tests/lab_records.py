@@ -40,7 +40,10 @@ PULSED = ss.Protocol(
     until=220.0,
 )
 SHAKEN = ss.Protocol(
-    pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressHarmonic(at=120.0, amplitude=0.02 * STRESS, period=20.0)),
+    pieces=(
+        ss.VelocityStep(at=60.13, to=3e-6),
+        ss.NormalStressHarmonic(at=120.0, amplitude=0.02 * STRESS, period=20.0),
+    ),
     until=220.0,
 )
 
@@ -61,7 +64,9 @@ def columns(source: ss.Slider, protocol: ss.Protocol, count: int = 2000, uniform
     }
 
 
-def record(source: ss.Slider, protocol: ss.Protocol, seed: int = 0, noise: float = NOISE, **options: object) -> ss.Record:
+def record(
+    source: ss.Slider, protocol: ss.Protocol, seed: int = 0, noise: float = NOISE, **options: object
+) -> ss.Record:
     """A noisy record."""
     found = columns(source, protocol, **options)
     found["friction"] = found["friction"] + noise * np.random.default_rng(seed).standard_normal(len(found["time"]))

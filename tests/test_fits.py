@@ -18,9 +18,7 @@ from steadyslip.lab.least_squares import minimise
 from steadyslip.lab.noise import describe, lag_one
 from steadyslip.lab.plan import make_plan
 
-BASALT, SEPIOLITE = (
-    f"examples/data/{name}_velocity_step.txt" for name in ("basalt_b819", "sepiolite_013")
-)
+BASALT, SEPIOLITE = (f"examples/data/{name}_velocity_step.txt" for name in ("basalt_b819", "sepiolite_013"))
 
 
 @cache
@@ -84,7 +82,9 @@ def test_random_truths_come_back(seed):
     rig = lab.rig(a=a, b=b, d_c=10 ** rng.uniform(-5.6, -4.4), mu_ref=rng.uniform(0.4, 0.7))
     unit = rig.value("friction.d_c") / lab.SLOW
     least = max(0.4, 2 * (b - a) / a)
-    rig = rig.with_values({"slider.stiffness": least * 10 ** rng.uniform(0, 1) * a * lab.STRESS / rig.value("friction.d_c")})
+    rig = rig.with_values(
+        {"slider.stiffness": least * 10 ** rng.uniform(0, 1) * a * lab.STRESS / rig.value("friction.d_c")}
+    )
     ratio = rng.choice([0.1, 0.3, 3.0, 10.0])
     end = 12 * unit + 30 * unit / min(ratio, 1)
     protocol = ss.Protocol(pieces=(ss.VelocityStep(at=12 * unit, to=ratio * lab.SLOW),), until=end)
@@ -118,7 +118,9 @@ def test_every_lane_solves_its_own_problem():
     def valley(z, _):
         x, y = z.T
         r = np.stack([-10 * (y - x**2), -(1 - x)], axis=1)
-        rows = np.stack([np.stack([-20 * x, -np.ones_like(x)], 1), np.stack([np.full_like(x, 10.0), np.zeros_like(x)], 1)], 1)
+        rows = np.stack(
+            [np.stack([-20 * x, -np.ones_like(x)], 1), np.stack([np.full_like(x, 10.0), np.zeros_like(x)], 1)], 1
+        )
         return r, rows
 
     start = np.random.default_rng(0).uniform(-2, 2, (40, 2))
@@ -156,7 +158,9 @@ def test_intervals_cover_as_often_as_they_say():
     space = plan.space()
     truth = space.coordinates(np.array([rig.value(u.parameter) for u in space.unknowns]))
     data = record.friction + lab.NOISE * np.random.default_rng(5).standard_normal((count, len(record)))
-    found = minimise(lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high)
+    found = minimise(
+        lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high
+    )
     assert np.all(found.converged)
     search = stepped().search
     inside = np.zeros((count, 2, len(space)))
@@ -192,7 +196,9 @@ def test_correlated_residuals_are_noticed_and_errors_honest():
     truth = space.coordinates(np.array([rig.value(u.parameter) for u in space.unknowns]))
     data = record.friction + lab.NOISE * np.array([correlated_noise(len(record), 0.8, s) for s in range(count)])
     comparison = plan.comparison()
-    found = minimise(lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high)
+    found = minimise(
+        lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high
+    )
     repeated = np.std(found.coordinates, axis=0)
     noisy = replace(record, friction=data[0])
     honest = ss.fit(ss.lab_rig(), noisy)
@@ -266,7 +272,9 @@ def test_alpha_is_not_given_an_absurd_error_from_a_velocity_step():
 
 def test_a_normal_stress_history_leaves_one_direction_open():
     """At constant load-point velocity (a, b, d_c, alpha) have one direction without effect, to first order."""
-    protocol = ss.Protocol(pieces=(ss.NormalStressHarmonic(amplitude=1e-4 * lab.STRESS, period=15.0, at=20.0),), until=200.0)
+    protocol = ss.Protocol(
+        pieces=(ss.NormalStressHarmonic(amplitude=1e-4 * lab.STRESS, period=15.0, at=20.0),), until=200.0
+    )
     small = ss.precision(lab.rig(alpha=0.4), protocol, fixed=["slider.stiffness"], noise=2e-6)
     (open_one,) = small.unidentified
     names = {"friction.a", "friction.b", "friction.d_c", "friction.normal_memory.alpha"}
@@ -340,7 +348,10 @@ def test_losses_are_what_scipy_calls_them(loss):
     r = np.concatenate([-np.geomspace(1e-3, 30, 40), np.geomspace(1e-3, 30, 40)])
     transformed, slope = lost(loss, r, 2.0)
     word = loss.replace("-", "_")
-    costs = [2 * least_squares(lambda x, v=v: np.array([x[0] + v]), [0.0], loss=word, f_scale=2.0, max_nfev=1).cost for v in r]
+    costs = [
+        2 * least_squares(lambda x, v=v: np.array([x[0] + v]), [0.0], loss=word, f_scale=2.0, max_nfev=1).cost
+        for v in r
+    ]
     np.testing.assert_allclose(transformed**2, costs, rtol=1e-9)
     step = 1e-6
     np.testing.assert_allclose(
@@ -423,7 +434,7 @@ def test_criteria_prefer_the_law_that_made_the_record():
     other = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, 3))
     with pytest.raises(ss.ParameterError, match="other records"):
         ss.compare({"one": found.fits["slip"], "two": other})
-    with pytest.raises(ss.ParameterError, match="'two states'|two states"):
+    with pytest.raises(ss.ParameterError, match="two states"):
         ss.compare_laws(ss.lab_rig(), record, ("slips",))
 
 

@@ -89,8 +89,13 @@ def test_hdf5_matlab_and_parquet(tmp_path, clean):
 
     with h5py.File(tmp_path / "r.h5", "w") as file:
         group = file.create_group("run7")
-        for name, values, unit in (("time", clean["time"], "s"), ("load_disp", 1e6 * clean["displacement"], "um"),
-                                   ("friction", clean["friction"], "1"), ("normal", 1e-6 * clean["normal"], "MPa")):  # fmt: skip
+        stored = {
+            "time": (clean["time"], "s"),
+            "load_disp": (1e6 * clean["displacement"], "um"),
+            "friction": (clean["friction"], "1"),
+            "normal": (1e-6 * clean["normal"], "MPa"),
+        }
+        for name, (values, unit) in stored.items():
             group[name] = values
             group[name].attrs["units"] = unit
         group["other"] = np.zeros(7)
@@ -179,7 +184,9 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, clean):
     message = faults(unitless)
     assert "'Displacement' has no unit" in message
     assert "'Normal stress' has no unit" in message
-    pascal = write(tmp_path / "pa.csv", [table[0], table[2] * 2e7, table[3]], "Time(s),Shear stress(MPa),Normal stress(MPa)")
+    pascal = write(
+        tmp_path / "pa.csv", [table[0], table[2] * 2e7, table[3]], "Time(s),Shear stress(MPa),Normal stress(MPa)"
+    )
     assert "which no contact has" in faults(pascal)
     assert "no such file" in faults(tmp_path / "nothing.csv")
     assert "is a folder" in faults(tmp_path)
@@ -204,7 +211,10 @@ def test_loss_of_contact_is_refused_unless_cut_away(tmp_path, clean):
     assert "leaves 0 samples" in faults(path, between=(1000, 2000))
 
 
-@given(st.sampled_from(["s", "ms", "min", "um", "mm", "MPa", "kPa", "kN"]), st.sampled_from(["{}({})", "{} [{}]", "{}_{}", "{}, {}"]))
+@given(
+    st.sampled_from(["s", "ms", "min", "um", "mm", "MPa", "kPa", "kN"]),
+    st.sampled_from(["{}({})", "{} [{}]", "{}_{}", "{}, {}"]),
+)
 def test_units_in_names(unit, form):
     head, found = split_name(form.format("column", unit))
     assert head == "column"

@@ -201,9 +201,16 @@ def _as_given(
         for known in (list(names), list(heads)):
             if known.count(value) == 1:
                 return known.index(value), stated, None
-        if stated is None and _known_unit(value) is not None:
-            return None, _known_unit(value), None
+        found = _known_unit(value)
+        if stated is None and found is not None and _fits(role, found):
+            return None, found, None
     return None, None, unknown_name("column", value, names)
+
+
+def _fits(role: str, name: str) -> bool:
+    """Whether a unit is one of a role's, forces included."""
+    dimension = unit(name)[1]
+    return dimension == unit(ROLES[role])[1] or (role in ("shear", "normal") and dimension == unit("N")[1])
 
 
 def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[int]:
@@ -242,7 +249,7 @@ def _with_unit(
             return None, fault + f"{role}=({name!r}, {_usual(role)!r})", notes
     factor, dimension = unit(found)
     force = role in ("shear", "normal") and dimension == unit("N")[1]
-    if dimension != unit(ROLES[role])[1] and not force:
+    if not _fits(role, found):
         wanted = described(ROLES[role]) + (" or a force" if role in ("shear", "normal") else "")
         return None, f"column {name!r} is in {found}; expected {wanted}", notes
     return Column(role, name, found, factor, force), None, notes

@@ -55,6 +55,8 @@ class Spec:
         Whether every step of a record is a record of its own.
     v_ref_given : bool
         Whether the file says at which rate mu_ref holds; the rate at the start of the first record unless given.
+    contact_given : bool
+        Whether it says what presses the surfaces together.
     """
 
     rig: Slider
@@ -64,6 +66,7 @@ class Spec:
     laws: tuple[str, ...] = ()
     windows: bool = False
     v_ref_given: bool = False
+    contact_given: bool = True
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
         """Read a record as the file says."""
@@ -86,6 +89,13 @@ class Spec:
 
     def _for(self, records: Sequence[Record]) -> tuple[Slider, tuple[Record, ...]]:
         parts = tuple(w for r in records for w in (r.windows() if self.windows else (r,)))
+        pressed = [record.normal is not None for record in parts]
+        if not (self.contact_given or all(pressed)):
+            message = (
+                f"{parts[pressed.index(False)].source} has no column for it; name one, or write "
+                "normal_stress = '20 MPa' in [record], or a table [contact]"
+            )
+            raise ParameterError([Problem("normal", message)])
         rate = parts[0].initial_rate
         known = "friction.v_ref" in self.rig.parameters()
         if self.v_ref_given or not known or not rate or not rate > 0:
@@ -125,6 +135,7 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
         problems += [Problem(f"{target}.{k}", unknown_name("key", k, keys)) for k in found if k not in keys]
     problems += _checked_record(record) + _checked_fit(options)
     v_ref_given = isinstance(tables.get("friction"), dict) and "v_ref" in tables["friction"]
+    contact_given = "contact" in tables
     missing = _completed(tables, options.pop("states", None), problems)
     from steadyslip.config.changes import apply
 
@@ -144,7 +155,7 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
         options["free"] = sorted(name for name in missing if name in rig.parameters())
         if "friction.mu_ref" not in missing and "friction.mu_ref" in rig.parameters():
             options["fixed"] = [*options.get("fixed", []), "friction.mu_ref"]
-    return Spec(rig, protocol, record, options, tuple(laws), windows, v_ref_given)
+    return Spec(rig, protocol, record, options, tuple(laws), windows, v_ref_given, contact_given)
 
 
 def default_spec(evolution: str = "slip") -> Spec:

@@ -89,7 +89,8 @@ def _noisy_drive(fit: Fit, part: Any) -> str | None:
     if moved < 0.3 * fit.rms:
         return None
     return (
-        f"{record.source}: the load point is measured to {shown(noise, 'm')} only, which moves the model by {moved:.2g} "
+        f"{record.source}: the load point is measured to {shown(noise, 'm')} only, which moves the model by "
+        f"{moved:.2g} "
         "in friction; that makes the stiffness come out too low; compare with drive='smoothed'"
     )
 

@@ -1,0 +1,165 @@
+"""Fits from files: one command from a record to a verdict, and messages that say exactly what is wrong."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import lab_records as lab
+import steadyslip as ss
+from steadyslip.lab.spec import spec_from_text
+from steadyslip.report import fit_report
+from test_command_line import run
+
+BASALT = "examples/data/basalt_b819_velocity_step.txt"
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Everything that one command writes."""
+    folder = tmp_path_factory.mktemp("fit")
+    outputs = [word for end in ("nc", "html", "json", "png") for word in ("-o", folder / f"fit.{end}")]
+    done = run("fit", BASALT, "examples/basalt.toml", *outputs)
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+def test_from_a_record_to_estimates(fitted):
+    folder, text = fitted
+    assert "velocity step at 11676.3 s: 3.015 um/s to 10.03 um/s" in text
+    assert "friction.d_c      10.09 um ±" in text
+    assert "steps back 1773 times" in text
+    assert f"wrote {folder / 'fit.html'}" in text
+    data = json.loads((folder / "fit.json").read_text())
+    assert data["parameters"]["friction.a"]["value"] == pytest.approx(0.00696, rel=0.003)
+    assert data["search"]["converged"] is True
+    assert data["correlated"] is True
+    page = (folder / "fit.html").read_text()
+    assert page.count("<svg") == 2
+    assert "http-equiv" not in page
+    assert "d_c = 1.00" in page
+    assert (folder / "fit.png").stat().st_size > 10_000
+
+
+def test_from_estimates_to_a_verdict(fitted):
+    folder, _ = fitted
+    done = run("analyze", "examples/double-direct-shear.toml", "--fit", folder / "fit.nc")
+    assert done.stdout.startswith("Stable: steady sliding is stable with probability more than 99.9")
+    assert "friction.b − friction.a" in done.stdout
+    assert "With the best values\nSTABLE" in done.stdout
+    done = run(
+        "analyze", "examples/double-direct-shear.toml", "--fit", folder / "fit.nc", "--json", "--require-stable",
+        "--set", "stiffness=0.5 GPa/m",
+    )  # fmt: skip
+    assert done.returncode == 1
+    data = json.loads(done.stdout)
+    assert data["prediction"]["probability_stable"] < 0.2
+    assert data["prediction"]["dominant"] == "friction.b − friction.a"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "messages"),
+    [
+        (["nothing.csv"], ["'nothing.csv': no such file"]),
+        ([BASALT, "-o", "fit.doc"], ["allowed endings are .nc, .html, .json, .png, .svg, .pdf"]),
+        ([BASALT, "-o", "no/such/folder/fit.nc"], ["there is no folder 'no/such/folder'"]),
+        (["examples/basalt.toml"], ["no record given"]),
+        ([BASALT, "examples/basalt.toml", "examples/sepiolite.toml"], ["allowed: one"]),
+        ([BASALT, "--set", "fit.trend=x"], ["fit.trend: got 'x'; allowed: a whole number >= 0"]),
+        ([BASALT, "--set", "fit.tend=1"], ["unknown key 'tend'; did you mean 'trend'?"]),
+        ([BASALT, "--set", "record.normal=kPa"], ["is in MPa by its name, but kPa is asked for"]),
+        ([BASALT, "--set", "record.friction=Mu"], ["unknown column 'Mu'", "allowed: Time(s), "]),
+        ([BASALT, "--set", "record.between=[0, 10]"], ["leaves 0 samples"]),
+        ([BASALT, "--set", "friction.evolution=agin"], ["did you mean 'aging'?"]),
+        ([BASALT, "--set", 'fit.free=["friction.q"]'], ["unknown parameter 'friction.q'"]),
+    ],
+)
+def test_mistakes_end_with_one_message_and_status_2(arguments, messages):
+    done = run("fit", *arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    for message in messages:
+        assert message in done.stderr
+
+
+def test_all_faults_of_the_file_of_a_fit_are_found_at_once():
+    text = '[friction]\nevolutoin = "aging"\nb = "x"\n[fit]\ntrend = "a"\nfreee = ["a"]\n'
+    text += '[record]\ntim = "x"\nbetween = 3\n'
+    with pytest.raises(ss.RigFileError) as caught:
+        spec_from_text(text)
+    found = {(p.line, p.name) for p in caught.value.problems}
+    assert found == {
+        (2, "friction.evolutoin"), (3, "friction.b"), (5, "fit.trend"), (6, "fit.freee"), (8, "record.tim"),
+        (9, "record.between"),
+    }  # fmt: skip
+
+
+def test_what_is_missing_is_fitted_and_what_is_given_is_not():
+    spec = spec_from_text("[friction]\na = 0.01\n[slider]\nstiffness = '20 GPa/m'\n")
+    assert set(spec.options["free"]) == {"friction.b", "friction.d_c", "friction.mu_ref"}
+    spec = spec_from_text("[friction]\nnormal_memory = 'linker-dieterich'\n[fit]\nstates = 2\n")
+    assert "friction.normal_memory.alpha" in spec.options["free"]
+    assert "friction.states.2.d_c" in spec.options["free"]
+    whole = spec_from_text(Path("examples/inclined-spring.toml").read_text())
+    assert "free" not in whole.options
+    record = lab.record(lab.rig(), lab.STEP)
+    fit = spec_from_text(f"[friction]\nmu_ref = 0.62\nv_ref = '1 um/s'\n[slider]\nstiffness = {lab.STIFFNESS}\n").fit(
+        [record]
+    )
+    assert set(fit.names) == {"friction.a", "friction.b", "friction.d_c"}
+
+
+def test_without_normal_stress_a_stiffness_means_nothing():
+    record = lab.record(lab.rig(), lab.STEP)
+    bare = ss.record_from_arrays(record.time, friction=record.friction, displacement=record.displacement)
+    with pytest.raises(ss.ParameterError, match="normal_stress = "):
+        spec_from_text("[friction]\n").fit([bare])
+    fit = spec_from_text("[friction]\n[contact]\nlaw = 'constant'\nsteady_normal_stress = '10 MPa'\n").fit([bare])
+    assert fit.values["slider.stiffness"] == pytest.approx(lab.STIFFNESS, rel=0.05)
+
+
+def test_laws_are_compared_and_records_fitted_together(tmp_path):
+    for name, seed in (("one", 1), ("two", 2)):
+        lab.record(lab.rig(), lab.STEP, seed, count=800).to_csv(tmp_path / f"{name}.csv")
+    (tmp_path / "spec.toml").write_text(
+        '[friction]\n[fit]\ncompare = ["slip", "aging"]\nseparate = ["friction.mu_ref"]\n'
+    )
+    done = run("fit", tmp_path / "one.csv", tmp_path / "two.csv", tmp_path / "spec.toml", "--json", "--bootstrap", "20")
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert data["comparison"]["slip"]["weight"] > 0.99
+    assert data["samples"] == 1600
+    assert data["bootstrap"]["friction.a"]["error"] > 0
+
+
+def test_reports_escape_what_came_from_outside():
+    record = lab.record(lab.rig(), lab.STEP)
+    fit = ss.fit(ss.lab_rig(), replace(record, source="<script>alert(1)</script>"))
+    page = fit_report(fit)
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
+
+
+def test_figures_show_what_was_measured_and_found():
+    record = lab.record(lab.rig(alpha=0.35), lab.PRESSED)
+    panels = ss.figures.record(record, Figure().subplots(3, 1))
+    np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), record.friction)
+    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point rate (µm/s)", "normal stress (MPa)"]
+    assert len(panels[0].lines) == 1 + len(record.steps)
+    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), record)
+    panels = ss.figures.fit(fit, Figure().subplots(2, 1))
+    np.testing.assert_array_equal(panels[0].lines[1].get_ydata(), fit.model)
+    np.testing.assert_allclose(panels[1].lines[0].get_ydata(), 1e3 * fit.residuals)
+    count = len(fit.names)
+    grid = ss.figures.corner(fit, Figure(figsize=(9, 9)).subplots(count, count))
+    assert grid[-1, 0].get_xlabel() == "a (1)"
+    assert not grid[0, -1].get_visible()
+    drawn = ss.figures.prediction(ss.predict(lab.rig(alpha=0.35), fit), Figure().subplots())
+    assert drawn.get_xlabel() == "stiffness (GPa/m)"
+    with pytest.raises(ss.ParameterError, match="sequence of 3"):
+        ss.figures.record(record, Figure().subplots(2, 1))

@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.lab.comparison import Comparison
 from steadyslip.lab.identify import combinations, prior_information
-from steadyslip.lab.least_squares import Minima, minimise
+from steadyslip.lab.least_squares import SAME, Minima, minimise
 from steadyslip.lab.noise import describe, white
 from steadyslip.lab.plan import Plan, check_width, make_plan
 from steadyslip.lab.record import Record, transient_rows
@@ -22,7 +22,7 @@ from steadyslip.slider import Slider
 
 Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
-SAME = 1e-2  # difference of rough sums of squares, as a share, between starts that lead to one minimum
+HOPE = 2.0  # times the best rough sum of squares: finalists beyond have no chance
 ENOUGH = 3  # starts that lead to the best minimum: with fewer, another round of starts may find a better one
 ROUNDS = 4
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
@@ -131,7 +131,9 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
     rough = Minima(np.empty((0, len(space))), np.empty(0), np.empty(0, dtype=bool), np.empty(0, dtype=int))
     for again in range(ROUNDS):
         begin = starting_points(whole.parts, space, starts, again)
-        rough = rough + minimise(lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4)
+        rough = rough + minimise(
+            lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH
+        )
         if np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)) >= ENOUGH:
             break
     if not np.any(np.isfinite(rough.ssq)):
@@ -139,12 +141,13 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
             "the model cannot follow these records from any start; is the rig's law and drive that of the experiment?"
         )
     chosen = _distinct(rough, FINALISTS)
-    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=True)
+    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1)
     order = np.argsort(found.ssq, kind="stable")
     best = found.ssq[order[0]]
     if not np.isfinite(best):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
-    others = sorted({round(float(s / best), 4) for s in found.ssq if np.isfinite(s) and s > best * (1 + 1e-4)})
+    worse = np.concatenate([found.ssq / best, rough.ssq[rough.converged] / np.min(rough.ssq)])
+    others = sorted({float(f"{x:.3g}") for x in worse if np.isfinite(x) and x > 1 + SAME})
     arrived = int(np.sum(rough.ssq <= rough.ssq[chosen[order[0]]] * (1 + SAME)))
     found.coordinates = _ordered(found.coordinates, space)
     minima = Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
@@ -191,7 +194,7 @@ def _distinct(rough: Minima, most: int) -> Array:
         near = [np.max(np.abs(rough.coordinates[i] - rough.coordinates[k])) < 0.02 for k in chosen]
         if not any(near):
             chosen.append(int(i))
-        if len(chosen) == most:
+        if len(chosen) == most or rough.ssq[i] > HOPE * rough.ssq[order[0]]:
             break
     return np.array(chosen)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -78,14 +78,19 @@ class Forward:
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.threads = rig, tuple(names), rtol, shifts, threads
         own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
-        self.model = model_values(rig, own).model
+        self._base = model_values(rig, own)
+        self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
         self.directions = len(names) + shifts if sensitive else 0
         self.program = experiment_program(self.model, self.directions, automatic_method(reduction))
 
     def values(self, parameters: Array) -> Values:
         """The model's parameters for rows of the free ones, (jobs, names)."""
-        return model_values(self.rig, {name: parameters[:, i] for i, name in enumerate(self.names)})
+        varied = {name: parameters[:, i] for i, name in enumerate(self.names)}
+        if self.rig.axial_stiffness is not None:  # k follows from other parameters
+            return model_values(self.rig, varied)
+        named = self._base.named() | varied
+        return replace(self._base, arguments=tuple(named.values()), shape=(len(parameters),))
 
     def _chain(self, parameters: Array, values: Values) -> Array:
         """How the model's parameters change with the free ones."""
@@ -152,7 +157,9 @@ class Forward:
                 own.input_rates, found[part], taken[part],
             )  # fmt: skip
 
-        if len(found):
+        if len(found) <= LANES:
+            work(0, len(found), threading.Event())
+        else:
             run_many(work, len(found), self.threads, LANES, lanes=LANES)
         if found is not seen:
             seen[good] = found

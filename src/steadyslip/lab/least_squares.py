@@ -17,6 +17,7 @@ Residuals = Callable[[Array, Array], tuple[Array, Array]]
 CONVERGED = 1e-10  # reduction of the sum of squares that is still to be had, as a share of it
 STALLED = 1e-7  # the same, where no step succeeds any more: below this the sum is at its rounding
 STEEPEST = 1e10  # of the damping
+SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
 
@@ -50,7 +51,7 @@ class Minima:
 
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
-    tolerance: float = CONVERGED, race: bool = False,
+    tolerance: float = CONVERGED, race: int = 0,
 ) -> Minima:  # fmt: skip
     """Minimise the sum of squares of every problem.
 
@@ -66,8 +67,9 @@ def minimise(
         Coordinates that stay where they are.
     tolerance : float
         Reduction still to be had, as a share of the sum, at which a problem is done.
-    race : bool
-        All problems are one, from several starts: once one is done, those that promise no better stop too.
+    race : int
+        All problems are one, from several starts: once so many are done at the best place, those that promise no
+        better stop too. Zero: they are not.
     """
     count, size = start.shape
     z = np.clip(start, low, high)
@@ -92,7 +94,9 @@ def minimise(
         promise = _promise(normal, gradient, free)
         over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | (damping[active] > STEEPEST)
         if race and np.any(found.converged):
-            over |= found.ssq[active] - promise > (1 - 1e-9) * np.min(found.ssq[found.converged])
+            best = np.min(found.ssq[found.converged])
+            if np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
+                over |= found.ssq[active] - promise > (1 - 1e-9) * best
         if np.any(over):
             ended = active[over]
             found.converged[ended] = promise[over] <= max(STALLED, tolerance) * np.maximum(found.ssq[ended], 1e-300)

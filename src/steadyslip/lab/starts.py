@@ -152,6 +152,8 @@ def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, ag
     steepness = max(f.slope for f in found) * 10.0 ** (1.2 * grid[:, 3] - 0.1)
     steepness = np.minimum(steepness, STIFFEST * a / d_c)
     alpha = 0.1 + 0.5 * grid[:, 4]
+    alike = np.argsort(steepness / a)  # lanes of one vector wait for the stiffest of them
+    d_c, a, b, steepness, alpha, grid = (x[alike] for x in (d_c, a, b, steepness, alpha, grid))
     values = np.zeros((count, len(space)))
     for i, unknown in enumerate(space.unknowns):
         part = parts[unknown.record or 0]

@@ -12,7 +12,7 @@ from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_nam
 from steadyslip.lab.comparison import Comparison
 from steadyslip.lab.identify import combinations, prior_information
 from steadyslip.lab.least_squares import SAME, Minima, minimise
-from steadyslip.lab.noise import describe, white
+from steadyslip.lab.noise import DETECTED, describe, lag_one, white
 from steadyslip.lab.plan import Plan, check_width, make_plan
 from steadyslip.lab.record import Record, transient_rows
 from steadyslip.lab.result import Fit, Search
@@ -23,8 +23,7 @@ from steadyslip.slider import Slider
 Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
 HOPE = 2.0  # times the best rough sum of squares: finalists beyond have no chance
-ENOUGH = 3  # starts that lead to the best minimum: with fewer, another round of starts may find a better one
-ROUNDS = 4
+ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 
 ERRORS = ("auto", "correlated", "independent")
@@ -122,37 +121,55 @@ def fit(
 
 
 def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Search, tuple[Array, Array]]:
-    """The best minimum: many starts on few samples, the best of them on all."""
-    space = plan.space()
-    thin = _thinned(plan)
-    quick = replace(thin, rtol=1e-5).comparison(threads)
-    whole = plan.comparison(threads)
+    """The best minimum: from several starts on few samples, the best of those on all.
+
+    A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
+    then more, as long as hardly any lead to the best minimum.
+    """
+    space, whole = plan.space(), plan.comparison(threads)
+    quick = replace(_thinned(plan), rtol=1e-5).comparison(threads)
     low, high = search_bounds(whole.parts, space)
     rough = Minima(np.empty((0, len(space))), np.empty(0), np.empty(0, dtype=bool), np.empty(0, dtype=int))
-    for again in range(ROUNDS):
-        begin = starting_points(whole.parts, space, starts, again)
+    for upto in (-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts):
+        begin = starting_points(whole.parts, space, upto - len(rough.ssq), len(rough.ssq))
         rough = rough + minimise(
             lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH
         )
-        if np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)) >= ENOUGH:
+        if not np.any(np.isfinite(rough.ssq)):
+            continue
+        arrived = int(np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)))
+        if arrived < ENOUGH or (upto < starts and arrived < upto / 3):
+            continue
+        found = _polished(whole, rough, low, high)
+        if upto >= starts or not _leaves_structure(whole, found.coordinates[0]):
             break
-    if not np.any(np.isfinite(rough.ssq)):
-        raise NotAvailable(
-            "the model cannot follow these records from any start; is the rig's law and drive that of the experiment?"
-        )
+    else:
+        if not np.any(np.isfinite(rough.ssq)):
+            raise NotAvailable(
+                "the model cannot follow these records from any start; are law and drive those of the experiment?"
+            )
+        found = _polished(whole, rough, low, high)
+    if not np.isfinite(found.ssq[0]):
+        raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
+    worse = np.concatenate([found.ssq / found.ssq[0], rough.ssq[rough.converged] / np.min(rough.ssq)])
+    others = sorted({float(f"{x:.3g}") for x in worse if np.isfinite(x) and x > 1 + SAME})
+    search = Search(len(rough.ssq), arrived, tuple(others), int(found.iterations[0]), bool(found.converged[0]))
+    found.coordinates = _ordered(found.coordinates, space)
+    return found, search, (low, high)
+
+
+def _polished(whole: Comparison, rough: Minima, low: Array, high: Array) -> Minima:
+    """The best of rough minima brought to their end, the best first."""
     chosen = _distinct(rough, FINALISTS)
     found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1)
     order = np.argsort(found.ssq, kind="stable")
-    best = found.ssq[order[0]]
-    if not np.isfinite(best):
-        raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
-    worse = np.concatenate([found.ssq / best, rough.ssq[rough.converged] / np.min(rough.ssq)])
-    others = sorted({float(f"{x:.3g}") for x in worse if np.isfinite(x) and x > 1 + SAME})
-    arrived = int(np.sum(rough.ssq <= rough.ssq[chosen[order[0]]] * (1 + SAME)))
-    found.coordinates = _ordered(found.coordinates, space)
-    minima = Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
-    search = Search(len(rough.ssq), arrived, tuple(others), int(minima.iterations[0]), bool(minima.converged[0]))
-    return minima, search, (low, high)
+    return Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
+
+
+def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
+    """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
+    r = whole.residuals(coordinates[None])[0][0]
+    return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
 
 
 def _ordered(coordinates: Array, space: Space) -> Array:

@@ -39,6 +39,8 @@ class Features:
         Change of steady friction per e-fold, a − b.
     slope : float
         Steepest rise of friction with displacement of the load point, 1/m.
+    least_slope : float
+        Range of friction over the whole displacement, 1/m.
     shortest, longest : float
         Slip distances that could show, m.
     """
@@ -47,6 +49,7 @@ class Features:
     direct: float | None
     drop: float | None
     slope: float
+    least_slope: float
     shortest: float
     longest: float
 
@@ -66,7 +69,7 @@ def features(record: Record, rate: float) -> Features:
     direct = drop = None
     if steps:
         direct, drop = _response(record, moved, steps[0])
-    return Features(level, direct, drop, slope, shortest, total / 2)
+    return Features(level, direct, drop, slope, float(np.ptp(mu)) / total, shortest, total / 2)
 
 
 def _moved(record: Record, rate: float) -> Array:
@@ -126,19 +129,19 @@ def _steepest_anywhere(moved: Array, mu: Array) -> float:
     for width in (2, 3, 5, 9, 17, 33, 65):
         if len(mu) <= width:
             break
-        rise = np.abs(mu[width:] - mu[:-width]) - 3 * noise
+        rise = np.abs(mu[width:] - mu[:-width]) - 5 * noise
         gone = moved[width:] - moved[:-width]
-        moving = gone > 1e-6 * moved[-1]
+        moving = gone > 3e-4 * (moved[-1] - moved[0])
         best = max(best, float(np.max(rise[moving] / gone[moving], initial=0.0)))
     return max(best, float(np.ptp(mu)) / max(float(np.ptp(moved)), 1e-12))
 
 
-def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, again: int = 0) -> Array:
-    """Coordinates to start from, (count, p): a design over what the records leave open, another one each time."""
+def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, already: int = 0) -> Array:
+    """Coordinates to start from, (count, p): a design over what the records leave open, continued after `already`."""
     from scipy.stats import qmc
 
     found = [features(part.record, part.rig.drive.velocity) for part in parts]
-    grid = qmc.Halton(6, rng=12345).random((again + 1) * count)[again * count :]
+    grid = qmc.Halton(6, rng=12345).random(already + count)[already:]
     shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
     d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
     directs = [f.direct for f in found if f.direct is not None]
@@ -178,8 +181,7 @@ def search_bounds(parts: Sequence[Part], space: Space) -> tuple[Array, Array]:
             ends = 1e-5, 1.0
         elif last in ("stiffness", "axial_stiffness", "kp"):
             stress = max(_stress(part) for part in parts)
-            slopes = [f.slope for f in own]
-            ends = min(slopes) * stress * 1e-3, max(slopes) * stress * 1e3
+            ends = min(f.least_slope for f in own) * stress * 1e-2, max(f.slope for f in own) * stress * 1e3
         else:
             continue
         low[i] = max(low[i], float(unknown.coordinate(ends[0])))

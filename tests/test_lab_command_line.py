@@ -24,7 +24,7 @@ def fitted(tmp_path_factory):
     """Everything that one command writes."""
     folder = tmp_path_factory.mktemp("fit")
     outputs = [word for end in ("nc", "html", "json", "png") for word in ("-o", folder / f"fit.{end}")]
-    done = run("fit", BASALT, "examples/basalt.toml", *outputs)
+    done = run("fit", BASALT, "examples/fits/basalt.toml", *outputs)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -32,7 +32,7 @@ def fitted(tmp_path_factory):
 def test_from_a_record_to_estimates(fitted):
     folder, text = fitted
     assert "velocity step at 11676.3 s: 3.015 um/s to 10.03 um/s" in text
-    assert "friction.d_c      10.09 um ±" in text
+    assert "friction.d_c      10.09 ± 0.87 um" in text
     assert "steps back 1773 times" in text
     assert f"wrote {folder / 'fit.html'}" in text
     data = json.loads((folder / "fit.json").read_text())
@@ -68,8 +68,8 @@ def test_from_estimates_to_a_verdict(fitted):
         (["nothing.csv"], ["'nothing.csv': no such file"]),
         ([BASALT, "-o", "fit.doc"], ["allowed endings are .nc, .html, .json, .png, .svg, .pdf"]),
         ([BASALT, "-o", "no/such/folder/fit.nc"], ["there is no folder 'no/such/folder'"]),
-        (["examples/basalt.toml"], ["no record given"]),
-        ([BASALT, "examples/basalt.toml", "examples/sepiolite.toml"], ["allowed: one"]),
+        (["examples/fits/basalt.toml"], ["no record given"]),
+        ([BASALT, "examples/fits/basalt.toml", "examples/fits/sepiolite.toml"], ["allowed: one"]),
         ([BASALT, "--set", "fit.trend=x"], ["fit.trend: got 'x'; allowed: a whole number >= 0"]),
         ([BASALT, "--set", "fit.tend=1"], ["unknown key 'tend'; did you mean 'trend'?"]),
         ([BASALT, "--set", "record.normal=kPa"], ["is in MPa by its name, but kPa is asked for"]),

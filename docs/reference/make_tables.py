@@ -9,6 +9,7 @@ from dataclasses import MISSING
 from pathlib import Path
 
 import steadyslip
+from steadyslip import figures
 from steadyslip.config.layout import PROTOCOL, has_choice, is_per_area, own_fields, sections, selector, total_unit
 from steadyslip.protocol import Protocol
 from steadyslip.records import Option, Parameter, Part, Record, Samples
@@ -138,6 +139,7 @@ GROUPS = {
     "drive": "Drives",
     "errors": "Exceptions",
     "friction": "Friction laws",
+    "lab": "Records and fits",
     "linear": "Linear stability",
     "model": "The Model",
     "motion": "Motion",
@@ -152,16 +154,8 @@ ORDER = (
     *("analysis", "steady", "linear", "model", "records"),
 )
 MODULES = {
-    "figures": (
-        "basin",
-        "critical_stiffness_against_mass",
-        "cycle_branch",
-        "history",
-        "hopf_curve",
-        "phase_plane",
-        "root_locus",
-        "stability_chart",
-    ),
+    "figures": tuple(name for name in figures.__all__ if name.islower()),
+    "report": ("fit_report",),
     "testing": ("check_friction_law", "check_contact_law"),
 }
 

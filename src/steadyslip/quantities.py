@@ -285,3 +285,26 @@ def shown(value: float, si_unit: str, digits: int = 4) -> str:
     if not 1e-3 <= size / factor < 1e5:
         return f"{value:.{digits}g} {si_unit}"
     return f"{value / factor:.{digits}g} {prefix}{si_unit}"
+
+
+def shown_error(value: float, error: float, si_unit: str) -> str:
+    """A value and its error for people, both in the unit in which the value reads best.
+
+    >>> shown_error(1.009e-5, 8.7e-7, "m"), shown_error(0.00696, 0.00043, "1")
+    ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
+    """
+    number, _, name = shown(value, si_unit).partition(" ")
+    factor = value / float(number) if float(number) else 1.0
+    return f"{number} ± {error / factor:.2g} {name}".rstrip()
+
+
+def shown_range(low: float, high: float, si_unit: str) -> str:
+    """Two values for people, in the unit in which the second reads best.
+
+    >>> shown_range(8.52e-6, 1.195e-5, "m")
+    '8.52 to 11.95 um'
+    """
+    number, _, name = shown(high, si_unit).partition(" ")
+    if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
+        return f"{shown(low, si_unit)} to {shown(high, si_unit)}"
+    return f"{low * float(number) / high:.4g} to {number} {name}".rstrip()

@@ -16,7 +16,7 @@ from steadyslip.lab.identify import Combination
 from steadyslip.lab.noise import Noise
 from steadyslip.lab.plan import Plan
 from steadyslip.lab.unknowns import Space
-from steadyslip.quantities import shown
+from steadyslip.quantities import shown, shown_error, shown_range
 from steadyslip.records import resolve
 from steadyslip.slider import Slider
 
@@ -54,11 +54,16 @@ class Estimate:
 
     def shown(self) -> str:
         """Value and error for people."""
-        if self.unit == "s":  # a time on the record's clock
-            value, error = f"{self.value:.7g} s", f"{self.error:.2g} s"
-        else:
-            value, error = shown(self.value, self.unit), shown(self.error, self.unit, 2)
-        return f"{value} ± {error}" if self.determined else f"{value} (not determined)"
+        clock = self.unit == "s"  # times are those of the record's clock
+        if not self.determined:
+            return f"{f'{self.value:.7g} s' if clock else shown(self.value, self.unit)} (not determined)"
+        return f"{self.value:.7g} ± {self.error:.2g} s" if clock else shown_error(self.value, self.error, self.unit)
+
+    def range(self) -> str:
+        """The 95 % interval for people."""
+        return (
+            f"{self.low:.7g} to {self.high:.7g} s" if self.unit == "s" else shown_range(self.low, self.high, self.unit)
+        )
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.lab.least_squares import minimise
 from steadyslip.lab.result import Fit
-from steadyslip.quantities import shown
+from steadyslip.quantities import shown, shown_error, shown_range
 
 Array = np.ndarray
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
@@ -59,8 +59,8 @@ class Draws:
         lines = [f"{len(self)} draws, {self.kind} ({details})"]
         for one in self.fit.estimates:
             low, high = self.interval(one.name)
-            error = shown(self.error(one.name), one.unit, 2)
-            lines.append(f"  {one.name}  ± {error}   95 %: {shown(low, one.unit)} to {shown(high, one.unit)}")
+            middle = shown_error(float(np.mean(self[one.name])), self.error(one.name), one.unit)
+            lines.append(f"  {one.name}  {middle}   95 %: {shown_range(low, high, one.unit)}")
         return "\n".join(lines)
 
     def plot(self, ax: Any = None) -> Any:

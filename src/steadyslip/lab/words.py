@@ -21,7 +21,7 @@ def words(fit: Fit) -> str:
     wide = max(len(name) for name in names)
     rows = []
     for name, one in zip(names, fit.estimates, strict=True):
-        interval = f"   95 %: {_end(one, one.low)} to {_end(one, one.high)}" if one.determined else ""
+        interval = f"   95 %: {one.range()}" if one.determined else ""
         rows.append(f"  {name:<{wide}}  {one.shown()}{interval}")
     sources = ", ".join(record.source for record in fit.plan.records)
     friction = type(fit.plan.rig.friction).__name__
@@ -39,10 +39,6 @@ def short_names(names: tuple[str, ...]) -> list[str]:
         brief = f"{first}.{last}" if first not in ("protocol",) and ".states." not in name else name
         found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
     return found
-
-
-def _end(one: Any, value: float) -> str:
-    return f"{value:.7g} s" if one.unit == "s" else shown(value, one.unit)
 
 
 def _quality(fit: Fit) -> list[str]:

@@ -7,7 +7,6 @@ import io
 from typing import TYPE_CHECKING, Any
 
 from steadyslip.errors import NotAvailable
-from steadyslip.quantities import shown
 
 if TYPE_CHECKING:
     from steadyslip.lab import Fit
@@ -57,7 +56,7 @@ def fit_report(fit: Fit, comparison: LawComparison | None = None) -> str:
 def _estimates(fit: Fit) -> str:
     rows = ["<tr><th>parameter</th><th>value</th><th>95 %</th></tr>"]
     for one in fit.estimates:
-        ends = f"{shown(one.low, one.unit)} to {shown(one.high, one.unit)}" if one.determined else "not determined"
+        ends = one.range() if one.determined else "not determined"
         rows.append(
             f"<tr><td>{html.escape(one.name)}</td><td>{html.escape(one.shown())}</td><td>{html.escape(ends)}</td></tr>"
         )

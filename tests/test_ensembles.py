@@ -63,7 +63,7 @@ def test_threads_chunks_and_order_change_nothing(events, monkeypatch):
     second = many(k, threads=3, events=events)
     order = np.random.default_rng(1).permutation(300)
     shuffled = many(k[order], events=events)
-    monkeypatch.setattr(engine.run_many, "__defaults__", (None, 32, None))
+    monkeypatch.setattr(engine.run_many, "__defaults__", (None, 32, None, 8))
     small = many(k, threads=2, events=events)
     for name, values in first.final.items():
         np.testing.assert_array_equal(second.final[name], values)
@@ -134,7 +134,7 @@ def test_regimes_mix():
 def test_interruption_returns_what_is_done(monkeypatch):
     k = kappas(4000)
     many(k[:16])  # compiled before the clock runs
-    monkeypatch.setattr(engine.run_many, "__defaults__", (None, 64, None))
+    monkeypatch.setattr(engine.run_many, "__defaults__", (None, 64, None, 8))
     timer = threading.Timer(0.3, _thread.interrupt_main)
     started = time.monotonic()
     timer.start()

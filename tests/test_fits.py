@@ -393,7 +393,7 @@ def test_a_commanded_step_whose_time_is_not_known():
     at = fit["protocol.pieces.1.at"]
     assert at.value == pytest.approx(60.13, abs=4 * at.error)
     assert at.error < 0.05
-    assert "s ±" in str(at)
+    assert str(at).endswith(" s")
 
 
 # -- real records

@@ -140,3 +140,9 @@ def test_any_size_of_any_parameter(data):
 def test_extremes(change):
     judged_rig = ss.read_rig(EXAMPLE, [change])
     judged(ss.rig_to_text(judged_rig))
+
+
+def test_an_onset_lost_in_rounding_is_left_out():
+    text = TEXT.replace("alpha = 0.56", "alpha = 1e17")
+    assert text != TEXT
+    judged(text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -198,7 +199,8 @@ def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | N
         if margin.parameter == name:
             edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]
             if edges:
-                return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)
+                with suppress(NotAvailable):  # lost in rounding
+                    return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)
     return None
 
 

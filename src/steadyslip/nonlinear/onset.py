@@ -160,10 +160,18 @@ def parameter_along(rig: Slider, along: str) -> str:
 
 
 def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
-    """Kind of onset at an oscillatory edge found before."""
+    """Kind of onset at an oscillatory edge found before.
+
+    Raises
+    ------
+    NotAvailable
+        If the numbers of the rig are so far apart that rounding hides it.
+    """
     name = edge.parameter
     values = _flat(rig, name, [edge.value], branch)
     found = coefficients(values, np.array([edge.angular_frequency]))
+    if not np.isfinite(found["c1"][0]):
+        raise NotAvailable(f"the kind of onset at {name} = {edge.value:.4g} is lost in rounding")
     return Onset(
         rig=rig,
         along=name,
@@ -237,9 +245,12 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
         return np.asarray(rows[:, :, None] * matrix * columns[:, None, :])
 
     def solve(matrix: Array, right: Array) -> Array:
-        """matrix⁻¹ right, in scaled rows and columns."""
-        found: Array = columns * np.linalg.solve(scaled(matrix), (rows * right)[:, :, None])[:, :, 0]
-        return found
+        """matrix⁻¹ right, in scaled rows and columns; NaN where rounding has made the matrix singular."""
+        balanced = scaled(matrix)
+        singular = np.linalg.cond(balanced) > 1 / np.finfo(float).eps
+        balanced = np.where(singular[:, None, None], np.eye(n), balanced)
+        found: Array = columns * np.linalg.solve(balanced, (rows * right)[:, :, None])[:, :, 0]
+        return np.where(singular[:, None], np.nan, found)
 
     critical = scaled(gradient - 1j * omega[:, None, None] * mass)
     left, _, right = np.linalg.svd(critical)

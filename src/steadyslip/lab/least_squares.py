@@ -115,7 +115,7 @@ def minimise(
         good = after < found.ssq[active]
         with np.errstate(all="ignore"):
             ratio = np.where(expected > 0, (found.ssq[active] - after) / expected, 0.0)
-        factor = np.where(good, np.where(ratio > 0.75, 0.1, np.where(ratio > 0.25, 0.5, 2.0)), 5.0)
+        factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), 2.0)  # slow to give up, quick to go on
         damping[active] = np.clip(damping[active] * factor, 1e-12, None)
         better = active[good]
         found.coordinates[better], found.ssq[better] = trial[good], after[good]

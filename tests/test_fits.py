@@ -258,6 +258,19 @@ def test_blocks_keep_correlation():
         assert blocks.error(name) == pytest.approx(fit.errors[name], rel=0.5)
 
 
+def test_a_jump_at_an_unknown_time_makes_errors_that_are_not_gaussian():
+    """After a small step the first response is lost between samples; the fit says so, and the profile knows it."""
+    rig = lab.rig(ss.Aging(), alpha=0.45)
+    protocol = ss.Protocol(
+        pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressStep(at=140.37, by=-0.02 * lab.STRESS)), until=260.0
+    )
+    fit = ss.fit(ss.lab_rig("aging", normal_memory="linker-dieterich"), lab.record(rig, protocol, 3, count=800))
+    assert "errors of what the jump tells" in " ".join(str(fit).split())
+    assert "the load point is measured" not in str(fit)
+    low, high = ss.profile(fit, "alpha", reach=8, count=65).interval(0.999)
+    assert low < 0.45 < high
+
+
 # -- what the data cannot tell
 
 

@@ -1,4 +1,4 @@
-"""Files that results are written to: which endings there are, refused before anything is computed."""
+"""Files of results: which endings there are, refused before anything is computed; netCDF written whole and read."""
 
 from __future__ import annotations
 
@@ -72,3 +72,20 @@ def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
         with suppress(OSError):
             os.unlink(temporary)
         raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+
+
+def read_dataset(path: str | PathLike[str]) -> Any:
+    """Read a netCDF file into memory.
+
+    Raises
+    ------
+    NotAvailable
+        If it cannot be read.
+    """
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_times=False) as file:
+            return file.load()
+    except (OSError, ValueError) as error:
+        raise NotAvailable(f"cannot read {str(path)!r}: {error}") from error

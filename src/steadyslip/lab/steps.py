@@ -60,13 +60,16 @@ def smoothed(time: Array, displacement: Array) -> Array:
     """A displacement without its noise: straight between the places where its slope changes."""
     from scipy.interpolate import LSQUnivariateSpline
 
-    ends = _split(time, displacement, _displacement_noise(displacement), linear=True)
+    ends = _split(time, displacement, displacement_noise(time, displacement), linear=True)
     knots = [float(time[i]) for i, _ in ends[1:]]
     return np.asarray(LSQUnivariateSpline(time, displacement, knots, k=1)(time))
 
 
-def _displacement_noise(displacement: Array) -> float:
-    white = _noise(np.diff(displacement, 2)) / 6.0**0.5
+def displacement_noise(time: Array, displacement: Array) -> float:
+    """Standard deviation of what a sample strays from the line through its neighbours, steps left out."""
+    share = (time[2:] - time[1:-1]) / (time[2:] - time[:-2])
+    strays = displacement[1:-1] - share * displacement[:-2] - (1 - share) * displacement[2:]
+    white = _noise(strays / np.sqrt(1 + share**2 + (1 - share) ** 2))
     return float(max(white, RESOLUTION * float(np.ptp(displacement))))
 
 
@@ -74,7 +77,7 @@ def velocity_steps(time: Array, displacement: Array) -> tuple[Step, ...]:
     """Changes of the load-point rate: kinks of a displacement that is made of straight lines."""
     if len(time) < 2 * FEWEST:
         return ()
-    ends = _split(time, displacement, _displacement_noise(displacement), linear=True)
+    ends = _split(time, displacement, displacement_noise(time, displacement), linear=True)
     ends = _without_wander(time, displacement, ends)
     rates = np.array([_line(time[i:j], displacement[i:j])[1] for i, j in ends])
     rest = AT_REST * float(np.max(np.abs(rates)))

@@ -14,7 +14,7 @@ from steadyslip.lab.noise import Noise
 from steadyslip.lab.plan import Plan, with_sharp_changes
 from steadyslip.lab.record import Record
 from steadyslip.lab.result import Fit, Search
-from steadyslip.output import write_dataset
+from steadyslip.output import read_dataset, write_dataset
 
 _COLUMNS = ("time", "friction", "normal", "shear", "displacement", "velocity")
 _OPTIONS = ("free", "separate", "drive", "trend", "trend_axis", "offset", "loss", "width", "rtol")
@@ -84,13 +84,7 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     NotAvailable
         If the file is not one of ours or cannot be read.
     """
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="netcdf4", decode_times=False) as file:
-            dataset = file.load()
-    except (OSError, ValueError) as error:
-        raise NotAvailable(f"cannot read {str(path)!r}: {error}") from error
+    dataset = read_dataset(path)
     if "coordinates" not in dataset or "search" not in dataset.attrs:
         raise NotAvailable(f"{str(path)!r} is not a steadyslip fit; write one with 'steadyslip fit ... -o fit.nc'")
     from steadyslip.config import protocol_from_text, rig_from_text

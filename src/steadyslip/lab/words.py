@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from steadyslip.lab.steps import displacement_noise
 from steadyslip.quantities import shown
 
 if TYPE_CHECKING:
     from steadyslip.lab.result import Fit
 
 WIDTH = 100
+VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
 
 
 def words(fit: Fit) -> str:
@@ -63,20 +65,30 @@ def warnings(fit: Fit) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds)
+    found += list(fit.at_bounds) + _vague_jumps(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
 
 
+def _vague_jumps(fit: Fit) -> list[str]:
+    """Jumps whose time matters and is hardly known: errors of what they tell are then not Gaussian."""
+    found = []
+    for i, one in enumerate(fit.space.unknowns):
+        if one.parameter.startswith("jump.") and float(fit.covariance[i, i]) > VAGUE**2:
+            found.append(
+                f"when exactly the normal stress jumped between {one.low:.7g} and {one.high:.7g} s is hardly determined "
+                f"({one.name}); errors of what the jump tells, such as alpha, are not Gaussian: take profile or bootstrap"
+            )
+    return found
+
+
 def _noisy_drive(fit: Fit, part: Any) -> str | None:
     """Whether the noise of the measured displacement moves the model about as much as the data scatter."""
-    from steadyslip.lab.steps import smoothed
-
     record = part.record
     if record.integrated or record.displacement is None:
         return None
-    noise = float(np.std(record.displacement - smoothed(record.time, record.displacement)))
+    noise = displacement_noise(record.time, record.displacement)
     rig = fit.rig(0)
     stiffness = rig.stiffness if rig.stiffness is not None else rig.axial_stiffness
     if stiffness is None or record.normal is None:

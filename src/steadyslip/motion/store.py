@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable
 from steadyslip.motion.events import Event
-from steadyslip.output import write_dataset
+from steadyslip.output import read_dataset, write_dataset
 
 if TYPE_CHECKING:
     from steadyslip.motion.result import History
@@ -65,17 +65,11 @@ def load_history(path: str | PathLike[str]) -> History:
     NotAvailable
         If the file is not one of ours or cannot be read.
     """
-    import xarray as xr
-
     from steadyslip.config import protocol_from_text, rig_from_text
     from steadyslip.motion.result import History
     from steadyslip.protocol import Protocol
 
-    try:
-        with xr.open_dataset(path, engine="netcdf4", decode_times=False) as file:
-            dataset = file.load()
-    except (OSError, ValueError) as error:
-        raise NotAvailable(f"cannot read {str(path)!r}: {error}") from error
+    dataset = read_dataset(path)
     if "rig" not in dataset.attrs or "time" not in dataset:
         raise NotAvailable(f"{str(path)!r} is not a steadyslip history: it has no rig in it")
     text = str(dataset.attrs["rig"])

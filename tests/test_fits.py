@@ -398,15 +398,28 @@ def test_a_commanded_step_whose_time_is_not_known():
     rig = lab.rig()
     record = lab.record(rig, lab.STEP)
     blind = ss.record_from_arrays(record.time, friction=record.friction, normal=record.normal)
-    guess = ss.lab_rig().with_values({"drive.velocity": lab.SLOW})
+    guess = ss.lab_rig().with_values({"drive.velocity": lab.SLOW, "friction.d_c": lab.TRUTH["d_c"]})
     fit = ss.fit(
         guess, blind, protocol=ss.VelocityStep(at=58.0, to=5e-6),
-        free=["a", "b", "d_c", "stiffness", "protocol.pieces.1.at"],
+        free=["a", "b", "stiffness", "protocol.pieces.1.at"],
     )  # fmt: skip
     at = fit["protocol.pieces.1.at"]
     assert at.value == pytest.approx(60.13, abs=4 * at.error)
     assert at.error < 0.05
     assert str(at).endswith(" s")
+
+
+def test_a_measured_rate_drives_the_model_too():
+    """Only the rate of the load point was measured; it jumps between two samples."""
+    columns = lab.columns(lab.rig(), lab.STEP)
+    run = ss.simulate(lab.rig(), lab.STEP, times=columns["time"], events=False)
+    friction = columns["friction"] + lab.NOISE * np.random.default_rng(1).standard_normal(len(columns["time"]))
+    record = ss.record_from_arrays(
+        columns["time"], friction=friction, normal=columns["normal"], velocity=run["load_velocity"]
+    )
+    fit = ss.fit(ss.lab_rig(), record)
+    assert fit["jump.1"].value == pytest.approx(60.13, abs=4 * fit["jump.1"].error)
+    assert np.max(np.abs(deviations(fit, lab.rig(), (60.13,)))) < 3.5
 
 
 # -- real records

@@ -1,7 +1,7 @@
 """Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig."""
 
-from steadyslip.lab.compare import LawComparison, compare, compare_laws
 from steadyslip.lab.fit import fit
+from steadyslip.lab.laws import LawComparison, compare, compare_laws
 from steadyslip.lab.precision import Precision, best_protocol, precision
 from steadyslip.lab.predict import Prediction, predict
 from steadyslip.lab.read import read_record, record_from_arrays

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.errors import NotAvailable
-from steadyslip.lab.compare import LawComparison
+from steadyslip.lab.laws import LawComparison
 from steadyslip.lab.result import Fit
 from steadyslip.output import FIGURES, write_by_ending
 

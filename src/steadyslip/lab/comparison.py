@@ -153,7 +153,7 @@ def lost(loss: str, r: Array, width: float) -> tuple[Array, Array]:
 
 
 def jump_unknowns(record: int | None, sharp: Sharp) -> list[Unknown]:
-    """When, between two samples, something jumped."""
+    """When, between two samples, the normal stress or a measured rate jumped."""
     label = "" if record is None else f"@{record + 1}"
     return [
         Unknown(f"jump.{k}{label}", f"jump.{k}", "s", record, False, late - early, early, late)

@@ -11,8 +11,8 @@ from steadyslip.config.lines import line_of
 from steadyslip.config.read import from_tables, parsed, text_of
 from steadyslip.errors import NotAvailable, ParameterError, Problem, RigFileError, unknown_name
 from steadyslip.lab.columns import ROLES
-from steadyslip.lab.compare import LawComparison, compare_laws
 from steadyslip.lab.fit import fit
+from steadyslip.lab.laws import LawComparison, compare_laws
 from steadyslip.lab.plan import AXES, DRIVES
 from steadyslip.lab.read import read_record
 from steadyslip.lab.record import Record

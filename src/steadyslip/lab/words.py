@@ -77,9 +77,9 @@ def _vague_jumps(fit: Fit) -> list[str]:
     for i, one in enumerate(fit.space.unknowns):
         if one.parameter.startswith("jump.") and float(fit.covariance[i, i]) > VAGUE**2:
             found.append(
-                f"when exactly the normal stress jumped between {one.low:.7g} and {one.high:.7g} s is hardly "
-                f"determined ({one.name}); errors of what the jump tells, such as alpha, are not Gaussian: take "
-                "profile or bootstrap"
+                f"when exactly the drive or the normal stress jumped between {one.low:.7g} and {one.high:.7g} s is "
+                f"hardly determined ({one.name}); errors of what the jump tells, such as alpha from one of normal "
+                "stress, are not Gaussian: take profile or bootstrap"
             )
     return found
 

@@ -10,7 +10,7 @@ from steadyslip.errors import NotAvailable
 
 if TYPE_CHECKING:
     from steadyslip.lab import Fit
-    from steadyslip.lab.compare import LawComparison
+    from steadyslip.lab.laws import LawComparison
 
 _STYLE = (
     "body{font-family:sans-serif;max-width:60em;margin:2em auto;padding:0 1em;line-height:1.4}"

@@ -114,6 +114,25 @@ def test_what_is_missing_is_fitted_and_what_is_given_is_not():
     assert set(fit.names) == {"friction.a", "friction.b", "friction.d_c"}
 
 
+@pytest.mark.parametrize(
+    ("fit", "names"),
+    [
+        ('free = ["a"]', ["friction.b", "friction.d_c", "slider.stiffness"]),
+        ('free = ["a", "b", "d_c", "stiffness"]', []),
+        ('fixed = ["slider.stiffness"]', ["slider.stiffness"]),
+    ],
+)
+def test_a_parameter_without_value_is_fitted_or_refused(fit, names):
+    """What stands in for a missing value must never be taken for one."""
+    text = f"[friction]\n[fit]\n{fit}\n"
+    if not names:
+        assert spec_from_text(text).options["free"] == ["a", "b", "d_c", "stiffness"]
+        return
+    with pytest.raises(ss.RigFileError, match="has no value and is not fitted") as caught:
+        spec_from_text(text)
+    assert [p.name for p in caught.value.problems] == names
+
+
 def test_without_normal_stress_a_stiffness_means_nothing():
     record = lab.record(lab.rig(), lab.STEP)
     bare = ss.record_from_arrays(record.time, friction=record.friction, displacement=record.displacement)

@@ -9,7 +9,14 @@ from typing import Any
 
 from steadyslip.config.lines import line_of
 from steadyslip.config.read import from_tables, parsed, text_of
-from steadyslip.errors import NotAvailable, ParameterError, Problem, RigFileError, unknown_name
+from steadyslip.errors import (
+    NotAvailable,
+    ParameterError,
+    Problem,
+    RigFileError,
+    UnknownNameError,
+    unknown_name,
+)
 from steadyslip.lab.columns import ROLES
 from steadyslip.lab.fit import fit
 from steadyslip.lab.laws import LawComparison, compare_laws
@@ -19,7 +26,7 @@ from steadyslip.lab.record import Record
 from steadyslip.lab.result import Fit
 from steadyslip.lab.starts import STARTS
 from steadyslip.protocol import Protocol
-from steadyslip.records import Parameter, checked_number, positive
+from steadyslip.records import Parameter, checked_number, positive, resolve
 from steadyslip.slider import Slider
 
 RECORD_KEYS = (*ROLES, "area", "normal_stress", "table", "between", "skip_bad_lines", "decimate")
@@ -146,9 +153,10 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
         rig, protocol = from_tables(tables, lines, source, [])
     except RigFileError as error:
         raise RigFileError([*_placed(problems, lines), *error.problems], title=source) from None
+    assert rig is not None
+    problems = problems or _left_open(missing, options, rig)
     if problems:
         raise RigFileError(_placed(problems, lines), title=source)
-    assert rig is not None
     laws = options.pop("compare", ())
     windows = options.pop("windows", False)
     if "free" not in options and missing:
@@ -312,6 +320,31 @@ def _completed_friction(friction: dict[str, Any], states: Any, problems: list[Pr
         if not given:
             complete(memory, "alpha", "friction.normal_memory.alpha", 0.3)
     return missing
+
+
+def _left_open(missing: set[str], options: Mapping[str, Any], rig: Slider) -> list[Problem]:
+    """Parameters that have no value and are not fitted either; what stands in for them must not be taken for one."""
+
+    problems: list[Problem] = []
+
+    def named(key: str) -> set[str]:
+        found = set()
+        for name in options.get(key, ()):
+            if name.startswith("protocol."):
+                continue
+            try:
+                found.add(resolve(name, rig.parameters()))
+            except UnknownNameError as error:
+                problems.append(Problem(f"fit.{key}", str(error)))
+        return found
+
+    absent = missing & named("fixed")
+    if "free" in options:
+        absent |= missing - named("free") - {"friction.mu_ref"}
+    if problems:  # a misspelt name is not a missing one
+        return problems
+    message = "has no value and is not fitted; give it one, or name it in [fit] free"
+    return [Problem(name, message) for name in sorted(absent)]
 
 
 def _placed(problems: Iterable[Problem], lines: dict[str, int]) -> list[Problem]:

@@ -38,6 +38,7 @@ table `[protocol]` may say what is done to the rig in an experiment. A whole one
   with `kind = "velocity-step"` and its keys.
 - A measured column is a list of numbers, `[0, 1.5, 3]`, or of texts with units.
 - A key without default that is not required is absent unless given.
+- A table `[map]` says what to compute for many rigs at once: see [Table of a map](map-file.md).
 - `law` may also name a law of yours: see [Add a friction law](../how-to/add-a-friction-law.md).
 
 `steadyslip schema` prints the JSON schema of this format, for editors. This page is written by `make_tables.py` from
@@ -148,6 +149,7 @@ GROUPS = {
     "records": "To declare a law of your own",
     "slider": "The rig",
     "steady": "Steady sliding",
+    "sweep": "Maps",
 }
 ORDER = (
     *("slider", "friction", "contact", "drive", "protocol", "config"),

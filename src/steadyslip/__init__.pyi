@@ -100,6 +100,7 @@ from .linear import (
     growth_rate as growth_rate,
     margins as margins,
     paper as paper,
+    safety_factor as safety_factor,
     small_signal as small_signal,
     stable_stiffness as stable_stiffness,
     state_space as state_space,
@@ -172,6 +173,24 @@ from .steady import (
     SteadySliding as SteadySliding,
     steady_state as steady_state,
     steady_states as steady_states,
+)
+from .sweep import (
+    Events as Events,
+    Grid as Grid,
+    KickThreshold as KickThreshold,
+    Map as Map,
+    MapResult as MapResult,
+    Measure as Measure,
+    Refined as Refined,
+    Samples as Samples,
+    Sensitivity as Sensitivity,
+    map_from_text as map_from_text,
+    measure as measure,
+    open_map as open_map,
+    read_map as read_map,
+    refine as refine,
+    run_map as run_map,
+    sensitivity as sensitivity,
 )
 
 __version__: str

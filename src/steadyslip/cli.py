@@ -253,6 +253,75 @@ def threshold(
     _given(found, output or (), as_json, write_basin)
 
 
+@app.command("map")
+def map_(
+    source: Annotated[Path, typer.Argument(metavar="RIG", help="rig file with a table [map], or a map (.zarr)")],
+    changes: Changes = None,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option("-o", "--output", help="the map (.zarr), and .nc, .parquet, .png, .svg or .pdf; repeatable"),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="processes; all cores unless given")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(help="compute on Dask: address of a scheduler such as tcp://host:8786, or local")
+    ] = None,
+    x: Annotated[str | None, typer.Option(help="parameter on the first axis of figures")] = None,
+    y: Annotated[str | None, typer.Option(help="and on the second; '' for curves over the first alone")] = None,
+    show: Annotated[str | None, typer.Option(help="result that figures show")] = None,
+    facet: Annotated[str | None, typer.Option(help="parameter that differs between figures side by side")] = None,
+    refine: Annotated[int, typer.Option(min=0, help="halve the cells along the edge of stability so often")] = 0,
+    of: Annotated[str | None, typer.Option(help="result whose edge to refine; status unless given")] = None,
+    level: Annotated[float | None, typer.Option(help="value that it crosses there, SI units")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+) -> None:
+    """Any analysis over many rigs, kept on disk; the same command again goes on after an interruption."""
+    from steadyslip.sweep import refine as refined
+    from steadyslip.sweep.commands import STORE, map_file, write_map
+
+    found = map_file(source, output or (), changes or (), workers, cluster, refine > 0)
+    if not found.complete:
+        done, count = found.finished
+        typer.secho(f"stopped: {done} of {count} chunks are finished and kept; the same command goes on", err=True)
+        raise typer.Exit(130)
+    edge = refined(found, refine, of=of, level=level, workers=workers, cluster=cluster) if refine else None
+    others = [path for path in output or () if path.suffix != STORE]
+    for path in others:
+        write_map(found, path, {"x": x, "y": y, "show": show, "facet": facet}, edge)
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        return
+    typer.echo(str(found))
+    if edge is not None:
+        typer.echo(f"\n{edge}")
+    for path in others:
+        typer.echo(f"wrote {path}")
+
+
+@app.command()
+def sensitivity(
+    rig: RigFile,
+    changes: Changes = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option(help="result, such as critical_stiffness or margin; repeatable; those of [map] unless given"),
+    ] = None,
+    points: Annotated[int, typer.Option(help="sets of points, a power of 2")] = 4096,
+    output: Annotated[
+        list[Path] | None, typer.Option("-o", "--output", help="draw: .png, .svg or .pdf; repeatable")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
+) -> None:
+    """Which parameters decide? Sobol indices over the ranges of the file's [map]."""
+    from steadyslip.output import FIGURES, check_output, write_by_ending
+    from steadyslip.sweep.commands import sensitivity_file
+
+    check_output(output or (), FIGURES)
+    found = sensitivity_file(rig, changes or (), of or (), points)
+    _given(found, output or (), as_json, lambda result, path: write_by_ending(path, {}, result.plot))
+
+
 def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], None]) -> None:
     """Write the files asked for, then print JSON or words."""
     for path in output:

@@ -104,5 +104,8 @@ def unknown_name(what: str, name: object, allowed: Iterable[str]) -> str:
     """Say that `name` is unknown, with the nearest valid name or all of them."""
     allowed = list(allowed)
     close = get_close_matches(str(name), allowed, n=1, cutoff=0.5)
+    if not close and "." not in str(name):  # the last part of a dotted name is often enough
+        last = {full.rpartition(".")[2]: full for full in allowed}
+        close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""
     return f"unknown {what} {name!r}; {hint}allowed: {', '.join(allowed) or 'none'}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -51,8 +51,9 @@ def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]],
         raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
 
 
-def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
-    """Write an xarray.Dataset as netCDF; a file of that name is replaced only once the new one is whole.
+@contextmanager
+def whole_file(path: str | PathLike[str]) -> Iterator[str]:
+    """The name of a temporary file, which takes the place of `path` once it is written without fault.
 
     Raises
     ------
@@ -61,17 +62,31 @@ def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
     """
     target, temporary = Path(path), ""
     try:
-        descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=".nc")
+        descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=target.suffix)
         os.close(descriptor)
-        dataset.to_netcdf(temporary, engine="netcdf4")
+        yield temporary
         mask = os.umask(0)
         os.umask(mask)
         os.chmod(temporary, 0o666 & ~mask)  # temporary files are the owner's alone
         os.replace(temporary, target)
-    except OSError as error:
+    except BaseException as error:
         with suppress(OSError):
             os.unlink(temporary)
-        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+        if isinstance(error, OSError):
+            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+        raise
+
+
+def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
+    """Write an xarray.Dataset as netCDF; a file of that name is replaced only once the new one is whole.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    with whole_file(path) as temporary:
+        dataset.to_netcdf(temporary, engine="netcdf4")
 
 
 def read_dataset(path: str | PathLike[str]) -> Any:

@@ -28,6 +28,9 @@ class Section:
 PROTOCOL = Section("protocol", Protocol)
 """The table that a file may have besides those of the rig."""
 
+MAP = "map"
+"""A table that is read by what computes maps, and by nothing else."""
+
 
 def sections() -> tuple[Section, ...]:
     """The tables of a rig, in order."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from steadyslip.config.changes import Table, apply
 from steadyslip.config.layout import (
+    MAP,
     PROTOCOL,
     Section,
     find_law,
@@ -145,8 +146,8 @@ class Reader:
     def rig(self) -> Slider | None:
         known = {section.name for section in (*sections(), PROTOCOL)}
         for name in self.tables:
-            if name not in known:
-                self.problem(name, unknown_name("table", name, sorted(known)))
+            if name not in {*known, MAP}:
+                self.problem(name, unknown_name("table", name, sorted({*known, MAP})))
         own = self._table("slider")
         self._read_area(own)
         parts = {s.name: self._section(s) for s in sections() if s.family is not None}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from steadyslip.config.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.config.layout import MAP, PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.protocol import Protocol
 from steadyslip.quantities import example
 from steadyslip.records import Option, Parameter, Part, Record, Role, Samples, is_required
@@ -25,6 +25,7 @@ def json_schema() -> Schema:
             properties[section.name] = _family(section.family)
             required.append(section.name)
     properties[PROTOCOL.name] = _table(Protocol, {}, _summary(Protocol))
+    properties[MAP] = _map()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "steadyslip rig",
@@ -33,6 +34,38 @@ def json_schema() -> Schema:
         "properties": properties,
         "required": required,
         "additionalProperties": False,
+    }
+
+
+def _map() -> Schema:
+    """The table of a map; which parameters and results there are depends on the rig and is checked by its reader."""
+    value: Schema = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+    spacing: Schema = {"enum": ["linear", "log"], "description": "even in the value or in its logarithm"}
+    ends: Schema = {"from": value, "to": value, "spacing": spacing}
+    count: Schema = {"type": "integer", "minimum": 1}
+    names: Schema = {"type": "array", "items": {"type": "string"}}
+    axis: Schema = {"anyOf": [{"type": "array", "items": value}, {"type": "object"}]}
+    samples: Schema = {
+        "over": {"type": "object", "description": "ranges by dotted name", "additionalProperties": {"type": "object"}},
+        "points": count,
+        "method": {"enum": ["sobol", "latin-hypercube"]},
+        "seed": {"type": "integer", "minimum": 0},
+        "fit": {"type": "string", "description": "file of a fit (.nc) from which to draw"},
+    }
+    return {
+        "type": "object",
+        "description": "a map: what to compute over which parameters; a further table for the options of each result",
+        "properties": {
+            "compute": {"anyOf": [{"type": "string"}, names], "description": "results, such as status"},
+            "over": {
+                "type": "object",
+                "description": f"values by dotted name: a list, or a table with points and {', '.join(ends)}",
+                "additionalProperties": axis,
+            },
+            "samples": {"type": "object", "properties": samples, "additionalProperties": False},
+            "chunk": count | {"description": "points computed in one go"},
+        },
+        "additionalProperties": {"type": "object"},
     }
 
 

@@ -97,10 +97,12 @@ def _reasons(rig: Slider, x: Axis, y: Axis, status: Any, points: int) -> str:
     if not len(a):
         return ""
     chosen = np.unique(np.linspace(0, len(a) - 1, _SAMPLES).astype(int))
-    found = []
-    for i in chosen:
-        vary = {x.name: float(x.at(share[a[i]])), y.name: float(y.at(share[b[i]]))}
-        found.append(explain_absence(rig.with_values(vary), model_values(rig, vary)).condition)
+    return absence_reasons(rig, [{x.name: float(x.at(share[a[i]])), y.name: float(y.at(share[b[i]]))} for i in chosen])
+
+
+def absence_reasons(rig: Slider, points: Sequence[dict[str, float]]) -> str:
+    """Why there is no steady sliding at some points, each kind of reason once."""
+    found = [explain_absence(rig.with_values(vary), model_values(rig, vary)).condition for vary in points]
     return ", ".join(sorted(set(found)))
 
 

@@ -14,7 +14,7 @@ from steadyslip.friction.normal_memory import NoMemory
 from steadyslip.lab.result import Fit
 from steadyslip.lab.uncertainty import Draws, normal_draws
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
-from steadyslip.linear.stiffness import critical_stiffness, growth_rate
+from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.nonlinear.threshold import threshold_map
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
@@ -42,6 +42,8 @@ class Prediction:
         Whether there is steady sliding at all.
     critical_stiffness : ndarray (m,)
         Pa/m; NaN where there is no edge.
+    safety : ndarray (m,)
+        Stiffness over critical stiffness.
     growth_rate : ndarray (m,)
         1/s.
     thresholds : dict of str to ndarray
@@ -56,6 +58,7 @@ class Prediction:
     stable: Array = field(repr=False)
     exists: Array = field(repr=False)
     critical_stiffness: Array = field(repr=False)
+    safety: Array = field(repr=False)
     growth_rate: Array = field(repr=False)
     thresholds: dict[str, Array] = field(repr=False)
     shares: dict[str, float]
@@ -64,11 +67,6 @@ class Prediction:
     def probability_stable(self) -> float:
         """That steady sliding exists and is stable."""
         return float(np.mean(self.stable))
-
-    @property
-    def safety(self) -> Array:
-        """Stiffness over critical stiffness, of every draw."""
-        return np.asarray(float(_own_stiffness(self.rig)) / self.critical_stiffness)
 
     @property
     def dominant(self) -> str | None:
@@ -170,6 +168,14 @@ def predict(
     NotAvailable
         If the fit does not determine what is needed.
     """
+    target, draws, vary = transferred(rig, fit, transfer, record, count, seed)
+    return _predicted(target, draws, vary, (kick,) if isinstance(kick, str) else tuple(kick))
+
+
+def transferred(
+    rig: Slider, fit: Fit | Draws, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT, seed: int = 0
+) -> tuple[Slider, Draws, dict[str, Array]]:
+    """The rig with a fit's best friction, the draws, and the rig's parameters in each of them; see `predict`."""
     draws = normal_draws(fit, count, seed) if isinstance(fit, Fit) else fit
     source = draws.fit
     target = with_fitted_friction(rig, source, record)
@@ -188,19 +194,21 @@ def predict(
         raise NotAvailable("none of the fitted parameters belongs to this rig's friction")
     best = {name: source.values[_name_of(source, name, record)] for name in vary if not name.startswith("friction.")}
     target = target.with_values(best)
-    return _predicted(target, draws, vary, (kick,) if isinstance(kick, str) else tuple(kick))
+    return target, draws, vary
 
 
 def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tuple[str, ...]) -> Prediction:
     with np.errstate(all="ignore"):
         states = np.broadcast_to(np.asarray(status(model_values(target, vary))), (len(draws),))
-        critical = np.broadcast_to(np.asarray(critical_stiffness(target, vary), dtype=float), (len(draws),))
-        growth = np.broadcast_to(np.asarray(growth_rate(target, vary), dtype=float), (len(draws),))
+        critical, safety, growth = (
+            np.broadcast_to(np.asarray(number(target, vary), dtype=float), (len(draws),))
+            for number in (critical_stiffness, safety_factor, growth_rate)
+        )
     few = {name: values[:KICKED] for name, values in vary.items()}
     thresholds = {kick: np.asarray(threshold_map(target, few, kick, precision=1e-3, progress=False)) for kick in kicks}
     exists = (states != ABSENT) & (states != UNKNOWN)
     shares = _shares(vary | _difference(target, vary), critical, growth)
-    return Prediction(target, draws, states == STABLE, exists, critical, growth, thresholds, shares)
+    return Prediction(target, draws, states == STABLE, exists, critical, safety, growth, thresholds, shares)
 
 
 def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
@@ -214,10 +222,6 @@ def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
 
 def _name_of(fit: Fit, parameter: str, record: int) -> str:
     return next(u.name for u in fit.space.unknowns if u.parameter == parameter and u.record in (None, record))
-
-
-def _own_stiffness(rig: Slider) -> Any:
-    return model_values(rig).named()["slider.stiffness"] + rig.drive.proportional()
 
 
 def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:

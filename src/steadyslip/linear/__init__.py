@@ -8,7 +8,13 @@ from steadyslip.linear.formula import formula
 from steadyslip.linear.response import Response, small_signal
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.state_space import state_space, to_control
-from steadyslip.linear.stiffness import critical_stiffness, eigenvalues, growth_rate, stable_stiffness
+from steadyslip.linear.stiffness import (
+    critical_stiffness,
+    eigenvalues,
+    growth_rate,
+    safety_factor,
+    stable_stiffness,
+)
 
 __all__ = [
     "Boundary",
@@ -21,6 +27,7 @@ __all__ = [
     "growth_rate",
     "margins",
     "paper",
+    "safety_factor",
     "small_signal",
     "stable_stiffness",
     "state_space",

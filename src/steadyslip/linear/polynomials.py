@@ -160,6 +160,14 @@ def routh_column(c: Array) -> Array:
     return np.asarray(np.nan_to_num(np.stack(column, axis=-1) * scale, nan=-1.0))
 
 
+def most_intervals(degree: int) -> int:
+    """The largest number of intervals that `stable_set` can find for polynomials of a degree.
+
+    Stability may change at the static edge, where the highest coefficient vanishes, and at degree − 1 frequencies.
+    """
+    return (degree + 3) // 2
+
+
 @dataclass(frozen=True)
 class StableSet:
     """Where p + k q is stable, for arrays of rigs.

@@ -55,6 +55,38 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     return values.wrap(in_chunks(values, _nearest_edge), "critical_stiffness", "Pa/m")
 
 
+def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
+    """Stiffness over critical stiffness k/k_cr, a controller's gain kp counted with both.
+
+    Parameters
+    ----------
+    rig, vary
+        As for `critical_stiffness`.
+
+    Returns
+    -------
+    float, ndarray or xarray.DataArray
+        Sliding is stable above 1 where the edge is a lower limit of the stiffness, as it is for most rigs, and below 1
+        where it is an upper one; `stable_stiffness` tells. NaN where there is no critical stiffness.
+    """
+    values = model_values(rig, vary)
+    gain = _gain(values.model)
+
+    def kernel(part: Values) -> Any:
+        added = gain(*part.arguments)[0]
+        with np.errstate(all="ignore"):
+            return (part.named()["slider.stiffness"] + added) / (_nearest_edge(part) + added)
+
+    return values.wrap(in_chunks(values, kernel), "safety_factor", "1")
+
+
+@lru_cache(maxsize=128)
+def _gain(model: Model) -> Callable[..., list[Any]]:
+    """Stiffness that the controller adds, as a function of the model's parameters."""
+    kp = model.parameters.get("drive.kp", sp.Integer(0))
+    return array_function([*model.parameters.values()], [kp])
+
+
 def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     """All stiffnesses k > 0 at which steady sliding is stable, as intervals.
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +16,7 @@ from steadyslip.motion.observe import observable_units, observe, segment_of
 from steadyslip.motion.setup import Jobs, Options, prepare
 from steadyslip.motion.single import checked_times
 from steadyslip.motion.status import WORDS
+from steadyslip.progress import progress_bar
 from steadyslip.protocol import Protocol
 from steadyslip.records import resolve
 from steadyslip.slider import Slider
@@ -275,11 +274,11 @@ class _Store:
         absent = np.broadcast_to(~(sigma > 0), outcome.status.shape)
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
         self.code[where] = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
-        self.end[where] = outcome.final[:, 0]
+        self.end[where] = np.where(absent, np.nan, outcome.final[:, 0])
         counts = np.nan_to_num(outcome.final[:, 2:4])  # NaN where a run was never finished
         self.steps[where], self.rejected[where] = counts.T
         for i, name in enumerate(TALLY if self.watch else ()):
-            self.events[name][where] = outcome.tally[:, i]
+            self.events[name][where] = np.where(absent, np.nan, outcome.tally[:, i])
         if not self.final:
             return
         ran = np.flatnonzero(np.isfinite(outcome.final[:, 4:]).all(axis=1) & ~absent)
@@ -323,18 +322,3 @@ def _run(
 
     _ = machine.module  # compile before the threads start
     return run_many(work, size, threads, advanced=advanced)
-
-
-@contextmanager
-def progress_bar(size: int, wanted: bool | None) -> Iterator[Callable[[int], None] | None]:
-    """A bar with rate and time left, on a terminal or where asked for."""
-    if wanted is False or (wanted is None and not sys.stderr.isatty()):
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = [TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("runs", total=size)
-        yield lambda count: bar.advance(task, count)

@@ -10,7 +10,6 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.motion import History, simulate
-from steadyslip.motion.many import progress_bar
 from steadyslip.motion.setup import Options, prepare
 from steadyslip.nonlinear.branch import Cycle
 from steadyslip.nonlinear.cycles import cycles
@@ -24,6 +23,7 @@ from steadyslip.nonlinear.kicks import (
     leading_eigenvalue,
     outcomes_of,
 )
+from steadyslip.progress import progress_bar
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_states
 from steadyslip.values import model_values

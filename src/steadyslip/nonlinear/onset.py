@@ -11,15 +11,17 @@ c1 is local: it says nothing about large kicks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from steadyslip.errors import NotAvailable
 from steadyslip.linear.boundary import boundary
+from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.stiffness import characteristic
+from steadyslip.linear.stiffness import characteristic, in_chunks, stiffness_polynomials
 from steadyslip.nonlinear.derivatives import Taylor, taylor
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
@@ -210,6 +212,71 @@ def kinds(found: dict[str, Array]) -> Array:
     named = np.where(found["c1"] < 0, "supercritical", "subcritical").astype(object)
     named[~(found["share"] > ROUNDING)] = "degenerate"
     return named
+
+
+NO_EDGE, SUPERCRITICAL, SUBCRITICAL, DEGENERATE = range(4)
+
+
+def onset_map(rig: Slider, vary: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Kinds of onset of many rigs, each at the oscillatory edge in stiffness nearest to its own.
+
+    Parameters
+    ----------
+    rig : Slider
+    vary : mapping of str to array_like or xarray.DataArray, optional
+        Parameters by dotted name, SI units; they broadcast.
+
+    Returns
+    -------
+    dict of str to ndarray or xarray.DataArray
+        ``kind`` (0 where there is no such edge, 1 supercritical, 2 subcritical, 3 degenerate),
+        ``edge`` (Pa/m, of the gain kp for a rig without spring) and ``coefficient`` (c1, 1/s), both NaN there.
+
+    Raises
+    ------
+    ParameterError
+        If a name or value is not allowed.
+    """
+    values = model_values(rig, vary)
+    along = parameter_along(rig, "slider.stiffness")
+    place = list(values.model.parameters).index("drive.kp" if along == "drive.kp" else "slider.stiffness")
+    found = in_chunks(values, lambda part: _onsets(part, place))
+    kind, edge, coefficient = np.moveaxis(np.asarray(found), -1, 0)
+    return {
+        "kind": values.wrap(kind.astype(np.int8), "onset", "1"),
+        "edge": values.wrap(edge, "onset_edge", "Pa/m"),
+        "coefficient": values.wrap(coefficient, "onset_coefficient", "1/s"),
+    }
+
+
+def _onsets(values: Values, place: int) -> Array:
+    """Kind, edge and c1 of each rig, (..., 3), along the stiffness or gain that is argument number `place`."""
+    arguments = list(values.arguments)
+    own = np.broadcast_to(arguments[place], values.shape).reshape(-1)
+    if list(values.model.parameters)[place] == "drive.kp":  # a gain acts as a spring would
+        arguments[place] = 0.0
+    bare = replace(values, arguments=tuple(arguments))
+    found = stable_set(*(np.broadcast_to(c, (*values.shape, c.shape[-1])) for c in stiffness_polynomials(bare)))
+    count = values.size
+    edges, frequencies, changes = (a.reshape(count, -1) for a in (found.edges, found.frequencies, found.changes))
+    usable = changes.astype(bool) & (frequencies > 0) & np.isfinite(frequencies)
+    distance = np.where(usable, np.abs(edges - own[:, None]), np.inf)
+    nearest = np.argmin(distance, axis=1)
+    rows = np.flatnonzero(usable.any(axis=1))
+    result = np.full((count, 3), np.nan)
+    result[:, 0] = NO_EDGE
+    if len(rows):
+        flat = [np.broadcast_to(a, values.shape).reshape(-1)[rows] if np.ndim(a) else a for a in arguments]
+        flat[place] = edges[rows, nearest[rows]]
+        at_edge = replace(values, arguments=tuple(flat), shape=(len(rows),))
+        numbers = coefficients(at_edge, frequencies[rows, nearest[rows]])
+        words = np.array(["", "supercritical", "subcritical", "degenerate"])
+        known = np.isfinite(numbers["c1"])
+        kind = np.argmax(kinds(numbers)[:, None] == words, axis=1)
+        result[rows, 0] = np.where(known, kind, NO_EDGE)
+        result[rows, 1] = np.where(known, flat[place], np.nan)
+        result[rows, 2] = numbers["c1"]
+    return result.reshape(*values.shape, 3)
 
 
 def coefficients(values: Values, omega: Array) -> dict[str, Array]:

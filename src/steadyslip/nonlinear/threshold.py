@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
-from steadyslip.motion.many import broadcast_arrays, progress_bar, regimes
+from steadyslip.motion.many import broadcast_arrays, regimes
 from steadyslip.nonlinear.kicks import INTERRUPTED, OUTCOMES, RETURNS, Kicked
+from steadyslip.progress import progress_bar
 from steadyslip.protocol import DisplacementStep, NormalStressStep, Protocol, VelocityStep
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider

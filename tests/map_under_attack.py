@@ -1,0 +1,82 @@
+"""A map whose computing can be counted and killed; also a program that computes it, for tests to kill.
+
+    python map_under_attack.py STORE LOG WORKERS [CLUSTER]
+
+Every point is written down in LOG when it is computed. While there are files in the folder LOG.tokens, a process that
+computes takes one at a random point and kills itself.
+"""
+
+import contextlib
+import math
+import os
+import random
+import signal
+import sys
+import time
+import zlib
+from pathlib import Path
+
+import steadyslip as ss
+
+ROWS, COLUMNS, CHUNK = 12, 10, 5
+
+
+def rig():
+    friction = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6)
+    return ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=9e9, drive=ss.Steady(1e-6))
+
+
+class Costly:
+    """A function of a rig that takes its time and leaves a trace."""
+
+    __name__ = "costly"
+
+    def __init__(self, log, pause):
+        self.log, self.pause = str(log), pause
+
+    def __call__(self, rig):
+        place = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+        os.write(place, f"{rig.stiffness!r} {rig.value('friction.a')!r} {os.getpid()}\n".encode())
+        os.close(place)
+        if random.random() < 0.1:
+            with contextlib.suppress(OSError):
+                token = next(Path(self.log + ".tokens").iterdir(), None)
+                if token is not None:
+                    token.unlink()
+                    os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(self.pause)
+        if zlib.crc32(repr(rig.stiffness).encode()) % 5 == 0:
+            return math.nan
+        return math.sin(rig.stiffness) / rig.value("friction.a")
+
+
+def plan(log, pause=0.01):
+    # only NaN in the first row: chunks that are all fill value
+    stiffness = [1e9 * (i + 1) for i in range(ROWS)]
+    return ss.Map(
+        rig(),
+        {"stiffness": stiffness, "friction.a": ss.Grid(0.01, 0.02, COLUMNS)},
+        compute=[ss.measure(Costly(log, pause)), "status"],
+        chunk=CHUNK,
+    )
+
+
+def computed(log):
+    """How often each point was computed."""
+    counts = {}
+    for line in Path(log).read_text().splitlines():
+        point = tuple(line.split()[:2])
+        counts[point] = counts.get(point, 0) + 1
+    return counts
+
+
+def files(store):
+    """All files of a store and what is in them."""
+    store = Path(store)
+    return {str(p.relative_to(store)): p.read_bytes() for p in sorted(store.rglob("*")) if p.is_file()}
+
+
+if __name__ == "__main__":
+    store, log, workers = sys.argv[1:4]
+    found = ss.run_map(plan(log), store, workers=int(workers), cluster=(sys.argv[4:] or [None])[0])
+    print(found.finished)

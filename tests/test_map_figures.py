@@ -1,6 +1,6 @@
 """Pictures of maps show the numbers of the map, with units, the rig, and the edge where it is."""
 
-import matplotlib
+import matplotlib.pyplot
 import numpy as np
 import pytest
 
@@ -34,6 +34,12 @@ def maps(tmp_path_factory):
         "points": made("points", compute=["status", "safety_factor"],
                        samples=ss.Samples({"friction.a": (0.01, 0.02), "friction.b": (0.01, 0.02)}, 128)),
     }  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    matplotlib.pyplot.close("all")
 
 
 def labels(ax):

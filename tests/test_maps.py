@@ -351,6 +351,7 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path):
     for workers in ("1", "2"):
         done = subprocess.run(
             [sys.executable, "-c", program, str(store), workers], capture_output=True, text=True, timeout=120,
+            env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},  # half a file of that would stay behind
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
         )  # fmt: skip
         assert done.returncode == 2, done.stderr
@@ -468,6 +469,28 @@ def test_a_file_says_the_same_as_python():
     assert changed.shape == (5, 2, 2, 8)
     assert changed.rig.value("friction.a") == 0.011
     assert ss.rig_from_text(FILE + TABLE) == rig()  # a rig file it is still
+
+
+def test_a_rig_with_an_area_is_varied_in_its_own_units():
+    text = (Path(__file__).parents[1] / "examples" / "slow-axis.toml").read_text(encoding="utf-8")
+    table = """
+[map]
+[map.over]
+kp = { from = "1 N/um", to = 5e6, points = 3 }
+[map.samples]
+points = 2
+[map.samples.over]
+slider.mass = { from = "10 kg", to = 20 }
+"""
+    plan = ss.map_from_text(text + table)
+    area = plan.rig.area
+    assert area not in (None, 1.0)
+    (axis,) = plan.axes
+    np.testing.assert_allclose(axis.values * area, [1e6, 3e6, 5e6], rtol=1e-12)
+    (mass,) = plan.sampling.ranges
+    np.testing.assert_allclose(np.array(mass[1:3]) * area, [10, 20], rtol=1e-12)
+    with pytest.raises(ss.RigFileError, match=r"map\.over\.kp: .*wrong dimension.*the rig has an area"):
+        ss.map_from_text(text + table.replace("1 N/um", "1 MPa"))
 
 
 def test_everything_wrong_with_a_file_is_said_with_its_line():

@@ -266,7 +266,9 @@ class Reader:
             return self._part(role, raw, name)
         try:
             if isinstance(role, (Parameter, Samples)) and self.area is not None and is_per_area(role.unit):
-                return self._total(role, raw) if isinstance(role, Parameter) else self._totals(role, raw, self.area)
+                return (
+                    number(role, raw, self.area) if isinstance(role, Parameter) else self._totals(role, raw, self.area)
+                )
             return checked(item, raw)
         except ParameterError as error:
             self.problem(name, error.problems[0].message)
@@ -287,20 +289,6 @@ class Reader:
             return None
         return self.record(role.family, dict(table), f"{name}.")
 
-    def _total(self, role: Parameter, raw: Any) -> float:
-        """A value for the whole area (N, N/m, kg, ...) as one per unit area; text may give either."""
-        assert self.area is not None
-        if isinstance(raw, str):
-            try:
-                return checked_number(role, parse(raw, total_unit(role.unit)) / self.area)
-            except QuantityError as error:
-                try:
-                    return checked_number(role, parse(raw, role.unit))
-                except QuantityError:
-                    raise ParameterError([Problem("", f"{error} (the rig has an area)")]) from error
-        whole = Parameter(total_unit(role.unit), role.domain, role.doc)
-        return checked_number(role, checked_number(whole, raw) / self.area)
-
     def _totals(self, role: Samples, raw: Any, area: float) -> tuple[float, ...]:
         """A column for the whole area as one per unit area; its texts may give either."""
 
@@ -317,6 +305,31 @@ class Reader:
             return tuple(value / area for value in numbers(raw, total_unit(role.unit), read))
         except QuantityError as error:
             raise ParameterError([Problem("", str(error))]) from error
+
+
+def number(role: Parameter, raw: Any, area: float | None) -> float:
+    """A value of a file, SI, per unit area.
+
+    Where the rig has an area, quantities per unit area are for the whole of it in a file (N, N/m, kg, ...); text may
+    give either.
+
+    Raises
+    ------
+    ParameterError
+        Without a name.
+    """
+    if area is None or not is_per_area(role.unit):
+        return checked_number(role, raw)
+    if isinstance(raw, str):
+        try:
+            return checked_number(role, parse(raw, total_unit(role.unit)) / area)
+        except QuantityError as error:
+            try:
+                return checked_number(role, parse(raw, role.unit))
+            except QuantityError:
+                raise ParameterError([Problem("", f"{error} (the rig has an area)")]) from error
+    whole = Parameter(total_unit(role.unit), role.domain, role.doc)
+    return checked_number(role, checked_number(whole, raw) / area)
 
 
 def _missing(role: Role) -> str:

@@ -9,7 +9,8 @@ from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.lab import corner, fit, prediction, record
 from steadyslip.figures.locus import root_locus
-from steadyslip.figures.maps import map_figure, refined, sensitivity
+from steadyslip.figures.map_results import refined, sensitivity
+from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 

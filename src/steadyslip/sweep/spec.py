@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from steadyslip.config.layout import MAP
 from steadyslip.config.lines import line_of
-from steadyslip.config.read import Reader, from_tables, parsed, text_of
+from steadyslip.config.read import Reader, from_tables, number, parsed, text_of
 from steadyslip.errors import (
     ParameterError,
     Problem,
@@ -19,7 +20,7 @@ from steadyslip.errors import (
     unknown_name,
 )
 from steadyslip.protocol import Protocol
-from steadyslip.records import parameters, resolve
+from steadyslip.records import Address, parameters, resolve
 from steadyslip.sweep.axes import Grid, Samples
 from steadyslip.sweep.measures import Measure
 from steadyslip.sweep.plan import Map
@@ -61,7 +62,9 @@ def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), f
     try:
         rig, protocol = from_tables(tables, lines, source, problems)
         assert rig is not None
-        reader.check_names({*rig.parameters(), *parameters(protocol or Protocol(), "protocol.")})
+        known = rig.parameters() | parameters(protocol or Protocol(), "protocol.")
+        reader.check_names(known)
+        reader.read_totals(known, rig.area)
         if reader.arguments:
             found = Map(rig, protocol=protocol, **reader.arguments)
         problems = []
@@ -109,6 +112,39 @@ class _MapReader:
                 resolve(name, dict.fromkeys(known))
             except UnknownNameError as error:
                 self._problem(f"map.over.{name}", str(error))
+
+    def read_totals(self, known: Mapping[str, Address], area: float | None) -> None:
+        """Where the rig has an area, take values for the whole of it, as everywhere in its file."""
+        if area is None:
+            return
+        self.arguments["over"] = self._per_area("map.over", self.arguments["over"], known, area)
+        samples = self.arguments.get("samples")
+        if isinstance(samples, Samples):
+            over = self._per_area("map.samples.over", samples.over, known, area)
+            self.arguments["samples"] = replace(samples, over=over)
+
+    def _per_area(
+        self, place: str, over: Mapping[str, Any], known: Mapping[str, Address], area: float
+    ) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, given in over.items():
+            found[name] = given
+            try:
+                role = known[resolve(name, known)].role
+            except UnknownNameError:
+                continue  # the map will say so
+            try:
+                if isinstance(given, Grid):
+                    start, stop = (number(role, end, area) for end in (given.start, given.stop))
+                    found[name] = replace(given, start=start, stop=stop)
+                elif isinstance(given, tuple):
+                    found[name] = (number(role, given[0], area), number(role, given[1], area), *given[2:])
+                elif isinstance(given, list):
+                    found[name] = [number(role, value, area) for value in given]
+            except ParameterError as error:
+                del found[name]
+                self.problems += [p.under(f"{place}.{name}") for p in error.problems]
+        return found
 
     def _problem(self, name: str, message: str) -> None:
         self.problems.append(Problem(name, message))

@@ -113,10 +113,7 @@ def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Map
         most = MOST_SCATTERED if scattered else max(100, MOST_IN_ALL // max(others, 1))
         steps[SAMPLE] = slice(None, None, -(-data.sizes[SAMPLE] // most))
     part = data[[*results, *(n for n in names if scattered)]].isel(place | steps)
-    if not scattered:
-        places = tuple(np.asarray(part[name].values) for name in names)
-    else:
-        places = tuple(np.asarray(part[name].values) for name in names)
+    places = tuple(np.asarray(part[name].values) for name in names)
     values, bands, shares = {}, {}, {}
     for result in results:
         array = part[result]

@@ -81,6 +81,9 @@ def do_chunk(job: Job, number: int) -> Done:
         if job.version != __version__:
             message = f"this worker has steadyslip {__version__}, the map was started with {job.version}"
             return Done(number, 0, 0.0, message)
+        if not Path(job.path).exists():
+            message = f"a worker does not see {job.path!r}; give a folder that all machines share"
+            return Done(number, 0, 0.0, message)
         store = _opened(job.path)
         points = store.points(number)
         if store.is_done(number):  # by a worker that was thought lost

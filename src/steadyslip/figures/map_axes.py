@@ -1,0 +1,88 @@
+"""What pictures of maps share: axes in units for people, the result that is shown, the legend."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from steadyslip.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    YELLOW,
+    display_unit,
+    labelled,
+)
+from steadyslip.sweep.result import MapResult
+from steadyslip.sweep.view import View
+
+Array = np.ndarray
+MANY = 100.0  # ratio from which on an axis or colour scale is logarithmic
+KINDS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
+
+
+def short(name: str) -> str:
+    """The last part of a dotted name, in words."""
+    return name.rpartition(".")[2].replace("_", " ")
+
+
+def shown_name(found: MapResult, view: View, show: str | None) -> str | None:
+    """The result that is drawn besides the regions."""
+    if show is not None:
+        return None if show == "status" else show
+    if "status" not in view.values:
+        return found.results[0]
+    return next((name for name in ("safety_factor", "growth_rate") if name in view.values), None)
+
+
+class Scale:
+    """How a column of SI values is put on an axis."""
+
+    def __init__(self, name: str, unit: str, values: Array, spaced: bool = True) -> None:
+        finite = np.abs(values[np.isfinite(values) & (values != 0)])
+        typical = float(np.median(finite)) if len(finite) else 1.0
+        self.factor, self.unit = display_unit(unit, typical)
+        self.label = labelled(short(name), self.unit)
+        good = values[np.isfinite(values)]
+        self.log = bool(len(good)) and bool(good.min() > 0) and bool(good.max() / good.min() >= MANY)
+        if spaced and self.log and len(good) > 2:  # as the grid is spaced
+            self.log = bool(np.ptp(np.diff(np.log(good))) < np.ptp(np.diff(good / good.max())) + 1e-9)
+
+    def __call__(self, values: Any) -> Any:
+        return np.asarray(values) / self.factor
+
+
+def place_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
+    """Label and scale the axes for the parameters of a view."""
+    scales = [Scale(n, found.unit(n), p, not view.scattered) for n, p in zip(view.names, view.places, strict=True)]
+    ax.set_xlabel(scales[0].label)
+    ax.set_xscale("log" if scales[0].log else "linear")
+    if len(scales) == 2:
+        ax.set_ylabel(scales[1].label)
+        ax.set_yscale("log" if scales[1].log else "linear")
+    return scales
+
+
+def legend(ax: Axes) -> None:
+    """A legend above the axes, if there is anything to name."""
+    if ax.get_legend_handles_labels()[0]:
+        # above the axes, where it hides no region, with room for a power of ten on the axis
+        ax.legend(loc="lower left", bbox_to_anchor=(0, 1.04), ncols=2, frameon=False, borderaxespad=0.2,
+                  fontsize="small")  # fmt: skip
+
+
+def entry(ax: Axes, handle: Any) -> None:
+    """An entry of the legend without anything drawn in the Axes."""
+    if isinstance(handle, Patch):
+        ax.fill_between([], [], facecolor=handle.get_facecolor(), edgecolor=handle.get_edgecolor(),
+                        hatch=handle.get_hatch(), label=handle.get_label())  # fmt: skip
+    else:
+        ax.add_line(handle)

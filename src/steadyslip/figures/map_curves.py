@@ -1,0 +1,126 @@
+"""A map over one parameter as curves, and samples alone as points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.errors import ParameterError, Problem
+from steadyslip.figures.map_axes import KINDS, Scale, place_axes, shown_name
+from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, labelled
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.sweep.result import MapResult
+from steadyslip.sweep.view import View, own_value
+
+Array = np.ndarray
+
+
+def curve(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
+    """A result over one parameter, above the stretches that are stable."""
+    (scale,) = place_axes(ax, found, view)
+    x = scale(view.places[0])
+    order = np.argsort(x)
+    x = x[order]
+    name = shown_name(found, view, show) or "status"
+    if "status" in view.values and name != "status":
+        _bands_of_status(ax, x, np.asarray(view.values["status"])[order])
+    if found.words(name):
+        _curves_of_kinds(ax, found, view, x, order, name)
+    else:
+        _curve_of_numbers(ax, found, view, x, order, name)
+    ax.set_xlim(x.min(), x.max())
+    own = own_value(found, view.names[0])
+    if own is not None and x.min() <= scale(own) <= x.max():
+        ax.axvline(float(scale(own)), color=VERMILION, linewidth=1.2, linestyle="--", label="this rig")
+
+
+def _bands_of_status(ax: Axes, x: Array, status: Array) -> None:
+    """Shading of stable and unstable stretches, ending midway between points."""
+    ends = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
+    styles: dict[int, dict[str, Any]] = {
+        STABLE: {"facecolor": SKY, "alpha": 0.35, "label": "stable"},
+        UNSTABLE: {"facecolor": ORANGE, "alpha": 0.3, "label": "unstable"},
+        ABSENT: {"facecolor": "none", "edgecolor": GREY, "hatch": "///", "label": "no steady sliding"},
+    }
+    for code, style in styles.items():
+        inside = np.concatenate([[False], status == code, [False]])
+        turns = np.flatnonzero(np.diff(inside.astype(int)))
+        for number, (start, stop) in enumerate(zip(turns[::2], turns[1::2], strict=True)):
+            keep = {k: v for k, v in style.items() if k != "label" or number == 0}
+            ax.axvspan(ends[start], ends[stop], linewidth=0, zorder=0, **keep)
+
+
+def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: Array, name: str) -> None:
+    values = np.asarray(view.values[name])[order]
+    unit = found.unit(name)
+    finite = values[np.isfinite(values)]
+    scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False)
+    if values.ndim == 3:  # intervals and their ends
+        top = finite.max() * 3 if len(finite) else 1.0
+        for i in range(values.shape[1]):
+            low, high = values[:, i, 0], np.where(np.isinf(values[:, i, 1]), top, values[:, i, 1])
+            ax.fill_between(x, scale(low), scale(high), color=CURVES[i % len(CURVES)], alpha=0.4,
+                            label=f"interval {i + 1} of stable stiffness")  # fmt: skip
+    elif name in view.bands:
+        low, middle, high = (scale(band[order]) for band in view.bands[name])
+        ax.fill_between(x, low, high, color=BLUE, alpha=0.25, linewidth=0, label="95 % of samples")
+        ax.plot(x, middle, color=BLUE, label="median of samples")
+    else:
+        ax.plot(x, np.where(np.isfinite(values), scale(values), np.nan), color=BLUE)
+    ax.set_yscale("log" if scale.log else "linear")
+    ax.set_ylabel(labelled(name.replace("_", " "), scale.unit))
+    if name == "safety_factor":
+        ax.axhline(1.0, color=BLACK, linewidth=0.8)
+    if name == "growth_rate":
+        ax.axhline(0.0, color=BLACK, linewidth=0.8)
+
+
+def _curves_of_kinds(ax: Axes, found: MapResult, view: View, x: Array, order: Array, name: str) -> None:
+    words = found.words(name)
+    if name in view.shares:
+        for code, word in enumerate(words):
+            if view.shares[name][code].any():
+                ax.plot(x, view.shares[name][code][order], color=KINDS[code % len(KINDS)], label=word)
+        ax.set_ylabel("share of samples (1)")
+        ax.set_ylim(-0.02, 1.02)
+        return
+    codes = np.asarray(view.values[name])[order]
+    if name == "status":
+        _bands_of_status(ax, x, codes)
+        ax.set_yticks([])
+        return
+    ax.step(x, codes, where="mid", color=BLUE)
+    ax.set_yticks(range(len(words)), words)
+    ax.set_ylabel(name.replace("_", " "))
+
+
+def scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
+    """Samples one by one: two parameters, or a parameter and the result."""
+    scales = place_axes(ax, found, view)
+    name = shown_name(found, view, show)
+    across = [s(p) for s, p in zip(scales, view.places, strict=True)]
+    if len(across) == 1:
+        name = name or found.results[0]
+        values = np.asarray(view.values[name], dtype=float)
+        if values.ndim > 1:
+            raise ParameterError([Problem("show", f"{name!r} has several numbers a point; choose another result")])
+        up = Scale(name, found.unit(name), values, spaced=False)
+        across.append(up(np.where(np.isfinite(values), values, np.nan)))
+        ax.set_yscale("log" if up.log else "linear")
+        ax.set_ylabel(labelled(name.replace("_", " "), up.unit))
+    status = view.values.get("status")
+    kinds = (
+        (UNSTABLE, "unstable", ORANGE, "v"),
+        (STABLE, "stable", BLUE, "o"),
+        (ABSENT, "no steady sliding", GREY, "x"),
+    )
+    if status is None:
+        ax.plot(*across, ".", color=BLUE, markersize=4, linestyle="none")
+        return
+    for code, label, colour, marker in kinds:
+        chosen = status == code
+        if chosen.any():
+            ax.plot(across[0][chosen], across[1][chosen], marker, color=colour, markersize=3, linestyle="none",
+                    label=label)  # fmt: skip

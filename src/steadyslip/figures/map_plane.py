@@ -1,0 +1,236 @@
+"""A map over two parameters: regions, contours, colours, the edge of stability and the rig beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.figures.chart import absence_reasons
+from steadyslip.figures.map_axes import KINDS, MANY, Scale, entry, place_axes, short, shown_name
+from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, display_unit, labelled
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.quantities import shown
+from steadyslip.sweep.result import MapResult
+from steadyslip.sweep.view import View, own_value
+
+Array = np.ndarray
+SAFETY = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+
+
+def plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) -> None:
+    """Regions with contours, or colours; `scale` is that of the colours where pictures share it, else None."""
+    scales = place_axes(ax, found, view)
+    x, y = (s(p) for s, p in zip(scales, view.places, strict=True))
+    name = shown_name(found, view, show)
+    regions = "status" in view.values and name in (None, "safety_factor", "growth_rate", "critical_stiffness")
+    if regions and view.shares:
+        _share_of_stable(ax, x, y, view)
+        name = None if show is None else name
+    elif regions:
+        _regions(ax, found, view, x, y)
+    if name is not None and regions:
+        _contours(ax, x, y, view.values[name], name, found.unit(name))
+    elif name is not None:
+        _colours(ax, found, view, x, y, name, scale)
+    line = _edge(ax, x, y, view)
+    ax.set_xlim(x.min(), x.max())
+    ax.set_ylim(y.min(), y.max())
+    _mark_own(ax, found, view, scales, line, told=scale is None)
+
+
+def _regions(ax: Axes, found: MapResult, view: View, x: Array, y: Array) -> None:
+    status = view.values["status"]
+    colours = {UNSTABLE: (ORANGE, 0.45, "unstable"), STABLE: (SKY, 0.55, "stable")}
+    for code, (colour, alpha, label) in colours.items():
+        inside = np.where(status == code, 1.0, np.nan)
+        if np.isfinite(inside).any():
+            ax.pcolormesh(x, y, inside, cmap=ListedColormap([colour]), alpha=alpha, shading="nearest", rasterized=True,
+                          linewidth=0)  # fmt: skip
+            entry(ax, Patch(facecolor=colour, alpha=alpha, label=label))
+    absent = status == ABSENT
+    if absent.any():
+        if min(absent.shape) > 1:
+            ax.contourf(x, y, absent.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
+        reasons = _reasons(found, view, absent)
+        entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="///", label=f"no steady sliding{reasons}"))
+
+
+def _reasons(found: MapResult, view: View, absent: Array) -> str:
+    """Lock-up, lift-off or both, asked at some of the points without steady sliding."""
+    try:
+        rig = found.rig
+    except NotAvailable:
+        return ""
+    rows = np.argwhere(absent)
+    points = []
+    for row in rows[np.unique(np.linspace(0, len(rows) - 1, 12).astype(int))]:
+        place = {n: float(p[i]) for n, p, i in zip(view.names, view.places, row[::-1], strict=True)}
+        points.append({n: v for n, v in (view.held | place).items() if not n.startswith("protocol.")})
+    found_reasons = absence_reasons(rig, points)
+    return f" ({found_reasons})" if found_reasons else ""
+
+
+def _share_of_stable(ax: Axes, x: Array, y: Array, view: View) -> None:
+    share = view.shares["status"][STABLE]
+    mesh = ax.pcolormesh(x, y, share, cmap="cividis", vmin=0, vmax=1, shading="nearest", rasterized=True)
+    ax.figure.colorbar(mesh, ax=ax, label="share of samples that are stable (1)")
+    if min(share.shape) > 1:
+        lines = ax.contour(x, y, share, levels=[0.05, 0.5, 0.95], colors="white", linewidths=0.9)
+        ax.clabel(lines, fontsize="small")
+
+
+def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, unit: str) -> None:
+    good = values[np.isfinite(values)]
+    if min(values.shape) < 2 or not len(good) or good.min() == good.max():
+        return
+    if name == "safety_factor":
+        levels, factor, label = [s for s in SAFETY if good.min() < s < good.max()], 1.0, "k/k_cr"
+    else:
+        factor, shown_unit = display_unit(unit, float(np.median(np.abs(good))) or 1.0)
+        levels, label = _levels(good / factor), f"{short(name)} ({shown_unit})"
+    if not levels:
+        return
+    lines = ax.contour(x, y, values / factor, levels=levels, colors=BLACK, linewidths=0.6, linestyles="--")
+    ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}")
+    entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label))
+
+
+def _levels(values: Array) -> list[float]:
+    """Powers of ten on both sides of zero, or even steps where the values span less than a decade."""
+    found: list[float] = []
+    for sign in (-1, 1):
+        size = sign * values[sign * values > 0]
+        if not len(size):
+            continue
+        low, high = np.quantile(size, [0.05, 1.0])
+        top = math.floor(math.log10(high))
+        found += [sign * 10.0**e for e in range(top - 3, top + 1) if 10.0**e >= low]
+    if len(found) < 2:
+        low, high = np.quantile(values, [0.05, 0.95])
+        found = [float(f"{v:.2g}") for v in np.linspace(low, high, 6)[1:-1]]
+    return sorted(set(found))
+
+
+def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: str, scale: Any) -> None:
+    values = view.values[name]
+    if values.ndim > 2:
+        message = f"{name!r} has several numbers a point; draw it over one parameter, y=''"
+        raise ParameterError([Problem("show", message)])
+    words = found.words(name)
+    if words:
+        colours = [KINDS[i % len(KINDS)] for i in range(len(words))]
+        norm = BoundaryNorm(np.arange(len(words) + 1) - 0.5, len(words))
+        kinds = np.where(values >= 0, values, np.nan).astype(float)
+        ax.pcolormesh(x, y, kinds, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)
+        for code in np.unique(values[values >= 0]):
+            entry(ax, Patch(facecolor=colours[int(code)], label=words[int(code)]))
+        return
+    factor, unit, norm = scale or colour_scale([values], found.unit(name))
+    mesh = ax.pcolormesh(x, y, np.where(np.isfinite(values), values, np.nan) / factor, cmap="cividis", norm=norm,
+                         shading="nearest", rasterized=True)  # fmt: skip
+    ax.figure.colorbar(mesh, ax=ax, label=labelled(name.replace("_", " "), unit))
+
+
+def colour_scale(fields: Sequence[Array], unit: str) -> tuple[float, str, Any]:
+    """Size and name of the unit shown, and the norm that suits all fields."""
+    values = np.concatenate([f[np.isfinite(f)].reshape(-1) for f in fields])
+    if not len(values):
+        return 1.0, unit, Normalize(0, 1)
+    factor, name = display_unit(unit, float(np.median(np.abs(values))) or 1.0)
+    low, high = np.quantile(values, [0.001, 0.999])
+    positive = values[values > 0]
+    if low >= 0 and len(positive) and high / np.quantile(positive, 0.02) >= MANY:
+        return factor, name, LogNorm(float(np.quantile(positive, 0.02)) / factor, float(high) / factor, clip=False)
+    return factor, name, Normalize(float(low) / factor, float(high) / factor)
+
+
+def _edge(ax: Axes, x: Array, y: Array, view: View) -> list[Array]:
+    """Draw the edge of stability; returns its pieces as vertices (n, 2) in the units of the axes."""
+    if len(x) < 2 or len(y) < 2:
+        return []
+    values = view.values
+    if view.shares.get("status") is not None:
+        field, level = view.shares["status"][STABLE], 0.5
+    elif "status" in values:
+        sign = np.select([values["status"] == STABLE, values["status"] == UNSTABLE], [1.0, -1.0], np.nan)
+        field, level = sign * _distance(values, sign), 0.0
+    else:
+        return []
+    good = field[np.isfinite(field)]
+    if not len(good) or not good.min() < level < good.max():
+        return []
+    lines = ax.contour(x, y, np.where(np.isfinite(field), field, np.nan), levels=[level], colors=BLACK, linewidths=2)
+    entry(ax, Line2D([], [], color=BLACK, linewidth=2, label="edge of stability"))
+    polygons = [np.asarray(p) for path in lines.get_paths() for p in path.to_polygons(closed_only=False)]
+    return [p for p in polygons if len(p)]
+
+
+def _distance(values: Mapping[str, Array], sign: Array) -> Array:
+    """Something that vanishes at the edge, so that it can be drawn finer than the grid; 1 where there is nothing."""
+    if "growth_rate" in values:
+        rate = np.abs(values["growth_rate"])
+        return np.asarray(np.where(np.isfinite(rate), np.arcsinh(rate / (np.nanmedian(rate) or 1.0)), 1.0))
+    if "safety_factor" in values:
+        with np.errstate(all="ignore"):
+            away = np.abs(np.log(values["safety_factor"]))
+        return np.asarray(np.where(np.isfinite(away), away, np.nanmax(away, initial=1.0, where=np.isfinite(away))))
+    return np.asarray(np.ones_like(sign))
+
+
+def _mark_own(
+    ax: Axes, found: MapResult, view: View, scales: Sequence[Scale], pieces: Sequence[Array], told: bool
+) -> None:
+    """The base rig, if it is in view, and the point of the edge nearest to it, with its numbers where there is room."""
+    own = [own_value(found, name) for name in view.names]
+    limits = [ax.get_xlim(), ax.get_ylim()]
+    if any(value is None for value in own):
+        return
+    at = [float(scale(value)) for scale, value in zip(scales, own, strict=True)]
+    if not all(min(ends) <= value <= max(ends) for value, ends in zip(at, limits, strict=True)):
+        return
+    ax.plot(*([v] for v in at), "o", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
+            label="this rig", clip_on=False, zorder=5)  # fmt: skip
+    nearest = _nearest(pieces, at, limits, [s.log for s in scales])
+    if nearest is None:
+        return
+    ax.plot(*zip(at, nearest, strict=True), color=VERMILION, linewidth=1.2, linestyle=":", zorder=4)
+    words = ", ".join(
+        f"{short(name)} {shown(float(value * scale.factor), found.unit(name), 3)}"
+        for name, value, scale in zip(view.names, nearest, scales, strict=True)
+    )
+    ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",
+            label=f"nearest edge\n({words})" if told else "nearest edge", zorder=5)  # fmt: skip
+
+
+def _nearest(pieces: Sequence[Array], at: Sequence[float], limits: Sequence[Any], logs: Sequence[bool]) -> Any:
+    """The point of the edge nearest to a point in the picture, in the units of the axes."""
+
+    def drawn(points: Array) -> Array:
+        columns = [
+            (np.log(c / lo) / np.log(hi / lo)) if log else (c - lo) / (hi - lo)
+            for c, (lo, hi), log in zip(points.T, limits, logs, strict=True)
+        ]
+        return np.column_stack(columns)
+
+    best, found = np.inf, None
+    origin = drawn(np.array([at], dtype=float))[0]
+    for piece in pieces:
+        points = drawn(piece)
+        starts, steps = points[:-1], np.diff(points, axis=0)
+        if not len(steps):
+            continue
+        length = np.maximum(np.sum(steps**2, axis=1), 1e-300)
+        share = np.clip(np.sum((origin - starts) * steps, axis=1) / length, 0, 1)
+        distance = np.hypot(*(starts + share[:, None] * steps - origin).T)
+        i = int(np.argmin(distance))
+        if distance[i] < best:
+            best, found = float(distance[i]), piece[i] + share[i] * (piece[i + 1] - piece[i])
+    return found

@@ -1,0 +1,101 @@
+"""What is made of maps: edges that were refined, and which parameters decide."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.errors import ParameterError, Problem
+from steadyslip.figures.map_axes import KINDS, legend, place_axes, short
+from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new
+from steadyslip.sweep.refine import Refined
+from steadyslip.sweep.sensitivity import Sensitivity
+from steadyslip.sweep.view import View
+
+
+def refined(found: Refined, ax: Axes | None = None) -> Axes:
+    """Draw the points that were put along an edge of a map over two parameters, and the edge that they found.
+
+    Parameters
+    ----------
+    found : Refined
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If the map is over another number of parameters.
+    """
+    names = [name for name in found.map.dims if name in found.spacing]
+    if len(names) != 2 or len(found.map.dims) != 2:
+        message = f"got a map over {', '.join(found.map.dims)}; allowed: two grids. Use points and edge for others"
+        raise ParameterError([Problem("found", message)])
+    ax = axes_or_new(ax)
+    places = tuple(np.asarray(found.map.dataset[name].values) for name in names)
+    view = View(tuple(names), places, {}, {}, {}, {}, False)
+    scales = place_axes(ax, found.map, view)
+    columns = [scale(found.points[name]) for name, scale in zip(names, scales, strict=True)]
+    values = found.points[found.of]
+    words = found.map.words(found.of)
+    if words:
+        groups = [(values == code, words[code], KINDS[code % len(KINDS)]) for code in np.unique(values)]
+    else:
+        assert found.level is not None
+        above = values > found.level
+        groups = [(above, f"above {found.level:.4g}", BLUE), (~above, f"below {found.level:.4g}", ORANGE)]
+    for chosen, label, colour in groups:
+        ax.plot(columns[0][chosen], columns[1][chosen], ".", color=colour, markersize=3, linestyle="none", label=label)
+    edge = [scale(found.edge[name]) for name, scale in zip(names, scales, strict=True)]
+    ax.plot(*edge, ".", color=BLACK, markersize=1.5, linestyle="none", label=f"edge of {found.of.replace('_', ' ')}")
+    ax.set_xlim(*(scales[0](places[0][[0, -1]])))
+    ax.set_ylim(*(scales[1](places[1][[0, -1]])))
+    legend(ax)
+    return ax
+
+
+def sensitivity(found: Sensitivity, ax: Any = None) -> Any:
+    """Draw Sobol indices: for each parameter the share that it has alone, and with others.
+
+    Parameters
+    ----------
+    found : Sensitivity
+    ax : matplotlib.axes.Axes or sequence of them, optional
+        One for each result.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    results = list(found.first)
+    if ax is None:
+        from matplotlib import pyplot as plt
+
+        height = 0.42 * len(found.parameters) + 1.6
+        _, ax = plt.subplots(1, len(results), figsize=(4.6 * len(results), height), layout="constrained", squeeze=False)
+    axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
+    for one, result in zip(axes, results, strict=True):
+        order = found.ranked(result)[::-1]
+        rows = np.array([found.parameters.index(name) for name in order])
+        place = np.arange(len(rows))
+        parts = (
+            ("alone", found.first[result], found.first_interval[result], BLUE, 0.2),
+            ("with others", found.total[result], found.total_interval[result], ORANGE, -0.2),
+        )
+        for label, values, (low, high), colour, shift in parts:
+            reach = np.abs(np.stack([values - low, high - values]))[:, rows]
+            one.barh(place + shift, values[rows], 0.36, xerr=reach, color=colour, ecolor=BLACK, capsize=2, label=label)
+        one.set_yticks(place, [short(name) for name in order])
+        one.set_xlim(left=min(0.0, one.get_xlim()[0]))
+        one.set_xlabel("share of the variance (1)")
+        title = result.replace("_", " ")
+        missing = found.missing[result]
+        one.set_title(title + (f"\n(missing at {100 * missing:.3g} % of the points)" if missing else ""),
+                      fontsize="medium")  # fmt: skip
+    axes[0].legend(loc="lower right", fontsize="small")
+    return axes

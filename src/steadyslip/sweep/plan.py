@@ -43,8 +43,8 @@ class Map:
         Parameters by dotted name, of the rig or of the protocol; each spans a dimension.
     compute : sequence of str, Measure or function
         Measures by name (``status``, ``critical_stiffness``, ``safety_factor``, ``margin``, ``stable_stiffness``,
-        ``growth_rate``, ``onset``, ``events``, ``threshold``), with options as records such as ``Events(until=200.0)``, or functions of
-        a rig; see `measure`.
+        ``growth_rate``, ``onset``, ``events``, ``threshold``), with options as records such as ``Events(until=200.0)``,
+        or functions of a rig; see `measure`.
     samples : Samples, mapping of str to array_like, Fit or Draws, optional
         Parameters that vary together along the dimension ``sample``: spread over ranges, listed, or as a fit allows, in
         which case the rig gets the fit's friction as in `predict`.

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import steadyslip as ss
 
-ROWS, COLUMNS, CHUNK = 12, 10, 5
+ROWS, COLUMNS, CHUNK = 12, 9, 5  # chunks of 5 and 4: the last one of a row is cut off
 
 
 def rig():

@@ -17,6 +17,7 @@ from dimensionless import unit_rig
 from steadyslip.nonlinear.onset import onset_map
 from steadyslip.sweep.axes import LARGEST_HYPERCUBE, make_sampling
 from steadyslip.sweep.plan import roles
+from steadyslip.sweep.work import do_chunk, job_of
 
 ANGLES = ss.Grid("-80 deg", "80 deg", 41)
 STIFFNESSES = ss.Grid("0.1 GPa/m", "100 GPa/m", 30, "log")
@@ -257,6 +258,23 @@ def test_a_finished_map_is_not_computed_again(tmp_path):
     assert calls == [1e9, 2e9]
     assert "complete" in str(found)
     assert found.to_dict()["chunks"] == {"finished": 1, "all": 1}
+
+
+def test_a_finished_chunk_is_left_alone(tmp_path):
+    """As when a worker that was thought lost had finished it."""
+    calls = []
+
+    def counted(one):
+        calls.append(one.stiffness)
+        return 1.0
+
+    plan = ss.Map(rig(), {"stiffness": [1e9, 2e9]}, [counted], chunk=1)
+    made(plan, tmp_path)
+    done = do_chunk(job_of(plan, tmp_path / "map.zarr"), 1)
+    assert (done.points, done.seconds, done.problem) == (1, 0.0, "")
+    assert len(calls) == 2
+    elsewhere = do_chunk(job_of(plan, tmp_path / "other.zarr"), 1)
+    assert "does not see" in elsewhere.problem
 
 
 def test_what_a_map_says_of_itself(tmp_path):
@@ -556,6 +574,24 @@ def test_a_refined_edge_is_that_of_the_fine_grid(tmp_path_factory, columns, rows
     np.testing.assert_array_equal(at["status"], found.points["status"])
     np.testing.assert_allclose(at["contact.angle"], found.points["contact.angle"], rtol=1e-9, atol=1e-12)
     assert len(found.points["status"]) < 0.8 * fine.size
+
+
+def test_an_edge_is_followed_through_a_side_whose_ends_agree(tmp_path):
+    """A bump of the edge pokes into a cell all whose corners are above it."""
+
+    def above(one, vary):
+        x, y = np.log10(vary["slider.stiffness"] / 1e9), np.log10(vary["friction.d_c"] / 1e-6)
+        return y - 0.9 - 0.35 * np.exp(-(((x - 0.5) / 0.13) ** 2))
+
+    def grid(n):
+        over = {"stiffness": ss.Grid(1e9, 1e10, n, "log"), "friction.d_c": ss.Grid(1e-6, 1e-4, 2 * n - 1, "log")}
+        return ss.Map(rig(), over, [ss.measure(above, arrays=True)])
+
+    found = ss.refine(made(grid(2), tmp_path), 4, of="above", level=0.0, compute=grid(2).compute)
+    fine = made(grid(17), tmp_path, "fine.zarr").dataset["above"].values > 0
+    crossings = np.count_nonzero(fine[1:] != fine[:-1]) + np.count_nonzero(fine[:, 1:] != fine[:, :-1])
+    assert np.any(found.edge["friction.d_c"] > 1.2e-5)
+    assert len(found.sides) == crossings
 
 
 def test_a_refined_edge_is_the_critical_stiffness(tmp_path):

@@ -27,36 +27,35 @@ def rig():
 
 
 class Costly:
-    """A function of a rig that takes its time and leaves a trace."""
+    """A function of a rig that takes its time and leaves a trace; where does not belong to what it is."""
 
     __name__ = "costly"
 
-    def __init__(self, log, pause):
-        self.log, self.pause = str(log), pause
-
     def __call__(self, rig):
-        place = os.open(self.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+        log, pause = os.environ["MAP_LOG"], float(os.environ["MAP_PAUSE"])
+        place = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         os.write(place, f"{rig.stiffness!r} {rig.value('friction.a')!r} {os.getpid()}\n".encode())
         os.close(place)
         if random.random() < 0.1:
             with contextlib.suppress(OSError):
-                token = next(Path(self.log + ".tokens").iterdir(), None)
+                token = next(Path(log + ".tokens").iterdir(), None)
                 if token is not None:
                     token.unlink()
                     os.kill(os.getpid(), signal.SIGKILL)
-        time.sleep(self.pause)
+        time.sleep(pause)
         if zlib.crc32(repr(rig.stiffness).encode()) % 5 == 0:
             return math.nan
         return math.sin(rig.stiffness) / rig.value("friction.a")
 
 
 def plan(log, pause=0.01):
+    os.environ |= {"MAP_LOG": str(log), "MAP_PAUSE": str(pause)}  # for this process and those that it starts
     # only NaN in the first row: chunks that are all fill value
     stiffness = [1e9 * (i + 1) for i in range(ROWS)]
     return ss.Map(
         rig(),
         {"stiffness": stiffness, "friction.a": ss.Grid(0.01, 0.02, COLUMNS)},
-        compute=[ss.measure(Costly(log, pause)), "status"],
+        compute=[ss.measure(Costly()), "status"],
         chunk=CHUNK,
     )
 

@@ -82,6 +82,7 @@ def wait_for(log, points):
 
 def test_killed_workers_scheduler_and_driver(tmp_path, cluster, undisturbed):
     store, log = tmp_path / "map.zarr", tmp_path / "log"
+    attack.plan(log)  # says where to log, to all processes that follow
     scheduler, workers = cluster.up()
     first = driver(store, log, cluster.address)
     wait_for(log, 10)

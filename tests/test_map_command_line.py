@@ -89,6 +89,9 @@ def test_refinement_and_sensitivity(capsys, monkeypatch, tmp_path):
         (("map", str(ROOT / "examples" / "lead-screw.toml"), "-o", "a.zarr"), "map: missing table"),
         (("map", "none.zarr"), "there is no map 'none.zarr'"),
         (("map", "none.toml", "-o", "a.zarr"), "no such file"),
+        (("map", SAFE, "-o", "a.zarr", "--refine", "1", "--show", "status"), "--show: is for figures of a map"),
+        (("map", SAFE, "-o", "a.zarr", "--level", "3"), "--level: is about the edge to refine"),
+        (("map", SAFE, "-o", "a.zarr", "--cluster", "tcp://:"), "allowed: 'local', or an address"),
         (("sensitivity", SAFE, "--points", "100"), "a power of 2"),
         (("sensitivity", SAFE, "--of", "status"), "not one number"),
         (("sensitivity", SAFE, "-o", "a.csv"), "allowed endings"),
@@ -110,7 +113,8 @@ def test_names_that_a_map_does_not_have_are_said(capsys, monkeypatch, tmp_path):
     for words, message in {
         ("--x", "angel"): "did you mean 'contact.angle'",
         ("--show", "growth"): "did you mean 'growth_rate'",
-        ("--facet", "angle"): "contact.preload",
+        ("--facet", "angel"): "did you mean 'contact.angle'",
+        ("--facet", "angle", "--x", "angle"): "is on an axis already",
         ("--x", "angle", "--y", "angle"): "on both axes",
     }.items():
         status, _, error = run(capsys, monkeypatch, "map", store, *words, "-o", str(tmp_path / "a.png"))

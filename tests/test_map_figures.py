@@ -113,8 +113,9 @@ def test_facets_share_axes_and_say_their_value(maps):
     axes = maps["chart"].plot(facet="friction.b", show="critical_stiffness")
     assert [ax.get_title() for ax in axes.flat] == ["b = 0.016", "b = 0.018", "b = 0.02"]
     assert axes[0, 1].get_ylabel() == ""
-    with pytest.raises(ss.ParameterError, match=r"facet.*allowed: friction\.b"):
-        maps["chart"].plot(facet="angle")
+    others = maps["chart"].plot(facet="angle")  # which is then on no axis
+    assert others[0, 0].get_title() == "angle = -80 deg"
+    assert (others[1, 0].get_xlabel(), others[1, 0].get_ylabel()) == ("stiffness (GPa/m)", "b (1)")
 
 
 def test_kinds_have_colours_and_names(maps):

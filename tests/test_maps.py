@@ -2,8 +2,10 @@
 
 import os
 import resource
+import shutil
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -245,34 +247,32 @@ def test_exports_hold_the_same(tmp_path):
     assert table.schema.field("growth_rate").metadata[b"units"] == b"1/s"
 
 
+CALLS = []
+
+
+def counted(one):
+    CALLS.append(one.stiffness)
+    return 1.0
+
+
 def test_a_finished_map_is_not_computed_again(tmp_path):
-    calls = []
-
-    def counted(one):
-        calls.append(one.stiffness)
-        return 1.0
-
+    CALLS.clear()
     plan = ss.Map(rig(), {"stiffness": [1e9, 2e9]}, [counted])
     made(plan, tmp_path)
     found = made(plan, tmp_path)
-    assert calls == [1e9, 2e9]
+    assert CALLS == [1e9, 2e9]
     assert "complete" in str(found)
     assert found.to_dict()["chunks"] == {"finished": 1, "all": 1}
 
 
 def test_a_finished_chunk_is_left_alone(tmp_path):
     """As when a worker that was thought lost had finished it."""
-    calls = []
-
-    def counted(one):
-        calls.append(one.stiffness)
-        return 1.0
-
+    CALLS.clear()
     plan = ss.Map(rig(), {"stiffness": [1e9, 2e9]}, [counted], chunk=1)
     made(plan, tmp_path)
     done = do_chunk(job_of(plan, tmp_path / "map.zarr"), 1)
     assert (done.points, done.seconds, done.problem) == (1, 0.0, "")
-    assert len(calls) == 2
+    assert len(CALLS) == 2
     elsewhere = do_chunk(job_of(plan, tmp_path / "other.zarr"), 1)
     assert "does not see" in elsewhere.problem
 
@@ -323,6 +323,68 @@ def test_another_version_or_function_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(ss, "__version__", "9.9")
     with pytest.raises(ss.NotAvailable, match=r"steadyslip: was 0\.1\.0, is 9\.9"):
         made(chart(), tmp_path, "other.zarr")
+
+
+def test_what_a_function_holds_belongs_to_it(tmp_path):
+    def times(factor):
+        def product(one):
+            return factor * one.stiffness
+
+        return product
+
+    made(ss.Map(rig(), {"stiffness": [1e9]}, [times(1.0)]), tmp_path)
+    made(ss.Map(rig(), {"stiffness": [1e9]}, [times(1.0)]), tmp_path)
+    with pytest.raises(ss.NotAvailable, match=r"compute\.product\.text: was"):
+        made(ss.Map(rig(), {"stiffness": [1e9]}, [times(2.0)]), tmp_path)
+
+
+def test_another_map_under_the_name_of_an_old_one_is_whole(tmp_path):
+    """A process that has had the old one open must not take it for the new one."""
+    for points in (11, 12):
+        shutil.rmtree(tmp_path / "map.zarr", ignore_errors=True)
+        data = made(ss.Map(rig(), samples=ss.Samples(RANGES, points), compute=["status"], chunk=6), tmp_path).dataset
+        assert data.sizes["sample"] == points
+        assert np.all(data["status"] >= 0)
+        assert np.all(data["friction.a"] > 0)
+
+
+@pytest.mark.parametrize("damage", [bytes.fromhex("00"), b""], ids=["changed", "empty"])
+def test_damaged_coordinates_are_written_again(tmp_path, damage):
+    values = {"friction.a": np.linspace(0.01, 0.02, 5)}
+    plan = ss.Map(rig(), {"angle": ANGLES}, ["growth_rate"], samples=values, chunk=40)
+    found = made(plan, tmp_path)
+    for name in ("contact.angle", "friction.a"):
+        file = tmp_path / "map.zarr" / name / "c" / "0"
+        file.write_bytes(damage + file.read_bytes()[: -len(damage)] if damage else b"")
+    with pytest.raises(ss.NotAvailable, match="is damaged"):
+        found.plot()
+    with pytest.raises(ss.NotAvailable, match="is damaged"):
+        found.to_parquet(tmp_path / "map.parquet")
+    data = made(plan, tmp_path).dataset
+    np.testing.assert_array_equal(data["contact.angle"], plan.axes[0].values)
+    np.testing.assert_array_equal(data["friction.a"], values["friction.a"])
+
+
+@pytest.mark.filterwarnings("ignore:Consolidated metadata")  # which threads cannot hold back
+def test_two_maps_may_be_begun_at_once(tmp_path):
+    """Whoever comes second finds the store, or is told that there is another run; nothing is broken."""
+    answers = []
+
+    def begin():
+        try:
+            answers.append(ss.run_map(chart(chunk=40), tmp_path / "map.zarr", workers=1).complete)
+        except ss.NotAvailable as error:
+            answers.append("another run is working" in str(error) or str(error))
+        except Exception as error:
+            answers.append(repr(error))
+
+    threads = [threading.Thread(target=begin) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert answers == [True] * 4
+    assert not list(tmp_path.glob(".*"))
 
 
 def test_a_path_that_cannot_be_used_is_said_before_anything_is_computed(tmp_path):
@@ -421,8 +483,18 @@ def test_everything_wrong_with_a_map_is_said_at_once():
         ss.Map(rig(), {"protocol.pieces.1.to": [1e-6]}, protocol=ss.VelocityStep(at=1.0, to=2e-6))
     with pytest.raises(ss.ParameterError, match="Latin hypercube"):
         sampling(2 * LARGEST_HYPERCUBE, method="latin-hypercube")
-    with pytest.raises(ss.ParameterError, match="is the name of a parameter"):
+    with pytest.raises(ss.ParameterError, match="is the name of something else"):
         ss.Map(rig(), {"angle": ANGLES}, [ss.measure(lambda one: 1.0, name="sample")])
+    with pytest.raises(ss.ParameterError, match="is the name of something else"):
+        ss.Map(rig(), {"angle": ANGLES}, [ss.measure(lambda one: 1.0, name="complete")])
+    assert ss.Map(rig(), {"angle": ANGLES}, ss.measure(lambda one: 1.0, name="one")).outputs()[0].name == "one"
+    for compute in (5, None, []):
+        with pytest.raises(ss.ParameterError, match="compute"):
+            ss.Map(rig(), {"angle": ANGLES}, compute)
+    with pytest.raises(ss.ParameterError, match="samples: is empty"):
+        ss.Map(rig(), samples={})
+    with pytest.raises(ss.ParameterError, match="two ends"):
+        ss.Map(rig(), samples=ss.Samples({"angle": 5}, 8))
     with pytest.raises(ss.ParameterError, match="differ in length"):
         make_sampling({"friction.a": [0.01], "friction.b": [0.01, 0.02]}, roles(chart()) | {
             name: address.role for name, address in rig().parameters().items()})  # fmt: skip
@@ -537,11 +609,14 @@ def test_everything_wrong_with_a_file_is_said_with_its_line():
         ("map = 3", "allowed: \\[map\\]"),
         ("[map]\nover = 3", "allowed: parameters and their values"),
         ("[map]\ncompute = 3", "allowed: a list of"),
-        ("[map]\nchunk = 0.5\n[map.over]\nangle = [0.1]", "a whole number of points"),
+        ("[map]\nchunk = 0.5\n[map.over]\nangle = [0.1]", "allowed: a whole number"),
         ("[map]\n[map.over]\nangle = [0.1]\n[map.threshold]\nkick = 'velocity'", "add 'threshold' to map.compute"),
         ("[map]\ncompute = ['threshold']\n[map.over]\nangle = [0.1]\n[map.threshold]\nkick = 'sideways'", "velocity"),
         ("[map]\n[map.samples]\nfit = 'none.nc'", "cannot read"),
         ("[map]\n[map.samples]\npoints = 3", "over: missing"),
+        ("[map]\nchunk = 'x'\n[map.over]\nangle = [0.1]", "allowed: a whole number"),
+        ("[map]\n[map.over]\nangle = [[0.1, 0.2], [0.3]]", "value 1: got"),
+        ("[map]\ncompute = ['events']\n[map.over]\nangle = [0.1]\n[map.events]\nlaw = 'status'", "is not an option"),
     ],
 )
 def test_a_file_with_one_fault(text, message):

@@ -278,15 +278,17 @@ def map_(
     from steadyslip.sweep import refine as refined
     from steadyslip.sweep.commands import STORE, map_file, write_map
 
-    found = map_file(source, output or (), changes or (), workers, cluster, refine > 0)
+    figure: dict[str, Any] = {"x": x, "y": y, "show": show, "facet": facet}
+    about: dict[str, Any] = {"of": of, "level": level}
+    found = map_file(source, output or (), changes or (), workers, cluster, refine > 0, figure, about)
     if not found.complete:
         done, count = found.finished
         typer.secho(f"stopped: {done} of {count} chunks are finished and kept; the same command goes on", err=True)
         raise typer.Exit(130)
-    edge = refined(found, refine, of=of, level=level, workers=workers, cluster=cluster) if refine else None
+    edge = refined(found, refine, **about, workers=workers, cluster=cluster) if refine else None
     others = [path for path in output or () if path.suffix != STORE]
     for path in others:
-        write_map(found, path, {"x": x, "y": y, "show": show, "facet": facet}, edge)
+        write_map(found, path, figure, edge)
     if as_json:
         import json
 

@@ -175,7 +175,7 @@ def _edge(ax: Axes, x: Array, y: Array, view: View) -> list[Array]:
 
 def _distance(values: Mapping[str, Array], sign: Array) -> Array:
     """Something that vanishes at the edge, so that it can be drawn finer than the grid; 1 where there is nothing."""
-    if "growth_rate" in values:
+    if "growth_rate" in values and np.isfinite(values["growth_rate"]).any():
         rate = np.abs(values["growth_rate"])
         return np.asarray(np.where(np.isfinite(rate), np.arcsinh(rate / (np.nanmedian(rate) or 1.0)), 1.0))
     if "safety_factor" in values:

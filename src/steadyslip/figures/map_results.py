@@ -12,11 +12,13 @@ from steadyslip.figures.map_axes import KINDS, legend, place_axes, short
 from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new
 from steadyslip.sweep.refine import Refined
 from steadyslip.sweep.sensitivity import Sensitivity
-from steadyslip.sweep.view import View
+from steadyslip.sweep.view import View, own_value
 
 
 def refined(found: Refined, ax: Axes | None = None) -> Axes:
-    """Draw the points that were put along an edge of a map over two parameters, and the edge that they found.
+    """Draw the points that were put along an edge of a map over two grids, and the edge that they found.
+
+    Where parameters have lists of values besides, those at the values nearest to the rig's own.
 
     Parameters
     ----------
@@ -33,14 +35,18 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
         If the map is over another number of parameters.
     """
     names = [name for name in found.map.dims if name in found.spacing]
-    if len(names) != 2 or len(found.map.dims) != 2:
-        message = f"got a map over {', '.join(found.map.dims)}; allowed: two grids. Use points and edge for others"
-        raise ParameterError([Problem("found", message)])
+    if len(names) != 2:
+        message = f"is over {', '.join(names)}; an edge is drawn over two grids. Write it as .csv instead"
+        raise ParameterError([Problem(str(found.map.path), message)])
     ax = axes_or_new(ax)
     places = tuple(np.asarray(found.map.dataset[name].values) for name in names)
     view = View(tuple(names), places, {}, {}, {}, {}, False)
     scales = place_axes(ax, found.map, view)
-    columns = [scale(found.points[name]) for name, scale in zip(names, scales, strict=True)]
+    held = {n: found.map.read(n) for n in found.map.dims if n not in names}
+    near = {n: values[np.argmin(np.abs(values - (own_value(found.map, n) or 0.0)))] for n, values in held.items()}
+    shown = np.all([found.points[n] == at for n, at in near.items()] or [True], axis=0)
+    on_edge = np.all([found.edge[n] == at for n, at in near.items()] or [True], axis=0)
+    columns = [scale(np.where(shown, found.points[name], np.nan)) for name, scale in zip(names, scales, strict=True)]
     values = found.points[found.of]
     words = found.map.words(found.of)
     if words:
@@ -51,7 +57,7 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
         groups = [(above, f"above {found.level:.4g}", BLUE), (~above, f"below {found.level:.4g}", ORANGE)]
     for chosen, label, colour in groups:
         ax.plot(columns[0][chosen], columns[1][chosen], ".", color=colour, markersize=3, linestyle="none", label=label)
-    edge = [scale(found.edge[name]) for name, scale in zip(names, scales, strict=True)]
+    edge = [scale(np.where(on_edge, found.edge[name], np.nan)) for name, scale in zip(names, scales, strict=True)]
     ax.plot(*edge, ".", color=BLACK, markersize=1.5, linestyle="none", label=f"edge of {found.of.replace('_', ' ')}")
     ax.set_xlim(*(scales[0](places[0][[0, -1]])))
     ax.set_ylim(*(scales[1](places[1][[0, -1]])))

@@ -65,11 +65,14 @@ def map_figure(
     """
     if show is not None and show not in found.results:
         raise ParameterError([Problem("show", unknown_name("result", show, found.results))])
-    names = axes_of(found, x, y or None)
+    third = None if facet is None else _facet_name(found, facet)
+    names = axes_of(found, x, y or None, third)
     if y == "":
         names = names[:1]
-    if facet is not None:
-        return _facets(found, names, show, facet, at or {})
+    if third in names:
+        raise ParameterError([Problem("facet", f"{third} is on an axis already; choose another parameter")])
+    if third is not None:
+        return _facets(found, names, show, third, at or {})
     view = take(found, names, _needed(found, show), at)
     ax = axes_or_new(ax)
     _draw(ax, found, view, show)
@@ -82,14 +85,17 @@ def _needed(found: MapResult, show: str | None) -> list[str]:
     return [name for name in dict.fromkeys(wanted) if name in found.results]
 
 
-def _facets(found: MapResult, names: Sequence[str], show: str | None, facet: str, at: Mapping[str, Any]) -> Any:
+def _facet_name(found: MapResult, facet: str) -> str:
+    grids = [dim for dim in found.dims if dim != "sample"]
+    try:
+        return resolve(facet, dict.fromkeys(grids))
+    except UnknownNameError as error:
+        raise ParameterError([Problem("facet", unknown_name("parameter", facet, grids))]) from error
+
+
+def _facets(found: MapResult, names: Sequence[str], show: str | None, third: str, at: Mapping[str, Any]) -> Any:
     from matplotlib import pyplot as plt
 
-    others = [dim for dim in found.dims if dim not in (*names, "sample")]
-    try:
-        third = resolve(facet, dict.fromkeys(others))
-    except UnknownNameError as error:
-        raise ParameterError([Problem("facet", unknown_name("parameter", facet, others))]) from error
     values = np.asarray(found.dataset[third].values)
     chosen = values[np.unique(np.linspace(0, len(values) - 1, min(FACETS, len(values))).round().astype(int))]
     columns = min(3, len(chosen))

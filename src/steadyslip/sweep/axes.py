@@ -18,6 +18,7 @@ Array = np.ndarray
 SPACINGS = ("linear", "log")
 METHODS = ("sobol", "latin-hypercube")
 SAMPLE = "sample"
+COMPLETE = "complete"  # the array of marks
 MOST_POINTS = 10**12
 SOBOL_BITS = 32  # SciPy's jumps ahead work up to here
 LARGEST_HYPERCUBE = 2**22  # all its points are needed for one of them
@@ -204,7 +205,7 @@ def make_axis(name: str, role: Parameter, given: Any) -> Axis:
         space = np.geomspace if given.spacing == "log" else np.linspace
         values = space(low, high, points)
         return Axis(name, role, np.clip(values, min(low, high), max(low, high)), given.spacing)
-    if isinstance(given, (str, bytes)) or not hasattr(given, "__len__") or np.ndim(given) != 1:
+    if isinstance(given, (str, bytes, Mapping)) or not hasattr(given, "__len__"):
         message = f"got {given!r}; allowed: a Grid (in a file {{from, to, points}}) or a list of values"
         raise ParameterError([Problem(name, message)])
     numbers, problems = [], []
@@ -233,6 +234,8 @@ def make_sampling(given: Any, roles: Mapping[str, Parameter]) -> Sampling:
     if isinstance(given, Samples):
         return _generated(given, roles)
     problems, columns = [], {}
+    if not given:
+        raise ParameterError([Problem("map.samples", "is empty; name at least one parameter and its values")])
     for name, values in given.items():
         try:
             columns[name] = np.atleast_1d(np.asarray(checked_array(name, roles[name], values), dtype=float))
@@ -269,7 +272,7 @@ def _generated(given: Samples, roles: Mapping[str, Parameter]) -> Generated:
         problems += error.problems
     for name, ends in given.over.items():
         try:
-            if isinstance(ends, str) or len(ends) not in (2, 3):
+            if not isinstance(ends, (list, tuple)) or len(ends) not in (2, 3):
                 raise ParameterError([Problem(name, f"got {ends!r}; allowed: two ends, and 'log' if so wanted")])
             spacing = ends[2] if len(ends) == 3 else "linear"
             ranges.append((name, *_ends(name, roles[name], ends[0], ends[1], spacing), spacing))

@@ -135,13 +135,18 @@ def _client(address: str, workers: int) -> Iterator[Any]:
             with (
                 dask.config.set(unwatched),
                 LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                    n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
                 ) as cluster,
                 Client(cluster, set_as_default=False) as client,
             ):
                 yield client
         else:
-            with Client(address, set_as_default=False, timeout=CONNECT) as client:
+            try:
+                client = Client(address, set_as_default=False, timeout=CONNECT)
+            except (ValueError, TypeError) as error:
+                message = f"no Dask scheduler at {address!r}: {error}; an address is like tcp://host:8786"
+                raise NotAvailable(message) from error
+            with client:
                 yield client
     finally:
         for logger, level in zip(quiet, levels, strict=True):

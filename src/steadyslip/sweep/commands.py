@@ -26,7 +26,8 @@ REFINED = (".csv", *ENDINGS)
 
 def map_file(
     source: Path, outputs: Sequence[Path], changes: Iterable[str] = (), workers: int | None = None,
-    cluster: str | None = None, refine: bool = False,
+    cluster: str | None = None, refine: bool = False, figure: Mapping[str, Any] | None = None,
+    edge: Mapping[str, Any] | None = None,
 ) -> MapResult:  # fmt: skip
     """Compute the map of a rig file into the one of `outputs` that ends in .zarr, or open a map.
 
@@ -35,6 +36,7 @@ def map_file(
     ParameterError, NotAvailable
         If anything is wrong, before anything is computed where it can be known.
     """
+    _check_words(refine, figure or {}, edge or {})
     check_output([path for path in outputs if path.suffix != STORE], REFINED if refine else ENDINGS)
     stores = [path for path in outputs if path.suffix == STORE]
     if source.suffix == STORE:
@@ -48,6 +50,18 @@ def map_file(
         raise ParameterError([Problem("output", message)])
     check_path(stores[0])
     return run_map(read_map(source, changes), stores[0], workers=workers, cluster=cluster)
+
+
+def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any]) -> None:
+    """Options that would have no effect are mistakes."""
+    if refine:
+        idle = [name for name, value in figure.items() if value is not None]
+        message = "is for figures of a map; with --refine they show the edge. Draw the map itself in a second command"
+    else:
+        idle = [name for name, value in edge.items() if value is not None]
+        message = "is about the edge to refine; add --refine N"
+    if idle:
+        raise ParameterError([Problem(f"--{name}", message) for name in idle])
 
 
 def write_map(found: MapResult, path: Path, options: Mapping[str, Any], edge: Refined | None = None) -> None:

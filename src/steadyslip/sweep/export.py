@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,12 +12,17 @@ from steadyslip.errors import NotAvailable
 from steadyslip.output import whole_file
 from steadyslip.sweep.store import Store
 
+if TYPE_CHECKING:
+    from steadyslip.sweep.result import MapResult
+
 FROM_STORE = ("title", "rig", "definition", "steadyslip", "versions")
 
 
-def to_netcdf(store: Store, path: str | PathLike[str]) -> None:
+def to_netcdf(found: MapResult, path: str | PathLike[str]) -> None:
     """Write netCDF-4 with the map's dimensions, coordinates, units, rig and versions."""
     import netCDF4
+
+    store = found.store
 
     with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
         for name in FROM_STORE:
@@ -27,13 +32,13 @@ def to_netcdf(store: Store, path: str | PathLike[str]) -> None:
             file.createDimension(dim, size)
         for name in store.coordinates:
             variable = _variable(file, store, name)
-            variable[:] = store.array(name)[:]
+            variable[:] = found.read(name)
         for name in store.results:
             _variable(file, store, name)
         for number in range(store.count):
             region = store.region(number)
             for name in store.results:
-                file[name][region] = store.array(name)[region]
+                file[name][region] = found.read(name, region)
 
 
 def _variable(file: Any, store: Store, name: str) -> Any:
@@ -65,7 +70,7 @@ def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
     return tuple(reversed(found))
 
 
-def to_parquet(store: Store, path: str | PathLike[str]) -> None:
+def to_parquet(found: MapResult, path: str | PathLike[str]) -> None:
     """Write one row for each point, parameters first; words for what is one of several kinds.
 
     Raises
@@ -78,12 +83,13 @@ def to_parquet(store: Store, path: str | PathLike[str]) -> None:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise NotAvailable("Parquet files need pyarrow; install it with pip install 'steadyslip[lab]'") from error
+    store = found.store
     notes = {name: str(store.group.attrs[name]) for name in FROM_STORE}
     writer = None
     with whole_file(path) as temporary:
         try:
             for number in range(store.count):
-                table = _rows(store, number, pa, notes)
+                table = _rows(found, number, pa, notes)
                 writer = writer or pq.ParquetWriter(temporary, table.schema, compression="zstd")
                 writer.write_table(table)
         finally:
@@ -91,7 +97,8 @@ def to_parquet(store: Store, path: str | PathLike[str]) -> None:
                 writer.close()
 
 
-def _rows(store: Store, number: int, pa: Any, notes: dict[str, str]) -> Any:
+def _rows(found: MapResult, number: int, pa: Any, notes: dict[str, str]) -> Any:
+    store = found.store
     region = store.region(number)
     shape = tuple(part.stop - part.start for part in region)
     names, columns, units = [], [], []
@@ -105,7 +112,7 @@ def _rows(store: Store, number: int, pa: Any, notes: dict[str, str]) -> Any:
         add(name, pa.array(np.broadcast_to(column, shape).reshape(-1)), str(store.array(name).attrs["units"]))
     for name in store.results:
         array: Any = store.array(name)
-        values: Any = np.asarray(array[region]).reshape(*[int(np.prod(shape))], *array.shape[len(shape) :])
+        values: Any = found.read(name, region).reshape(*[int(np.prod(shape))], *array.shape[len(shape) :])
         unit = str(array.attrs["units"])
         if "flag_meanings" in array.attrs:
             words = [word.replace("_", " ") for word in str(array.attrs["flag_meanings"]).split()]

@@ -64,7 +64,7 @@ def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], w
             if deaths == PATIENCE:
                 message = (
                     f"worker processes die on chunks {', '.join(map(str, sorted(left)[:workers]))}: killed, or out of "
-                    "memory. Finished chunks are kept; try fewer workers, or smaller chunks"
+                    "memory. Finished chunks are kept; try fewer workers, or another map with a smaller chunk"
                 )
                 raise NotAvailable(message) from error
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
@@ -212,14 +213,14 @@ class Events(Measure, name="events"):
     def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
         ended = (
             Output("outcome", "1", "how the run ended", tuple(WORDS)),
-            Output("end", "s", "time reached"),
+            Output("end_time", "s", "time reached"),
         )
         meant = (Output(name, unit, name.replace("_", " ")) for name, unit in EVENT_UNITS.items())
         return (*ended, *meant)
 
     def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         found = self._run(rig, protocol, vary)
-        return {"outcome": found.status_code, "end": found.end, **found.events}
+        return {"outcome": found.status_code, "end_time": found.end, **found.events}
 
     def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
         if self.until is None and protocol.until is None:
@@ -310,7 +311,7 @@ class FunctionMeasure:
 
 
 def source_digest(thing: Any) -> str:
-    """A short name for the text of a function or class; of what else can be called, for that of its class."""
+    """A short name for a function or class: its text, and what it holds (closure, defaults, attributes)."""
     if isinstance(thing, partial):
         text = f"{source_digest(thing.func)} {thing.args!r} {sorted(thing.keywords.items())!r}"
     else:
@@ -320,7 +321,12 @@ def source_digest(thing: Any) -> str:
         except (OSError, TypeError):  # typed at a prompt, or compiled
             code = getattr(thing, "__code__", None)
             text = repr((code.co_code, code.co_consts, code.co_names)) if code else repr(written)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+        held = [getattr(thing, name, None) for name in ("__defaults__", "__kwdefaults__")]
+        held += [cell.cell_contents for cell in getattr(thing, "__closure__", None) or ()]
+        if written is not thing:
+            held += sorted(getattr(thing, "__dict__", {}).items())
+        text += repr(held)
+    return hashlib.sha256(re.sub(r" at 0x[0-9a-f]+", "", text).encode()).hexdigest()[:16]
 
 
 def measure(
@@ -338,8 +344,8 @@ def measure(
     function : callable
         ``function(rig)`` gives a number; NaN, or one of this package's exceptions, where there is none. With
         `arrays`, ``function(rig, vary)`` gives an array for parameters, by dotted name, that broadcast. It must depend
-        on nothing else: maps are computed in several processes and may be continued another day. Its text tells whether
-        it is still the same then; what it refers to does not.
+        on nothing else: maps are computed in several processes and may be continued another day. Its text, and
+        what it holds, tell whether it is still the same then.
     name : str, optional
         Of the array; the function's own unless given.
     unit : str

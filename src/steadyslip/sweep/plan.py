@@ -18,7 +18,7 @@ from steadyslip.errors import ParameterError, Problem, SteadyslipError, UnknownN
 from steadyslip.protocol import Protocol
 from steadyslip.records import Address, Parameter, Record, parameters, resolve
 from steadyslip.slider import Slider
-from steadyslip.sweep.axes import SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
+from steadyslip.sweep.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
 from steadyslip.sweep.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
 from steadyslip.values import model_values
 
@@ -76,7 +76,8 @@ class Map:
         self._set("compute", _measures(self.compute, problems))
         self._read_samples(problems)
         self._read_axes(problems)
-        if self.chunk is not None and (isinstance(self.chunk, bool) or not 1 <= int(self.chunk) <= 2**24):
+        whole = isinstance(self.chunk, int) and not isinstance(self.chunk, bool)
+        if self.chunk is not None and not (whole and 1 <= self.chunk <= 2**24):
             problems.append(Problem("map.chunk", f"got {self.chunk!r}; allowed: a whole number from 1 to {2**24}"))
         if not (self.axes or self.sampling or problems):
             problems.append(Problem("map.over", "missing; name at least one parameter and its values"))
@@ -84,8 +85,11 @@ class Map:
             for problem in one.problems(self.rig, self.protocol):
                 problems.append(problem.under(f"map.{one.name}"))
         names = [output.name for one in self.compute for output in one.outputs(self.rig, ())]
-        taken = {*names} & {*self.known(), SAMPLE}
-        problems += [Problem("map.compute", f"{n!r} is the name of a parameter; give another") for n in sorted(taken)]
+        extra = {dim for one in self.compute for output in one.outputs(self.rig, ()) for dim, _ in output.extra}
+        taken = {*names} & {*self.known(), SAMPLE, COMPLETE, *extra}
+        problems += [
+            Problem("map.compute", f"{n!r} is the name of something else; give another") for n in sorted(taken)
+        ]
         twice = sorted({n for n in names if names.count(n) > 1})
         problems += [Problem("map.compute", f"{n!r} is computed twice; name it once") for n in twice]
         if problems:
@@ -286,10 +290,13 @@ def evaluate(rig: Slider, protocol: Protocol, compute: Iterable[AnyMeasure], var
 
 def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
     found: list[AnyMeasure] = []
-    for one in [given] if isinstance(given, str) or callable(given) or isinstance(given, Measure) else given:
+    single = isinstance(given, (str, Measure, FunctionMeasure)) or not isinstance(given, (list, tuple))
+    for one in [given] if single else given:
         try:
             if isinstance(one, (Measure, FunctionMeasure)):
                 found.append(one)
+            elif isinstance(one, type) and issubclass(one, Measure):
+                found.append(one())
             elif callable(one):
                 found.append(measure(one))
             else:

@@ -149,7 +149,7 @@ def refine(
     level = _checked(found, rounds, of, level)
     lattice = _Lattice(found, rounds)
     kinds = _Kinds(found, of, level)
-    base = found.dataset[of].values
+    base = found.read(of)
     nodes = lattice.flat(np.indices(found.shape).reshape(len(found.shape), -1).T * lattice.size)
     known = _Known(nodes, kinds(base.reshape(-1)))
     batch = _Batches(found, of, level, compute, lattice, workers, cluster, progress)
@@ -172,6 +172,8 @@ def _checked(found: MapResult, rounds: int, of: str, level: float | None) -> flo
         problems.append(Problem("rounds", f"got {rounds!r}; allowed: a whole number from 1 to {MOST_ROUNDS}"))
     if of not in found.results:
         problems.append(Problem("of", unknown_name("result", of, found.results)))
+    elif found.store.array(of).ndim > len(found.dims):
+        problems.append(Problem("of", f"{of!r} has several numbers a point; choose another result"))
     elif found.words(of):
         if level is not None:
             problems.append(Problem("level", f"{of} is one of several kinds; leave the level away"))
@@ -180,6 +182,8 @@ def _checked(found: MapResult, rounds: int, of: str, level: float | None) -> flo
         if of not in usual:
             problems.append(Problem("level", f"missing; give the value of {of} at the edge"))
         level = usual.get(of)
+    elif isinstance(level, bool) or not isinstance(level, (int, float)):
+        problems.append(Problem("level", f"got {level!r}; allowed: a number in {found.unit(of)}"))
     if problems:
         raise ParameterError(problems)
     if SAMPLE in found.dims:
@@ -205,9 +209,9 @@ class _Lattice:
     """Points between those of a grid: whole numbers, `size` of them from one grid point to the next."""
 
     def __init__(self, found: MapResult, rounds: int) -> None:
-        over = json.loads(str(found.dataset.attrs["definition"]))["over"]
+        over = found.store.definition["over"]
         self.names = found.dims
-        self.values = [np.asarray(found.dataset[name].values) for name in self.names]
+        self.values = [found.read(name) for name in self.names]
         self.logs = [over[name].get("spacing") == "log" for name in self.names]
         self.divides = [over[n].get("spacing", "list") != "list" and len(v) > 1 for n, v in zip(
             self.names, self.values, strict=True)]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from steadyslip.quantities import shown, shown_range
 from steadyslip.slider import Slider
 from steadyslip.sweep import export
 from steadyslip.sweep.store import Store
+
+BLOCK = 2**22  # points read at a time
 
 
 class MapResult:
@@ -28,6 +31,11 @@ class MapResult:
     @property
     def path(self) -> Path:
         return self._store.path
+
+    @property
+    def store(self) -> Store:
+        """How it lies on disk."""
+        return self._store
 
     @property
     def rig(self) -> Slider:
@@ -78,7 +86,10 @@ class MapResult:
         """An xarray.Dataset that reads from disk what is used of it; units are in the attributes."""
         import xarray as xr
 
-        return xr.open_zarr(self.path, chunks=None, consolidated=True, decode_times=False, mask_and_scale=False)
+        try:
+            return xr.open_zarr(self.path, chunks=None, consolidated=True, decode_times=False, mask_and_scale=False)
+        except (ValueError, RuntimeError, OSError) as error:  # coordinates are read at once
+            raise self._store.damage("coordinates", error) from error
 
     def words(self, name: str) -> tuple[str, ...]:
         """What the numbers 0, 1, ... of an array of kinds stand for; empty for other arrays."""
@@ -92,19 +103,20 @@ class MapResult:
 
     def unit(self, name: str) -> str:
         """SI unit of a result or parameter."""
+        if name not in (*self.results, *self.parameters):
+            raise ParameterError([Problem("name", unknown_name("array", name, (*self.results, *self.parameters)))])
         return str(self._store.array(name).attrs["units"])
 
     def statistics(self) -> dict[str, dict[str, float]]:
         """What the finished chunks hold: shares of kinds; of numbers the least, the greatest and how many exist."""
+        store = self._store
+        pending = store.pending()
+        total = self.size - sum(store.points(number) for number in pending)
         found: dict[str, dict[str, float]] = {}
-        pending = set(self._store.pending())
-        chunks = [number for number in range(self._store.count) if number not in pending]
-        total = sum(self._store.points(number) for number in chunks)
         for name in self.results if total else ():
             words = self.words(name)
             counts, low, high, exist = np.zeros(len(words) + 1), np.inf, -np.inf, 0
-            for number in chunks:
-                values = np.asarray(self._store.array(name)[self._store.region(number)])
+            for values in self._blocks(name):
                 if words:
                     counts += np.bincount(values.reshape(-1).astype(int) + 1, minlength=len(counts))
                     continue
@@ -117,6 +129,24 @@ class MapResult:
             else:
                 found[name] = {"share": exist / total} | ({"low": low, "high": high} if exist else {})
         return found
+
+    def _blocks(self, name: str) -> Iterator[np.ndarray]:
+        """A result in pieces of many chunks; what is not computed is fill value."""
+        first = self._store.chunks[0]
+        row = self.size // self.shape[0]
+        step = first * max(1, BLOCK // (first * row))
+        for start in range(0, self.shape[0], step):
+            yield self.read(name, slice(start, start + step))
+
+    def read(self, name: str, region: Any = ...) -> np.ndarray:
+        """Values of a result or parameter.
+
+        Raises
+        ------
+        NotAvailable
+            If a file is damaged.
+        """
+        return self._store.read(name, region)
 
     def __str__(self) -> str:
         done, count = self.finished
@@ -159,7 +189,7 @@ class MapResult:
         NotAvailable
             If the file cannot be written.
         """
-        self._readable(export.to_netcdf, path)
+        export.to_netcdf(self, path)
 
     def to_parquet(self, path: str | PathLike[str]) -> None:
         """Write one Parquet file with a row for each point.
@@ -169,17 +199,7 @@ class MapResult:
         NotAvailable
             If the file cannot be written, or pyarrow is missing.
         """
-        self._readable(export.to_parquet, path)
-
-    def _readable(self, write: Any, path: str | PathLike[str]) -> None:
-        try:
-            write(self._store, path)
-        except (ValueError, RuntimeError) as error:  # a damaged chunk, as Zarr says it
-            if isinstance(error, NotAvailable):
-                raise
-            damaged = self.damaged()
-            message = f"{str(self.path)!r} has damaged chunks ({damaged}); compute the map again to repair it"
-            raise NotAvailable(message if damaged else f"cannot write {str(path)!r}: {error}") from error
+        export.to_parquet(self, path)
 
     def plot(self, x: str | None = None, y: str | None = None, show: str | None = None, **options: Any) -> Any:
         """Draw it; see `steadyslip.figures.map_figure`."""

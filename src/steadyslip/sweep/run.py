@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from os import PathLike
 from pathlib import Path
+
+import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.motion.engine import available_cores
@@ -14,7 +17,7 @@ from steadyslip.sweep.cluster import run_cluster
 from steadyslip.sweep.local import run_here, run_local
 from steadyslip.sweep.plan import Map
 from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.store import Store, check_path, open_or_create
+from steadyslip.sweep.store import Store, check_path, open_or_create, versions
 from steadyslip.sweep.work import Done, job_of
 
 SHORT = 2.0  # seconds of work for which no processes are started
@@ -64,6 +67,8 @@ def run_map(
     check_path(target)
     store = open_or_create(target, plan)
     with store.held():
+        store.restore(plan)
+        _remark(store, plan)
         for number in store.damaged():
             store.forget(number)
         missing = store.pending()
@@ -81,10 +86,21 @@ def _check(plan: Map, workers: int | None, cluster: str | None) -> None:
         problems.append(Problem("plan", f"got {plan!r}; allowed: a Map, such as read_map gives"))
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         problems.append(Problem("workers", f"got {workers!r}; allowed: a whole number >= 1"))
-    if cluster is not None and not (cluster == "local" or "://" in str(cluster)):
+    if cluster is not None and not (cluster == "local" or re.fullmatch(r"\w+://[^\s:/]+.*", str(cluster))):
         problems.append(Problem("cluster", f"got {cluster!r}; allowed: 'local', or an address such as tcp://host:8786"))
     if problems:
         raise ParameterError(problems)
+
+
+def _remark(store: Store, plan: Map) -> None:
+    """Say what does not hinder, but should be known."""
+    then = store.versions
+    for name, now in versions().items():
+        if then.get(name) != now and store.marked() < store.count:
+            _note(f"{name} was {then.get(name)}, is {now}; last digits of new chunks may differ from those of old ones")
+    size = int(np.prod(store.chunks, dtype=int))
+    if plan.chunk is not None and plan.chunks != store.chunks:
+        _note(f"the map has chunks of {size} points already; they stay as they are")
 
 
 def _check_space(store: Store, missing: list[int]) -> None:
@@ -114,6 +130,7 @@ def _compute(
 
         try:
             if cluster is not None:
+                _note(f"computing on Dask, {cluster}")
                 run_cluster(job, store, missing, report, cluster, workers or available_cores(), _note)
             elif count == 1:
                 run_here(job, missing, report)

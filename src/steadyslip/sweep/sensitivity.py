@@ -16,7 +16,8 @@ from steadyslip.sweep.plan import Map, evaluate
 Array = np.ndarray
 POINTS = 4096
 RESAMPLES = 200
-LEAST = 64
+LEAST, MOST = 64, 2**20
+WIDE = 0.2  # width of an interval from which on an index says little
 LEVEL = 0.95
 
 
@@ -65,6 +66,9 @@ class Sensitivity:
                 one, all_ = self.first[result][i], self.total[result][i]
                 low, high = self.total_interval[result][:, i]
                 lines.append(f"  {name:<{width}}  {one:6.3f}  {all_:6.3f}  ({low:.3f} to {high:.3f})")
+            intervals = np.stack([self.first_interval[result], self.total_interval[result]])
+            if np.max(intervals[:, 1] - intervals[:, 0]) > WIDE:
+                lines.append(f"  not settled: some intervals are wider than {WIDE:g}; ask for more points")
             if self.missing[result]:
                 lines.append(
                     f"  does not exist at {100 * self.missing[result]:.3g} % of the points, which are left out"
@@ -138,8 +142,9 @@ def sensitivity(
     `scipy.stats.sobol_indices`. Where a result does not exist at one of the points of a set, the set is left out; the
     largest power of 2 of the remaining sets is used.
     """
-    if isinstance(points, bool) or not isinstance(points, int) or points < LEAST or points & (points - 1):
-        raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, at least {LEAST}")])
+    whole = isinstance(points, int) and not isinstance(points, bool)
+    if not (whole and LEAST <= points <= MOST and points & (points - 1) == 0):
+        raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, from {LEAST} to {MOST}")])
     plan = Map(rig, compute=of, samples=Samples(over, points, seed=seed), protocol=protocol)
     if len(plan.varied) < 2:
         raise ParameterError([Problem("over", "give at least two parameters; one alone has all the variance")])
@@ -157,7 +162,8 @@ def sensitivity(
         good = np.all(np.isfinite(column), axis=0)
         used = np.flatnonzero(good)[: 2 ** int(np.log2(max(good.sum(), 1)))]
         if len(used) < LEAST:
-            message = f"{output.name} exists at {good.sum()} of {points} sets of points only; choose other ranges"
+            count = f"{output.name} exists at {good.sum()} of {points} sets of points only"
+            message = f"{count}; ask for more points, or for other ranges"
             raise NotAvailable(message)
         column = column[:, used]
         if np.ptp(column) == 0:

@@ -165,8 +165,6 @@ class _MapReader:
         self.left_out = [name for name, axis in axes.items() if isinstance(axis, dict)]
         if "chunk" in table:
             self.arguments["chunk"] = table["chunk"]
-            if isinstance(table["chunk"], bool) or not isinstance(table["chunk"], int):
-                self._problem("map.chunk", f"got {table['chunk']!r}; allowed: a whole number of points")
         if "samples" in table:
             self.arguments["samples"] = self._samples(table["samples"])
 
@@ -188,6 +186,9 @@ class _MapReader:
     def _measure(self, reader: Reader, name: str, options: dict[str, Any] | None) -> Any:
         if options is None:
             return name
+        if "law" in options:
+            self._problem(f"map.{name}.law", "is not an option; the table is named after the result")
+            return None
         return reader.record(Measure, {"law": name, **options}, f"map.{name}.")
 
     def _flat(self, table: Any, name: str) -> dict[str, Any]:
@@ -211,6 +212,10 @@ class _MapReader:
                     found[full] = value
 
         walk("", table)
+        for name in [n for n in found if "." in n]:  # a change by full name of what the file calls by its last part
+            short = next((n for n in found if n != name and name.endswith(f".{n}")), None)
+            if short is not None and isinstance(found[name], dict) and isinstance(found[short], dict):
+                found[short] = found[short] | found.pop(name)
         self.written += found
         return found
 

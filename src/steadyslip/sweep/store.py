@@ -12,6 +12,7 @@ import errno
 import json
 import os
 import shutil
+import uuid
 import warnings
 import zlib
 from collections.abc import Iterator, Mapping
@@ -25,11 +26,10 @@ import numpy as np
 from steadyslip.config import rig_from_text, rig_to_text
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.slider import Slider
-from steadyslip.sweep.axes import SAMPLE, Generated
+from steadyslip.sweep.axes import COMPLETE, SAMPLE, Generated
 from steadyslip.sweep.plan import Map, differences, roles
 
 FORMAT = 1
-MARK = "complete"
 _WRITTEN = 1 << 32  # added to every checksum, so that none is the zero of a chunk not done
 _VERSIONS = ("numpy", "scipy", "numba", "zarr")
 
@@ -53,13 +53,15 @@ class Store:
                 raise KeyError("steadyslip_map")
             self.definition: dict[str, Any] = json.loads(str(attributes["definition"]))
             self.version = str(attributes["steadyslip"])
+            self.versions: dict[str, str] = json.loads(str(attributes["versions"]))
             self.rig_text = str(attributes["rig"])
             self.dims: tuple[str, ...] = tuple(json.loads(str(attributes["dims"])))
             self.results: tuple[str, ...] = tuple(json.loads(str(attributes["results"])))
-            self.marks: Any = self.group[MARK]
+            self.marks: Any = self.group[COMPLETE]
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise NotAvailable(
-                f"{str(path)!r} exists and is not a map of this program; give another name, or move it away"
+                f"{str(path)!r} exists and is not a map of this program, or its zarr.json is damaged; give another "
+                "name, or move it away"
             ) from error
         self.grid: tuple[int, ...] = tuple(int(n) for n in self.marks.shape)
         self._arrays: dict[str, Any] = {}
@@ -94,6 +96,23 @@ class Store:
     def generated(self) -> tuple[str, ...]:
         """Those of them whose values are written chunk by chunk."""
         return self.sampled if "method" in self.definition["samples"] else ()
+
+    def read(self, name: str, region: Any = ...) -> np.ndarray:
+        """Values of one of its arrays.
+
+        Raises
+        ------
+        NotAvailable
+            If a file is damaged.
+        """
+        try:
+            return np.asarray(self.array(name)[region])
+        except (ValueError, RuntimeError, OSError) as error:  # as Zarr says it
+            raise self.damage(name, error) from error
+
+    def damage(self, what: str, error: Exception) -> NotAvailable:
+        """What to say of files that cannot be read."""
+        return NotAvailable(f"{str(self.path)!r} is damaged ({what}: {error}); compute the map again to repair it")
 
     def rig(self) -> Slider:
         """The base rig.
@@ -134,7 +153,7 @@ class Store:
             shape[i] = -1
             stored = [n for n in self.sampled if generated or n not in self.generated] if dim == SAMPLE else [dim]
             for name in stored:
-                found[name] = np.asarray(self.array(name)[region[i]]).reshape(shape)
+                found[name] = self.read(name, region[i]).reshape(shape)
         return found
 
     # -- chunks ------------------------------------------------------------------------------------------
@@ -214,10 +233,22 @@ class Store:
         return total | _WRITTEN
 
     def tidy(self) -> None:
-        """Remove files that a process which was killed left half written."""
+        """Remove what processes that were killed left half written."""
         for file in self.path.rglob("*.partial"):
             with suppress(OSError):
                 file.unlink()
+        for folder in self.path.parent.glob(f".{self.path.name}.*.new"):
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def restore(self, plan: Map) -> None:
+        """Write coordinates again that are not those of the map, which no mark covers."""
+        for name, values in _coordinates(plan).items():
+            try:
+                intact = np.array_equal(np.asarray(self.array(name)[:]), values)
+            except Exception:  # damaged, whatever zarr says of it
+                intact = False
+            if not intact:
+                self.array(name)[:] = values
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -279,17 +310,32 @@ def open_or_create(path: Path, plan: Map) -> Store:
     return store
 
 
+def _coordinates(plan: Map) -> dict[str, np.ndarray]:
+    """Parameters whose values are written when the store is made."""
+    found = {axis.name: axis.values for axis in plan.axes}
+    if plan.sampling and not isinstance(plan.sampling, Generated):
+        found |= plan.sampling.part(0, plan.sampling.points)
+    return found
+
+
 def _create(path: Path, plan: Map) -> None:
     """Lay out a store under a temporary name and move it into place, so that there is never half a store."""
-    new = path.with_name(f".{path.name}.new")
+    new = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.new")
     try:
-        shutil.rmtree(new, ignore_errors=True)  # left by a run that was killed
         new.mkdir()
         _lay_out(new, plan)
+        for file in new.rglob("*"):
+            if file.is_file():  # nothing recalculates these
+                with open(file, "rb") as written:
+                    os.fsync(written.fileno())
         os.rename(new, path)
-    except OSError as error:
+    except Exception as error:
         shutil.rmtree(new, ignore_errors=True)
-        raise cannot_write(path, error) from error
+        if path.exists():  # somebody else has made it meanwhile, and tidied up
+            return
+        if isinstance(error, OSError):
+            raise cannot_write(path, error) from error
+        raise
 
 
 def cannot_write(path: Path, error: OSError) -> NotAvailable:
@@ -318,7 +364,7 @@ def _lay_out(path: Path, plan: Map) -> None:
             "dims": json.dumps(plan.dims),
             "results": json.dumps([output.name for output in outputs]),
             "steadyslip": __version__,
-            "versions": json.dumps(_versions()),
+            "versions": json.dumps(versions()),
             "coordinates": " ".join(plan.sampling.names) if plan.sampling else "",
         }
     )
@@ -332,20 +378,14 @@ def _lay_out(path: Path, plan: Map) -> None:
         )  # fmt: skip
 
     known = roles(plan)
-    for axis in plan.axes:
-        role = known[axis.name]
-        n = len(axis.values)
-        array(axis.name, [axis.name], [n], [n], "float64", np.nan, units=role.unit, long_name=role.doc)[:] = axis.values
-    if plan.sampling:
-        stored = not isinstance(plan.sampling, Generated)
-        n, part = plan.sampling.points, plan.chunks[-1]
-        for name in plan.sampling.names:
-            made = array(
-                name, [SAMPLE], [n], [n if stored else part], "float64", np.nan,
-                units=known[name].unit, long_name=known[name].doc,
-            )  # fmt: skip
-            if stored:
-                made[:] = plan.sampling.part(0, n)[name]
+    given = _coordinates(plan)
+    for name in plan.varied:
+        n = len(given[name]) if name in given else plan.shape[-1]
+        part = n if name in given else plan.chunks[-1]
+        dim = name if name in plan.dims else SAMPLE
+        made = array(name, [dim], [n], [part], "float64", np.nan, units=known[name].unit, long_name=known[name].doc)
+        if name in given:
+            made[:] = given[name]
     for output in outputs:
         sizes = [size for _, size in output.extra]
         attributes: dict[str, Any] = {"units": output.unit, "long_name": output.meaning}
@@ -358,7 +398,7 @@ def _lay_out(path: Path, plan: Map) -> None:
         )  # fmt: skip
     grid = [-(-n // c) for n, c in zip(plan.shape, plan.chunks, strict=True)]
     group.create_array(
-        MARK, shape=tuple(grid), chunks=(1,) * len(grid), dtype="uint64", fill_value=0, compressors=None,
+        COMPLETE, shape=tuple(grid), chunks=(1,) * len(grid), dtype="uint64", fill_value=0, compressors=None,
         dimension_names=[f"{dim}_chunk" for dim in plan.dims],
         attributes={"units": "1", "long_name": "checksum of each finished chunk, 0 until then"},
     )  # fmt: skip
@@ -367,7 +407,8 @@ def _lay_out(path: Path, plan: Map) -> None:
         zarr.consolidate_metadata(str(path))
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of the packages that numbers depend on."""
     from importlib.metadata import version
 
     return {name: version(name) for name in _VERSIONS}

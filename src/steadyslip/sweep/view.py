@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.errors import NotAvailable, ParameterError, Problem, SteadyslipError, UnknownNameError, unknown_name
 from steadyslip.quantities import parse
 from steadyslip.records import resolve
 from steadyslip.sweep.axes import SAMPLE
@@ -52,15 +53,15 @@ class View:
     scattered: bool
 
 
-def axes_of(found: MapResult, x: str | None, y: str | None) -> tuple[str, ...]:
-    """Full names of the parameters on the axes; the first ones of the map unless given.
+def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = None) -> tuple[str, ...]:
+    """Full names of the parameters on the axes; the first ones of the map unless given, and not that of the facets.
 
     Raises
     ------
     ParameterError
         If a name is not one of those that vary.
     """
-    own = [dim for dim in found.dims if dim != SAMPLE and found.shape[found.dims.index(dim)] > 1]
+    own = [dim for dim in found.dims if dim not in (SAMPLE, facet) and found.shape[found.dims.index(dim)] > 1]
     problems, given = [], []
     for place, name in (("x", x), ("y", y)):
         if name is None:
@@ -101,8 +102,22 @@ def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Map
     ParameterError
         If a name or value is wrong.
     """
-    data = found.dataset
-    held, place = _held(found, data, names, at or {})
+    with _damage_told(found):
+        return _taken(found, found.dataset, names, results, at or {})
+
+
+@contextmanager
+def _damage_told(found: MapResult) -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, RuntimeError) as error:
+        if isinstance(error, SteadyslipError):
+            raise
+        raise found.store.damage("results", error) from error
+
+
+def _taken(found: MapResult, data: Any, names: Sequence[str], results: Sequence[str], at: Mapping[str, Any]) -> View:
+    held, place = _held(found, data, names, at)
     scattered = names[0] not in found.dims
     steps: dict[str, slice] = {}
     free = [n for n in names if n in found.dims]
@@ -116,20 +131,19 @@ def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Map
     places = tuple(np.asarray(part[name].values) for name in names)
     values, bands, shares = {}, {}, {}
     for result in results:
-        array = part[result]
         order = [*(names[::-1] if not scattered else ()), *((SAMPLE,) if SAMPLE in found.dims else ())]
-        try:
-            numbers = np.asarray(array.transpose(*order, ...).values)
-        except (ValueError, RuntimeError) as error:
-            raise NotAvailable(f"cannot read {result} of {str(found.path)!r}: {error}; compute it again") from error
+        numbers = np.asarray(part[result].transpose(*order, ...).values)
         if SAMPLE not in found.dims or scattered:
             values[result] = numbers
             continue
         axis = len(order) - 1
         words = found.words(result)
         if words:
-            shares[result] = np.stack([np.mean(numbers == code, axis=axis) for code in range(len(words))])
-            values[result] = np.argmax(shares[result], axis=0)
+            known = np.sum(numbers >= 0, axis=axis)
+            counts = np.stack([np.sum(numbers == code, axis=axis) for code in range(len(words))])
+            with np.errstate(invalid="ignore"):  # NaN where nothing is computed yet
+                shares[result] = counts / known
+            values[result] = np.where(known > 0, np.argmax(counts, axis=0), -1)
         else:
             bands[result] = _quantiles(numbers, axis)
             values[result] = bands[result][1]
@@ -151,6 +165,8 @@ def _held(
     """Values and positions along the dimensions that are not shown."""
     others = [dim for dim in found.dims if dim not in (*names, SAMPLE)]
     known, problems, wanted = dict.fromkeys(others), [], {}
+    if not isinstance(at, Mapping):
+        raise ParameterError([Problem("at", f"got {at!r}; allowed: names of parameters and values")])
     for name, value in at.items():
         try:
             full = resolve(name, known)

@@ -84,7 +84,7 @@ def do_chunk(job: Job, number: int) -> Done:
         if not Path(job.path).exists():
             message = f"a worker does not see {job.path!r}; give a folder that all machines share"
             return Done(number, 0, 0.0, message)
-        store = _opened(job.path)
+        store = _opened(job.path, _stamp(job.path))
         points = store.points(number)
         if store.is_done(number):  # by a worker that was thought lost
             return Done(number, points, 0.0)
@@ -127,5 +127,11 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of malloc.h
 
 
 @lru_cache(maxsize=4)
-def _opened(path: str) -> Store:
+def _opened(path: str, stamp: tuple[int, int]) -> Store:
+    """A store that stays open from chunk to chunk, until another one takes its place."""
     return Store(Path(path))
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    found = (Path(path) / "zarr.json").stat()
+    return found.st_ino, found.st_mtime_ns

@@ -19,6 +19,7 @@ from steadyslip.sweep.work import Done, Job, do_chunk, keep_memory
 LOCAL = "local"
 PATIENCE = 3  # times that a chunk's worker may die
 WAIT = 600.0  # seconds to wait for a scheduler that is lost
+COUNT = 5.0  # seconds between looks at how many workers there are
 RETRY = 2.0  # seconds between attempts
 CONNECT = 30.0  # seconds to wait for an answer
 
@@ -81,7 +82,7 @@ def _flow(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
     waiting = iter(list(chunks))
     deaths: dict[int, int] = {}
     under_way = as_completed(loop=client.loop)
-    count = 0
+    count, wanted, counted = 0, 2, -COUNT
     numbers: dict[str, int] = {}
 
     def hand_out(number: int) -> None:
@@ -92,7 +93,9 @@ def _flow(client: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
         count += 1
 
     def fill() -> None:
-        wanted = 2 * max(1, sum(client.nthreads().values()))
+        nonlocal wanted, counted
+        if time.monotonic() - counted > COUNT:  # clusters grow and shrink
+            wanted, counted = 2 * max(1, sum(client.nthreads().values())), time.monotonic()
         while count < wanted and (number := next(waiting, None)) is not None:
             hand_out(number)
 

@@ -6,6 +6,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+MOST_SHOWN = 120
+
+
+def came(value: object) -> str:
+    """What came, for a message: its repr, cut where it is long, and never a fault of its own.
+
+    >>> came("5 MPa"), came("a" * 1000)[-32:]
+    ("'5 MPa'", 'aaa... (1002 characters in all)')
+    """
+    try:
+        text = repr(value)
+    except Exception:  # integers of more than 4300 digits, and whatever a foreign object does
+        text = f"a value of type {type(value).__name__} that cannot be shown"
+    if len(text) > MOST_SHOWN:
+        text = f"{text[:MOST_SHOWN]}... ({len(text)} characters in all)"
+    return text
+
 
 class SteadyslipError(Exception):
     """Base of every exception that this package raises on purpose."""
@@ -108,4 +125,4 @@ def unknown_name(what: str, name: object, allowed: Iterable[str]) -> str:
         last = {full.rpartition(".")[2]: full for full in allowed}
         close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown {what} {name!r}; {hint}allowed: {', '.join(allowed) or 'none'}"
+    return f"unknown {what} {came(name)}; {hint}allowed: {', '.join(allowed) or 'none'}"

@@ -1,14 +1,14 @@
 """Text such as ``"9 GPa/m"`` to SI numbers and back; the table of units.
 
 Numbers inside the package are plain SI floats. Text is read only at the edges (files, command line,
-constructors). Everyday units are read from the table below; any other goes to pint.
+constructors), and nothing in it is evaluated. Everyday units stand in the table below; other words go to pint.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from steadyslip import units
-from steadyslip.errors import QuantityError
+from steadyslip.errors import QuantityError, came
 
 
 class Dimension(NamedTuple):
@@ -32,7 +32,7 @@ class Dimension(NamedTuple):
 
 
 _PREFIX = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
-_MICRO = str.maketrans({"µ": "u", "μ": "u", "·": " ", "×": " ", "²": "^2", "³": "^3", "−": "-"})
+_MICRO = str.maketrans({"µ": "u", "μ": "u", "·": " ", "×": " ", "−": "-"})
 _PREFIXED = {
     "Pa": Dimension(1, -1, -2),
     "N": Dimension(1, 1, -2),
@@ -64,61 +64,93 @@ for _base, _dimension in _PREFIXED.items():
     for _letter, _factor in _PREFIX.items():
         _TABLE.setdefault(_letter + _base, (_factor, _dimension))
 
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I)
-_FACTOR = re.compile(r"\s*(/|\*(?!\*))?\s*([A-Za-z%°1]+)\s*(?:(?:\^|\*\*)\s*(-?\d+)|(\d+))?")
-
-
-class _NotInTable(Exception):
-    """The unit has to be looked up elsewhere."""
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
+_TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
+_NONZERO = re.compile(r"[^eE]*[1-9]")
+_ONE = re.compile(r"1\s*(?=/|$)")
+_SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
+_PLAIN = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
+_AREA = Dimension(length=2)
+MOST_TEXT = 200
+"""Characters of a quantity: longer texts are refused unread."""
+MOST_POWER = 9
+"""Largest power of a word in a unit."""
 
 
 @lru_cache(maxsize=256)
 def unit(text: str) -> tuple[float, Dimension]:
     """SI factor and dimension of a unit such as ``"Pa s/m"``.
 
+    A unit is words with small whole powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
+    arithmetic, a stroke divides by the one factor behind it. Words that the table does not have go to pint.
+
     Raises
     ------
     QuantityError
-        If neither the table nor pint knows the unit.
+        If the text is none, or a word is not that of a unit.
     """
-    try:
-        return _unit_from_table(text)
-    except _NotInTable:
-        return _unit_from_pint(text)
-
-
-def _unit_from_table(text: str) -> tuple[float, Dimension]:
-    factor, dimension, position = 1.0, Dimension(), 0
-    text = text.translate(_MICRO).strip()
-    while position < len(text):
-        match = _FACTOR.match(text, position)
-        if match is None or match[2] not in _TABLE:
-            raise _NotInTable
-        power = int(match[3] or match[4] or 1) * (-1 if match[1] == "/" else 1)
-        value, base = _TABLE[match[2]]
-        factor *= value**power
+    if len(text) > MOST_TEXT:
+        raise QuantityError(f"{came(text)} is not a unit: too long")
+    factor, dimension = 1.0, Dimension()
+    for word, power in _factors(text):
+        value, base = _TABLE.get(word) or _from_pint(word)
+        factor *= float(np.float64(value) ** power)  # inf where a float would raise
         dimension = dimension.times(base, power)
-        position = match.end()
+    if not 0 < factor < math.inf:
+        raise QuantityError(f"{text!r} leaves the range of floating point")
     return factor, dimension
 
 
-def _unit_from_pint(text: str) -> tuple[float, Dimension]:
-    import pint
+def _factors(text: str) -> Iterator[tuple[str, int]]:
+    """The words of a unit with their powers, negative where divided by."""
+    fault = QuantityError(f"{text!r} is not a unit")
+    plain = _SUPERSCRIPT.sub(lambda run: "^" + run[0].translate(_PLAIN), text.translate(_MICRO)).strip()
+    start = _ONE.match(plain)
+    position = start.end() if start else 0
+    wanted, sign, group = start is None, 1, 1
+    outer: list[int] = []  # signs in front of open brackets
+    while position < len(plain):
+        match = _TOKEN.match(plain, position)
+        if match is None:
+            raise fault
+        position = match.end()
+        mark, word, power = match[1], match[2], match[3] or match[4] or "1"
+        if word:
+            if len(power) > 3 or abs(int(power)) > MOST_POWER:
+                raise QuantityError(f"{text!r} is not a unit: powers are whole numbers up to {MOST_POWER}")
+            yield word, int(power) * sign * group
+        elif mark == ")":
+            if wanted or not outer:
+                raise fault
+            group = outer.pop()
+        elif mark == "(":
+            outer.append(group)
+            group *= sign
+        elif wanted:
+            raise fault
+        wanted = mark in ("(", "/", "*")
+        sign = -1 if mark == "/" else 1
+    if wanted or outer:
+        raise fault
 
+
+@lru_cache(maxsize=256)
+def _from_pint(word: str) -> tuple[float, Dimension]:
+    """SI factor and dimension of one word that the table does not have."""
     registry = _pint_registry()
+    fault = QuantityError(f"{word!r} is not a unit")
     try:
-        quantity = registry.Quantity(1.0, text)
-        exponents = dict(quantity.dimensionality)
-        base = quantity.to_base_units()
-    except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
-        raise QuantityError(f"{text!r} is not a unit") from error
-    except Exception as error:  # pint's tokenizer raises its own kinds for broken text
-        raise QuantityError(f"{text!r} is not a unit") from error
+        bases = [registry.Quantity(size, word).to_base_units() for size in (1.0, 2.0)]
+        exponents = dict(bases[0].dimensionality)
+        one, two = (float(base.magnitude) for base in bases)
+    except Exception as error:  # pint raises its own kinds, and others, for words that are none
+        raise fault from error
+    if not (math.isfinite(one) and one > 0 and math.isclose(two, 2 * one)):  # decibels, degrees Celsius
+        raise fault
     known = {"[mass]": "mass", "[length]": "length", "[time]": "time"}
     if not set(exponents) <= set(known):
-        raise QuantityError(f"{text!r} has a dimension that no parameter has")
-    dimension = Dimension(**{known[key]: float(power) for key, power in exponents.items()})
-    return float(base.magnitude), dimension
+        raise QuantityError(f"{word!r} has a dimension that no parameter has")
+    return one, Dimension(**{known[key]: float(power) for key, power in exponents.items()})
 
 
 @lru_cache(maxsize=1)
@@ -149,29 +181,37 @@ def parse(text: str, expected: str) -> float:
         If the text is not a quantity, has no unit where one is needed, or another dimension.
     """
     cleaned = text.translate(_MICRO).strip()
-    match = _NUMBER.match(cleaned)
+    match = _NUMBER.match(cleaned) if len(text) <= MOST_TEXT else None
     if match is None:
-        raise QuantityError(f"{text!r} is not a number with a unit; write for example {example(expected)}")
+        raise QuantityError(f"{came(text)} is not a number with a unit; write for example {example(expected)}")
     digits, name = match.group(), cleaned[match.end() :].strip()
     _, wanted = unit(expected)
     if not name:
         if wanted != Dimension():
             raise QuantityError(f"{text!r} has no unit; write for example {example(expected)}")
-        return float(digits)
+        return _scaled(digits, 1.0)
     try:
+        if name == "1":
+            raise QuantityError("it holds two numbers")
         factor, found = unit(name)
     except QuantityError as error:
-        raise QuantityError(f"{error}; write for example {example(expected)}") from error
+        raise QuantityError(f"{text!r} is not a quantity: {error}; write for example {example(expected)}") from error
     if found != wanted:
-        raise QuantityError(
-            f"{text!r} has the wrong dimension; expected {described(expected)}, for example {example(expected)}"
-        )
+        message = f"{text!r} has the wrong dimension; expected {described(expected)}, for example {example(expected)}"
+        if wanted.mass == 1 and found == wanted.times(_AREA):
+            message += (
+                "; it is the total of a contact, and this is per unit area: add the contact's area to the rig file, "
+                "[slider] area = '0.01 m^2', or divide by it"
+            )
+        raise QuantityError(message)
     return _scaled(digits, factor)
 
 
 def _scaled(digits: str, factor: float) -> float:
     """Number times factor, rounded once: ``10 um`` is 1e-05, not the next float below."""
     plain = float(digits)
+    if plain == 0 and _NONZERO.match(digits):
+        raise QuantityError(f"{digits!r} is too small for floating point")
     if not math.isfinite(plain) or abs(plain) < 1e-290:
         return plain * factor
     try:
@@ -205,7 +245,7 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
     if isinstance(values, np.ndarray) and values.ndim == 1:
         values = values.tolist()
     if not isinstance(values, (list, tuple)):
-        raise QuantityError(f"got {values!r}; allowed: a list of numbers in {expected}, or of texts with units")
+        raise QuantityError(f"got {came(values)}; allowed: a list of numbers in {expected}, or of texts with units")
     found = []
     for place, value in enumerate(values, start=1):
         try:
@@ -213,7 +253,7 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
         except QuantityError as error:
             raise QuantityError(f"value {place}: {error}") from error
         if not math.isfinite(number):
-            raise QuantityError(f"value {place}: got {value!r}; allowed: a finite number")
+            raise QuantityError(f"value {place}: got {came(value)}; allowed: a finite number")
         found.append(number)
     return tuple(found)
 
@@ -223,11 +263,11 @@ def _plain(value: Any) -> float:
     if type(value) is float:  # long columns are of these
         return value
     if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__") or np.ndim(value) != 0:
-        raise QuantityError(f"got {value!r}; allowed: a finite number or text with a unit")
+        raise QuantityError(f"got {came(value)}; allowed: a finite number or text with a unit")
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise QuantityError(f"got {value!r}; allowed: a finite number or text with a unit") from error
+        raise QuantityError(f"got {came(value)}; allowed: a finite number or text with a unit") from error
 
 
 _EXAMPLES = {

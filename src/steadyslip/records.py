@@ -18,7 +18,7 @@ from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem, QuantityError, UnknownNameError, unknown_name
+from steadyslip.errors import ParameterError, Problem, QuantityError, UnknownNameError, came, unknown_name
 from steadyslip.quantities import example, numbers, parse
 
 
@@ -234,7 +234,7 @@ def checked(item: Field[Any], value: Any) -> Any:
     if isinstance(role, Option):
         if not any(value == c and isinstance(value, bool) == isinstance(c, bool) for c in role.choices):
             if role.choices == (False, True):
-                raise _fault(f"got {value!r}; allowed: true or false")
+                raise _fault(f"got {came(value)}; allowed: true or false")
             raise _fault(unknown_name("choice", value, [str(c) for c in role.choices]))
         return value
     if isinstance(role, Samples):
@@ -244,7 +244,7 @@ def checked(item: Field[Any], value: Any) -> Any:
             raise _fault(str(error)) from error
     if role.many:
         if not isinstance(value, (list, tuple)):
-            raise _fault(f"got {value!r}; allowed: a list of {role.family.__name__}")
+            raise _fault(f"got {came(value)}; allowed: a list of {role.family.__name__}")
         return tuple(_checked_part(role, v, f"{i}") for i, v in enumerate(value, start=1))
     return _checked_part(role, value, "")
 
@@ -252,7 +252,7 @@ def checked(item: Field[Any], value: Any) -> Any:
 def _checked_part(role: Part, value: Any, index: str) -> Record:
     if isinstance(value, role.family):
         return value
-    message = f"got {value!r}; allowed: a {role.family.__name__}"
+    message = f"got {came(value)}; allowed: a {role.family.__name__}"
     known = ", ".join(f"{law.__name__}" for law in role.family.registry.values())
     raise ParameterError([Problem(index, message + (f" ({known})" if known else ""))])
 
@@ -265,16 +265,16 @@ def checked_number(role: Parameter, value: Any) -> float:
         except QuantityError as error:
             raise _fault(str(error)) from error
     elif isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise _fault(f"got {value!r}; allowed: {allowed(role)}")
+        raise _fault(f"got {came(value)}; allowed: {allowed(role)}")
     elif np.ndim(value) != 0:
         raise _fault("got an array; a rig holds single values, pass arrays by dotted name instead")
     else:
         try:
             number = float(value)
         except (TypeError, ValueError, OverflowError) as error:
-            raise _fault(f"got {value!r}; allowed: {allowed(role)}") from error
+            raise _fault(f"got {came(value)}; allowed: {allowed(role)}") from error
     if not role.domain.contains(number):
-        raise _fault(f"got {value!r}; allowed: {allowed(role)}")
+        raise _fault(f"got {came(value)}; allowed: {allowed(role)}")
     return number
 
 

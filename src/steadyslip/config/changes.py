@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import Any
 
 from steadyslip.config.layout import PROTOCOL, has_choice, own_fields, sections, selector
-from steadyslip.errors import Problem, UnknownNameError
+from steadyslip.config.toml import NotToml, Table, tables_of
+from steadyslip.errors import ParameterError, Problem, UnknownNameError, came
 from steadyslip.records import Part, Record, resolve
 from steadyslip.slider import Slider
-
-Table = dict[str, Any]
 
 
 def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
     """Write ``name=value`` into the tables, and forget on which line that value stood; returns the problems."""
     name, equals, raw = (part.strip() for part in text.partition("="))
     if not equals or not name or not raw:
-        return [Problem(text, "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
+        return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = _full_name(name, tables)
     *path, last = full.split(".")
     table: Any = tables
@@ -32,18 +30,30 @@ def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
     if isinstance(table, list):
         message = "cannot be set: name one value of one member, such as friction.states.1.b"
         return [*problems, Problem(name, message)]
-    table[last] = value_of(raw)
+    try:
+        table[last] = value_of(raw, name)
+    except ParameterError as error:
+        return [*problems, *error.problems]
     for key in [key for key in lines if key == full]:  # the fault is no longer on that line
         del lines[key]
     return problems
 
 
-def value_of(raw: str) -> Any:
-    """A value written without the quotes that TOML wants around text."""
+def value_of(raw: str, name: str) -> Any:
+    """A value of `name` written without the quotes that TOML wants around text.
+
+    Raises
+    ------
+    ParameterError
+        If more than one value is written.
+    """
     try:
-        return tomllib.loads(f"value = {raw}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+        tables = tables_of(f"value = {raw}")
+    except NotToml:
         return raw
+    if len(tables) > 1:
+        raise ParameterError([Problem(name, f"got {came(raw)}; allowed: one value; repeat the option for others")])
+    return tables["value"]
 
 
 def _full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:

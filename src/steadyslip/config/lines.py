@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 
-_TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
 
 
@@ -14,9 +13,9 @@ def key_lines(text: str) -> dict[str, int]:
     counts: dict[str, int] = {}
     prefix = ""
     for number, line in enumerate(text.splitlines(), start=1):
-        if table := _TABLE.match(line):
-            prefix = _plain(table[2])
-            if table[1] == "[[":
+        if header := _header(line):
+            prefix, listed = header
+            if listed:
                 counts[prefix] = counts.get(prefix, 0) + 1
                 lines.setdefault(prefix, number)
                 prefix = f"{prefix}.{counts[prefix]}"
@@ -34,6 +33,18 @@ def line_of(name: str, lines: dict[str, int]) -> int | None:
             return lines[name]
         name = name.rpartition(".")[0]
     return None
+
+
+def _header(line: str) -> tuple[str, bool] | None:
+    """The dotted name of a table's heading, and whether it begins a member of a list; None for other lines."""
+    text = line.strip()
+    listed = text.startswith("[[")
+    opened, closed = ("[[", "]]") if listed else ("[", "]")
+    name, end, rest = text.removeprefix(opened).partition(closed)
+    rest = rest.lstrip()
+    if not text.startswith("[") or not end or not name.strip() or (rest and not rest.startswith("#")):
+        return None
+    return _plain(name), listed
 
 
 def _plain(dotted: str) -> str:

@@ -6,9 +6,10 @@ import shlex
 from collections.abc import Iterable
 from os import PathLike
 
-from steadyslip.config.changes import Table, value_of
+from steadyslip.config.changes import value_of
 from steadyslip.config.layout import selector
 from steadyslip.config.read import Reader, read_text, text_of
+from steadyslip.config.toml import Table
 from steadyslip.errors import ParameterError, Problem
 from steadyslip.protocol import Piece, Protocol
 
@@ -76,7 +77,7 @@ def piece_from_text(text: str, area: float | None = None) -> Piece:
         elif name in table:
             reader.problem(name, "is given twice")
         else:
-            table[name] = value_of(raw)
+            table[name] = value_of(raw, name)
     piece = reader.record(Piece, table, "")
     if reader.problems:
         raise ParameterError(reader.problems, title=repr(text))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from steadyslip.config.changes import Table, apply
+from steadyslip.config.changes import apply
 from steadyslip.config.layout import (
     MAP,
     PROTOCOL,
@@ -24,7 +23,8 @@ from steadyslip.config.layout import (
     total_unit,
 )
 from steadyslip.config.lines import key_lines, line_of
-from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, unknown_name
+from steadyslip.config.toml import NotToml, Table, tables_of
+from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, came, unknown_name
 from steadyslip.protocol import Protocol
 from steadyslip.quantities import numbers, parse
 from steadyslip.records import (
@@ -104,8 +104,8 @@ def read_text(
 def parsed(text: str, source: str, changes: Iterable[str]) -> tuple[Table, dict[str, int], list[Problem]]:
     """The tables of a text with changes made, the lines of their keys, and what is wrong with the changes."""
     try:
-        tables = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        tables = tables_of(text)
+    except NotToml as error:
         raise _failed(source, f"is not TOML: {error}") from error
     lines, problems = key_lines(text), []
     for change in [changes] if isinstance(changes, str) else changes:
@@ -170,7 +170,7 @@ class Reader:
         table = self.tables.get(name, {})
         if isinstance(table, dict):
             return table
-        self.problem(name, f"got {table!r}; allowed: a table [{name}]")
+        self.problem(name, f"got {came(table)}; allowed: a table [{name}]")
         return {}
 
     def _read_area(self, own: Table) -> None:
@@ -277,14 +277,14 @@ class Reader:
     def _part(self, role: Part, raw: Any, name: str) -> Any:
         if role.many:
             if not isinstance(raw, list) or not all(isinstance(member, dict) for member in raw):
-                self.problem(name, f"got {raw!r}; allowed: a list of tables, [[{name}]]")
+                self.problem(name, f"got {came(raw)}; allowed: a list of tables, [[{name}]]")
                 return None
             members = [self.record(role.family, member, f"{name}.{i}.") for i, member in enumerate(raw, start=1)]
             return None if None in members else tuple(members)
         table = {"law": raw} if isinstance(raw, str) else raw
         if not isinstance(table, Mapping):
             self.problem(
-                name, f"got {raw!r}; allowed: a table [{name}] with law = one of {', '.join(role.family.registry)}"
+                name, f"got {came(raw)}; allowed: a table [{name}] with law = one of {', '.join(role.family.registry)}"
             )
             return None
         return self.record(role.family, dict(table), f"{name}.")

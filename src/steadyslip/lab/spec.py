@@ -212,7 +212,7 @@ def _sorted_changes(changes: Iterable[str]) -> tuple[list[tuple[str, str, Any]],
         name, equals, raw = (part.strip() for part in change.partition("="))
         target, _, key = name.partition(".")
         if target in ("record", "fit") and equals and key:
-            own.append((target, key, value_of(raw)))
+            own.append((target, key, value_of(raw, name)))
         else:
             others.append(change)
     return own, others

@@ -1,0 +1,55 @@
+"""TOML text to tables, within bounds: what would keep the reader busy for ever, or overflow later, is refused."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+Table = dict[str, Any]
+MOST_PARTS = 32
+"""Parts of a dotted key: the time that tomllib takes grows with their cube."""
+MOST_INTEGER = 2**63
+"""TOML's integers have 64 bits."""
+
+_PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+_LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
+
+_TOO_LARGE = "it has an integer that does not fit into 64 bits; write such a number with a decimal point or exponent"
+
+
+class NotToml(ValueError):
+    """A text is not TOML, or not within bounds; says why."""
+
+
+def tables_of(text: str) -> Table:
+    """The tables of a text.
+
+    Raises
+    ------
+    NotToml
+        If it is not TOML, has keys of too many parts or integers of more than 64 bits.
+    """
+    if long := _LONG_KEY.search(text):
+        raise NotToml(f"a key has more than {MOST_PARTS} parts: {long[0][:40]}...")
+    try:
+        tables = tomllib.loads(text)
+    except RecursionError:
+        raise NotToml("lists or tables lie too deep in each other") from None
+    except ValueError as error:  # integers of thousands of digits are not even a TOMLDecodeError
+        raise NotToml(str(error) if isinstance(error, tomllib.TOMLDecodeError) else _TOO_LARGE) from error
+    _check(tables)
+    return tables
+
+
+def _check(tables: Any) -> None:
+    """Refuse integers beyond 64 bits; without recursion, for depth is the file's choice."""
+    left = [tables]
+    while left:
+        value = left.pop()
+        if isinstance(value, dict):
+            left += value.values()
+        elif isinstance(value, list):
+            left += value
+        elif isinstance(value, int) and not -MOST_INTEGER <= value < MOST_INTEGER:
+            raise NotToml(_TOO_LARGE)

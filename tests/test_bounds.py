@@ -1,0 +1,203 @@
+"""Nothing that a person can type or hand over keeps the program busy for ever, is half read, or ends in a traceback."""
+
+import math
+import time
+
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from steadyslip import Slider
+from steadyslip.config import rig_from_text
+from steadyslip.config.lines import key_lines
+from steadyslip.config.toml import MOST_PARTS, NotToml, tables_of
+from steadyslip.errors import ParameterError, QuantityError, SteadyslipError
+from steadyslip.quantities import parse, unit
+
+RIG = """
+[friction]
+law = "rate-state"
+a = 0.0145
+b = 0.0160
+d_c = "1 um"
+mu_ref = 0.7
+v_ref = "1 um/s"
+[contact]
+law = "constant"
+preload = "5 MPa"
+[slider]
+stiffness = "9 GPa/m"
+[drive]
+velocity = "1 um/s"
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1 m**9**9**9",
+        "1 m^9^9^9",
+        "1 Pa*2**99999999999",
+        "1 GPa^99",
+        "1 m**999999999999",
+        "1 (((((((m",
+        "1 m" + "*m" * 500,
+        "9±1 GPa/m",
+        "9 +- 1 GPa/m",
+        "9(1) GPa/m",
+        "9 1 GPa/m",
+        "9,1 GPa/m",
+        "9 GPa/m GPa/m",
+        "9 GPa//m",
+        "9 GPa/",
+        "*9 GPa/m",
+        "9 GPa/m # stiff",
+        "9_0 GPa/m",
+        "9e GPa/m",
+        "nine GPa/m",
+        "9 None",
+        "9 __import__",
+        "9 lambda",
+        "9 Pa.real/m",
+        "٩ GPa/m",
+        "9" * 5000 + " GPa/m",
+        "9." + "0" * 5000 + " GPa/m",
+        "1e-400 GPa/m",
+        "9 Ym^9 Ym^9 Ym^9",
+        "9 dB",
+        "9 degC",
+        "",
+        " ",
+        "GPa/m",
+    ],
+    ids=range(34),
+)
+def test_what_is_no_quantity_is_refused_at_once(text):
+    begun = time.process_time()
+    with pytest.raises(QuantityError):
+        parse(text, "Pa/m")
+    assert time.process_time() - begun < 3  # pint is loaded once
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "value"),
+    [
+        ("9 GPa/m", "Pa/m", 9e9),
+        ("9GPa/m", "Pa/m", 9e9),
+        ("3 kg/(m s^2)", "Pa", 3.0),
+        ("3 kg/m/s^2", "Pa", 3.0),
+        ("2 s⁻¹", "1/s", 2.0),
+        ("2 1/s", "1/s", 2.0),
+        ("1 kN·s/m³", "Pa s/m", 1e3),
+        ("1 N/mm²", "Pa", 1e6),
+        ("1 kilopascal", "Pa", 1e3),
+        ("50 %", "1", 0.5),
+        ("-45 °", "rad", -math.pi / 4),
+        ("0e-400 Pa", "Pa", 0.0),
+    ],
+)
+def test_units_are_words_and_small_powers(text, expected, value):
+    assert parse(text, expected) == pytest.approx(value, rel=1e-15)
+
+
+WORDS = st.sampled_from(["Pa", "m", "s", "kg", "N", "MPa", "um", "min", "kilopascal", "inch", "1", "x", "²"])
+MARKS = st.sampled_from(["/", "*", " ", "^2", "**3", "^-1", "(", ")", "9", "±", "^99", "·", "\n", "**"])
+
+
+@settings(max_examples=300, deadline=1000)
+@given(st.lists(st.one_of(WORDS, MARKS), max_size=12).map("".join))
+def test_whatever_is_written_is_a_unit_or_refused(text):
+    try:
+        factor, dimension = unit(text)
+    except QuantityError:
+        return
+    assert 0 < factor < math.inf
+    assert all(math.isfinite(power) for power in dimension)
+    if not text.strip().startswith("1"):
+        assert unit(f"m/m*({text})") == (pytest.approx(factor), dimension)
+
+
+VALUES = [None, "nine", "", [9e9], {}, True, 1j, math.nan, math.inf, 10**5000, 10**400, 1e400, object()]
+
+
+@pytest.mark.parametrize("place", range(len(VALUES)))
+def test_any_thing_for_a_number_is_one_message(place):
+    rig = rig_from_text(RIG)
+    with pytest.raises(ParameterError, match="stiffness") as found:
+        Slider(friction=rig.friction, contact=rig.contact, drive=rig.drive, stiffness=VALUES[place])
+    assert len(str(found.value)) < 1000
+
+
+WRITTEN = [
+    "1" * 5000,
+    "0x" + "f" * 5000,
+    str(2**63),
+    "1e400",
+    "nan",
+    "[" * 9000,
+    "{a=" * 3000,
+    "2020-01-01",
+    "'9±1 GPa/m'",
+]
+
+
+@pytest.mark.parametrize("written", WRITTEN, ids=range(len(WRITTEN)))
+def test_any_value_of_a_key_is_one_message(written):
+    for make in (
+        lambda: rig_from_text(RIG.replace('"9 GPa/m"', written)),
+        lambda: rig_from_text(RIG, changes=[f"stiffness={written}"]),
+    ):
+        with pytest.raises(SteadyslipError) as found:
+            make()
+        assert len(str(found.value)) < 1000
+
+
+def test_a_change_is_one_value():
+    with pytest.raises(ParameterError, match=r"slider\.stiffness.*one value"):
+        rig_from_text(RIG, changes=["slider.stiffness=1\nmass=2"])
+    with pytest.raises(ParameterError, match="one value"):
+        rig_from_text(RIG, changes=["stiffness=1e9\n[slider.more]"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" + " " * 100_000,
+        "[a" + " " * 100_000,
+        "[" + " " * 50_000 + "a" + " " * 50_000,
+        "[" * 100_000,
+        "[[" + "a " * 50_000,
+        " " * 100_000 + "a",
+        "a" + " " * 100_000,
+        "a" + " . a" * 25_000,
+        '"' * 100_000,
+        "a." * 50_000,
+        "'\"" * 50_000,
+    ],
+    ids=range(11),
+)
+def test_reading_takes_no_longer_than_the_text_is_long(text):
+    begun = time.process_time()
+    key_lines(text)
+    with pytest.raises(NotToml):
+        tables_of(text)
+    assert time.process_time() - begun < 1
+
+
+def test_keys_have_few_parts():
+    assert tables_of(".".join("a" * MOST_PARTS) + " = 1")
+    for text in (
+        ".".join("a" * 20_000) + " = 1",
+        "[" + " . ".join("a" * 20_000) + "]",
+        "x = {" + ".".join("a" * 20_000) + " = 1}",
+    ):
+        begun = time.process_time()
+        with pytest.raises(NotToml, match="parts"):
+            tables_of(text)
+        assert time.process_time() - begun < 1
+
+
+def test_totals_without_an_area_are_told_of_it():
+    for name, total in (("slider.stiffness", "48 N/um"), ("slider.mass", "120 kg"), ("contact.preload", "300 N")):
+        with pytest.raises(ParameterError, match=rf"{name}.*add the contact's area to the rig file, \[slider\] area"):
+            rig_from_text(RIG, changes=[f"{name}={total}"])
+        rig_from_text(RIG, changes=[f"{name}={total}", "area=0.01 m^2"])

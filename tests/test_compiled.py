@@ -20,6 +20,7 @@ from steadyslip.compiled.program import Program
 from steadyslip.compiled.source import Constants, statements
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.setup import Options, prepare
+from steadyslip.sealed import write_sealed
 
 mpmath.mp.dps = 50
 KERNEL = build.interpreted("")
@@ -252,7 +253,7 @@ def test_damaged_cache_is_compiled_again(folder, damage):
         if damage == "flipped":
             content[len(content) // 2] ^= 1
         new = {"empty": b"", "cut": content[:-100], "flipped": content, "text": b"hello",
-               "pickle": build._MAGIC + pickle.dumps(7)}.get(damage)  # fmt: skip
+               "pickle": pickle.dumps(7)}.get(damage)  # fmt: skip
         file.unlink()
         if new is None:
             file.mkdir()
@@ -264,13 +265,32 @@ def test_damaged_cache_is_compiled_again(folder, damage):
 
 def test_sound_file_of_another_kind_is_compiled_again(folder):
     """A checksum that is right around content that is wrong."""
-    import hashlib
-
     assert ask(TINY % 6) == 6
     content = pickle.dumps(("not", "a", "kernel"))
     for file in folder.iterdir():
-        file.write_bytes(build._MAGIC + hashlib.sha256(content).digest() + content)
+        write_sealed(file, content, build.KERNEL, file.name, private=True)
     assert ask(TINY % 6) == 6
+
+
+def test_a_file_of_another_function_is_not_opened(folder, monkeypatch):
+    """A sound file under the name of another one, as a mistaken copy leaves it."""
+    assert ask(TINY % 21) == 21
+    others = {file.name.rpartition("-")[2]: file.read_bytes() for file in folder.iterdir()}
+    assert ask(TINY % 22) == 22
+    for file in folder.iterdir():
+        file.write_bytes(others[file.name.rpartition("-")[2]])
+        file.chmod(0o600)
+    assert ask(TINY % 22) == 22
+    assert ask(TINY % 21) == 21
+    advance, observe = sorted(
+        file for file in folder.iterdir() if file.name.startswith(build._key(build.source_of(TINY % 21)))
+    )
+    observe.write_bytes(advance.read_bytes())
+    opened = []
+    monkeypatch.setattr(build.pickle, "loads", lambda content: opened.append(content))
+    cache = build._FileCache(observe)
+    assert cache.load_overload(None, None) is None
+    assert not opened
 
 
 def test_stale_cache_is_not_used(folder, monkeypatch):
@@ -282,13 +302,82 @@ def test_stale_cache_is_not_used(folder, monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="owners are a matter of POSIX")
-def test_foreign_cache_is_not_opened(folder, monkeypatch):
+@pytest.mark.parametrize("reason", ["owner", "file", "folder", "pipe"])
+def test_foreign_cache_is_not_opened(folder, monkeypatch, reason):
+    """Machine code that anybody else could have put there."""
     assert ask(TINY % 8) == 8
-    monkeypatch.setattr(os, "getuid", lambda: 12345)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert {stat.S_IMODE(file.stat().st_mode) for file in folder.iterdir()} == {0o600}
+    if reason == "owner":
+        monkeypatch.setattr(os, "getuid", lambda: 12345)
+    if reason == "folder":
+        folder.chmod(0o770)
+    for file in list(folder.iterdir()):
+        if reason == "file":
+            file.chmod(0o602)
+        if reason == "pipe":
+            file.unlink()
+            os.mkfifo(file)
     opened = []
     monkeypatch.setattr(build.pickle, "loads", lambda content: opened.append(content))
     assert ask(TINY % 8) == 8
     assert not opened
+
+
+def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
+    import steadyslip
+
+    def key():
+        build._surroundings.cache_clear()
+        return build._key(build.source_of(TINY % 8))
+
+    try:
+        keys = [key(), key()]
+        assert keys[0] == keys[1]
+        for name in build.OPTIONS:
+            changed = build.OPTIONS | {name: build.OPTIONS[name] | {"boundscheck": True}}
+            with monkeypatch.context() as patch:
+                patch.setattr(build, "OPTIONS", changed)
+                keys.append(key())
+        with monkeypatch.context() as patch:
+            patch.setattr(build, "OPTIONS", build.OPTIONS | {"ENTRY": build.OPTIONS["ENTRY"] | {"fastmath": {"fast"}}})
+            keys.append(key())
+        with monkeypatch.context() as patch:
+            patch.setattr(steadyslip, "__version__", "99")
+            keys.append(key())
+        with monkeypatch.context() as patch:
+            patch.setenv("NUMBA_OPT", "0")
+            keys.append(key())
+        real = build.files
+        for changed in ("bits.py", "primitives.py"):
+            with monkeypatch.context() as patch:
+                patch.setattr(build, "files", lambda package, changed=changed: _Changed(real(package), changed))
+                keys.append(key())
+        assert len(set(keys)) == len(keys) - 1
+    finally:
+        build._surroundings.cache_clear()
+    script = f"from steadyslip.compiled import build; print(build._key(build.source_of({TINY % 8!r})))"
+    seeds = [
+        subprocess.run(
+            [sys.executable, "-c", script], env=os.environ | {"PYTHONHASHSEED": seed}, capture_output=True, text=True
+        ).stdout.strip()
+        for seed in ("1", "2")
+    ]
+    assert seeds == [keys[0]] * 2, "sets have no order"
+
+
+class _Changed:
+    """The package's files, one of them with one more line."""
+
+    def __init__(self, folder, name):
+        self.folder, self.name = folder, name
+
+    def joinpath(self, name):
+        self.last = name
+        return self
+
+    def read_text(self, encoding):
+        return self.folder.joinpath(self.last).read_text(encoding=encoding) + "\n" * (self.last == self.name)
 
 
 def test_cache_that_cannot_be_written(tmp_path, monkeypatch):

@@ -34,7 +34,7 @@ class UnreadableFile(NotAvailable):
         super().__init__(f"cannot read {name!r}: {reason}")
 
 
-def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True) -> bytes:
+def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, private: bool = False) -> bytes:
     """The content of a regular file.
 
     The file is opened first and looked at then, so that nothing can take its place in between; opening a pipe does
@@ -47,6 +47,8 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True) -> b
         Greatest allowed size in bytes.
     links : bool
         Whether `path` itself may be a symbolic link.
+    private : bool
+        Whether to refuse a file that anybody else can change.
 
     Raises
     ------
@@ -63,6 +65,8 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True) -> b
     try:
         found = os.fstat(descriptor)
         check_kind(name, found)
+        if private and not is_private(found):
+            raise UnreadableFile(name, "others can change it")
         _check_size(name, found.st_size, most)
         parts, left = [], most + 1
         while left and (part := os.read(descriptor, min(left, 2**24))):
@@ -86,6 +90,13 @@ def check_kind(name: str, found: os.stat_result) -> None:
     """
     if not stat.S_ISREG(found.st_mode):
         raise UnreadableFile(name, f"it is {_KINDS.get(stat.S_IFMT(found.st_mode), 'special')}; give a regular file")
+
+
+def is_private(found: os.stat_result) -> bool:
+    """Whether a file or folder is this user's, and nobody else may write to it; always so where there are no owners."""
+    if not hasattr(os, "getuid"):
+        return True
+    return found.st_uid == os.getuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _check_size(name: str, size: int, most: int) -> None:

@@ -52,8 +52,10 @@ def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]],
 
 
 @contextmanager
-def whole_file(path: str | PathLike[str]) -> Iterator[str]:
+def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[str]:
     """The name of a temporary file, which takes the place of `path` once it is written without fault.
+
+    A `private` file is for its owner alone.
 
     Raises
     ------
@@ -65,9 +67,10 @@ def whole_file(path: str | PathLike[str]) -> Iterator[str]:
         descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=target.suffix)
         os.close(descriptor)
         yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # temporary files are the owner's alone
+        if not private:
+            mask = os.umask(0)
+            os.umask(mask)
+            os.chmod(temporary, 0o666 & ~mask)  # temporary files are the owner's alone
         os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):

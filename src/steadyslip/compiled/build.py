@@ -1,9 +1,11 @@
 """Kernel text to machine code, kept between processes in the user's cache folder.
 
-A compiled function is stored under the hash of its text, of all versions that matter and of the processor, in
-one file with its own checksum, written under a temporary name and moved into place. Anything odd about such a
-file (damaged, foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder
-that cannot be written to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none.
+A compiled function is stored under the hash of its text, of all versions and options that matter and of the
+processor, in one sealed file (`steadyslip.sealed`), written under a temporary name and moved into place. Machine code
+comes as a pickle, so a file is opened only if it and its folder are this user's and nobody else can write to them, and
+if its seal says that it is of this very function. Anything odd about it (damaged, of another function, foreign owner,
+other version, unreadable) means that it is ignored and compiled again; a folder that cannot be written to means that
+nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none.
 """
 
 from __future__ import annotations
@@ -11,12 +13,12 @@ from __future__ import annotations
 import contextlib
 import gc
 import hashlib
+import json
 import math
 import os
 import pickle
 import struct
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator
 from functools import lru_cache
@@ -26,6 +28,10 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+
+from steadyslip.errors import NotAvailable
+from steadyslip.inputs import is_private
+from steadyslip.sealed import Kind, read_sealed, write_sealed
 
 ENTRIES = {
     "advance": "int64(float64[::1], int64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], "
@@ -37,7 +43,11 @@ ENTRIES = {
     "float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
 }
 """Functions that are called from outside; not every kernel has all of them."""
-_MAGIC = b"steadyslip kernel 1\n"
+_FAST: dict[str, Any] = {"fastmath": {"contract", "nsz"}, "error_model": "numpy", "boundscheck": False}
+_INNER = _FAST | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+OPTIONS = {"PLAIN": _INNER, "FLAT": _INNER, "INLINE": _INNER | {"forceinline": True}, "ENTRY": _FAST | {"nogil": True}}
+"""What a kernel's text asks of numba, by the name that it uses."""
+KERNEL = Kind("kernel", 2, 2**26, "it is compiled again")
 _lock = threading.RLock()
 _loaded: dict[str, ModuleType] = {}
 
@@ -71,8 +81,7 @@ def interpreted(text: str) -> ModuleType:
         return np.float64(number)  # division by zero gives infinity, as in machine code
 
     module = ModuleType("steadyslip_kernel_interpreted")
-    options: dict[str, Any] = {"PLAIN": {}, "INLINE": {}, "FLAT": {}, "ENTRY": {}}
-    module.__dict__.update(math=math, np=np, njit=keep, bits=bits, real=real, **options)
+    module.__dict__.update(math=math, np=np, njit=keep, bits=bits, real=real, **{name: {} for name in OPTIONS})
     exec(compile(source_of(text), "<kernel>", "exec"), module.__dict__)
     return module
 
@@ -94,14 +103,18 @@ def _surroundings() -> str:
     import llvmlite.binding as llvm
     import numba
 
+    from steadyslip import __version__
+
     switches = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
     processor = [llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    versions = [sys.version, numba.__version__, llvmlite.__version__, np.__version__]
-    return "\n".join([*versions, *processor, *switches])
+    versions = [__version__, sys.version, numba.__version__, llvmlite.__version__, np.__version__]
+    intrinsics = files("steadyslip.compiled").joinpath("bits.py").read_text(encoding="utf-8")
+    return "\n".join([*versions, *processor, *switches, intrinsics])
 
 
 def _key(source: str) -> str:
-    return hashlib.sha256(f"{_surroundings()}\n{ENTRIES}\n{source}".encode()).hexdigest()
+    options = json.dumps(OPTIONS, default=sorted, sort_keys=True)
+    return hashlib.sha256(f"{_surroundings()}\n{options}\n{ENTRIES}\n{source}".encode()).hexdigest()
 
 
 def _module(source: str, key: str) -> ModuleType:
@@ -109,12 +122,9 @@ def _module(source: str, key: str) -> ModuleType:
 
     from steadyslip.compiled.bits import bits, real
 
-    fast = {"fastmath": {"contract", "nsz"}, "error_model": "numpy", "boundscheck": False}
-    inner = fast | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     module = ModuleType(f"steadyslip_kernel_{key}")
     sys.modules[module.__name__] = module  # numba finds a cached function's globals by module name
-    options = {"PLAIN": inner, "FLAT": inner, "INLINE": inner | {"forceinline": True}, "ENTRY": fast | {"nogil": True}}
-    module.__dict__.update(math=math, np=np, njit=numba.njit, bits=bits, real=real, **options)
+    module.__dict__.update(math=math, np=np, njit=numba.njit, bits=bits, real=real, **OPTIONS)
     exec(compile(source, f"<{module.__name__}>", "exec"), module.__dict__)
     folder = cache_folder()
     with _without_collection():
@@ -163,33 +173,23 @@ class _FileCache:
         except Exception:  # whatever a file of another build may raise: compile instead
             return None
 
-    def _sound_content(self) -> bytes | None:
+    def _sound_content(self) -> memoryview | None:
         if self.path is None:
             return None
         try:
-            if hasattr(os, "getuid") and self.path.stat().st_uid != os.getuid():
-                return None  # a pickle from somebody else is not to be trusted
-            raw = self.path.read_bytes()
-        except OSError:
+            if not is_private(self.path.parent.stat()):
+                return None
+            return read_sealed(self.path, KERNEL, self.path.name, private=True)
+        except (OSError, NotAvailable):
             return None
-        head, digest, content = raw[: len(_MAGIC)], raw[len(_MAGIC) : len(_MAGIC) + 32], raw[len(_MAGIC) + 32 :]
-        if head != _MAGIC or hashlib.sha256(content).digest() != digest:
-            return None
-        return content
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Write the file, or do without."""
         if self.path is None:
             return
         content = pickle.dumps(data._reduce(), protocol=-1)
-        temporary = None
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            descriptor, temporary = tempfile.mkstemp(dir=self.path.parent, prefix="writing-")
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(_MAGIC + hashlib.sha256(content).digest() + content)
-            os.replace(temporary, self.path)
-        except OSError:
-            if temporary is not None:
-                with contextlib.suppress(OSError):
-                    os.unlink(temporary)
+        with contextlib.suppress(OSError, NotAvailable):
+            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if "STEADYSLIP_CACHE" not in os.environ:
+                self.path.parent.chmod(0o700)  # earlier versions left it to the umask
+            write_sealed(self.path, content, KERNEL, self.path.name, private=True)

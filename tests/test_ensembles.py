@@ -177,3 +177,43 @@ def test_memory_is_bounded_by_what_is_asked_for():
     tracemalloc.stop()
     assert ensemble.final["v"].shape == (100_000,)
     assert peak < 40 * 8 * 100_000  # results, parameters, starting values: under forty numbers a run
+
+
+def test_every_requested_sample_up_to_the_end_exists():
+    """Breakpoints and ends anywhere, some at the very end: times are those asked for, to the last bit."""
+    random = np.random.default_rng(5)
+    lanes = 96
+    until = random.uniform(0.5, 20.0, lanes) * 10.0 ** random.integers(-3, 1, lanes)
+    at = random.uniform(0, 1, lanes) * until
+    at[:8] = until[:8]  # a step at the very end is cut
+    times = np.unique(np.concatenate([[0.0], at, until]))
+    step = ss.VelocityStep(at=1.0, to=1.5)
+    ensemble = ss.simulate_many(
+        unit_rig("aging", 0.5, 0.4, 1e-3),
+        {"protocol.pieces.1.at": at, "protocol.until": until, "stiffness": kappas(lanes)},
+        ss.Protocol(pieces=(step,), until=1.0),
+        times=times,
+    )
+    assert set(ensemble.status) == {"done"}
+    np.testing.assert_array_equal(ensemble.end, until)
+    asked = times <= until[:, None]
+    for name, values in ensemble.samples.items():
+        np.testing.assert_array_equal(np.isfinite(values), asked, err_msg=name)
+        last = values[np.arange(lanes), asked.sum(axis=1) - 1]
+        np.testing.assert_array_equal(last, ensemble.final[name], err_msg=name)
+    after = (times >= at[:, None]) & (at < until)[:, None]
+    np.testing.assert_array_equal(ensemble.samples["load_velocity"][asked], np.where(after, 1.5, 1.0)[asked])
+
+
+def test_numbers_that_are_none_are_not_done():
+    """The load falls to a fiftieth: θ = (σ0/σ)^(α/b) d_c/v0 leaves the range of floating point for small b."""
+    b = np.array([0.01, 1e-5])
+    a_rig = rig(friction=ONE_MEMORY[1], contact=CONTACTS[0], stiffness=3e10, radiation_damping=2e10)
+    protocol = ss.NormalStressStep(at=1.0, by=-4.9e6)
+    ensemble = ss.simulate_many(a_rig, {"friction.b": b}, protocol, until=1.5, times=[0.5, 1.5])
+    assert list(ensemble.status) == ["done", "out of range"]
+    alone = ss.simulate(a_rig.with_values({"friction.b": 1e-5}), protocol, until=1.5)
+    assert alone.status == "out of range"
+    assert alone.end == 1.0
+    assert all(np.all(np.isfinite(values)) for values in alone.values())
+    assert "1e308" in str(alone)

@@ -67,6 +67,27 @@ def test_kernels_follow_the_model(law, contact, mass):
     assert np.max(np.abs(got - expected) / scale) < (5e-6 if law == "lugre" else 2e-8)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_times_are_exact(seed):
+    """Own steps never go back, land on every breakpoint (twice: before and after) and on the end, to the last bit."""
+    random = np.random.default_rng(seed)
+    until = random.uniform(0.5, 5.0)
+    breakpoints = np.sort(random.uniform(0, until, 6))
+    pieces = [ss.VelocityStep(at=t, to=1e-6 * (1 + i % 2)) for i, t in enumerate(breakpoints)]
+    jobs = prepare(rig(stiffness=2e10), ss.Protocol.of(pieces), until, {}, {}, Options(rtol=1e-4))
+    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
+    requested = np.sort(np.concatenate([[0.0, until], breakpoints, random.uniform(0, until, 5)]))
+    outcome = run_single(jobs, machine, requested, True, True)
+    own = outcome.recorded[:, 0]
+    assert outcome.final[0, 0] == own[-1] == until
+    assert np.all(np.diff(own) >= 0)
+    for moment in breakpoints:
+        assert np.sum(own == moment) == 2
+    assert np.all(np.diff(outcome.log[:, 1]) >= 0)
+    assert np.all(np.isfinite(outcome.samples))
+    np.testing.assert_array_equal(outcome.samples[0, -1], outcome.final[0, 4:])
+
+
 INPUTS = {
     "ramp of velocity": (
         ss.VelocityRamp(at=0.5, to=3e-6, duration=1.0),

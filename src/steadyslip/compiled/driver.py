@@ -36,6 +36,12 @@ LOG_COLUMNS = 8
 
 
 @njit(**PLAIN)
+def clock(R, tau):
+    """Time since the start of the run, at tau into the segment: at its end that of the breakpoint, to the last bit."""
+    return min(R[ROW_START] + tau, R[ROW_STOP]) if tau < R[ROW_END] else R[ROW_STOP]
+
+
+@njit(**PLAIN)
 def load_advance(R, tau):
     """How far the load point has moved since the start of the segment."""
     moved = R[ROW_INPUT] * tau + 0.5 * R[ROW_SLOPE] * tau * tau
@@ -106,6 +112,7 @@ def enter_segment(R, j, k, segments, y, out):
     R[ROW_SEGMENT] = k
     R[ROW_TAU] = 0.0
     R[ROW_START] = row[0]
+    R[ROW_STOP] = row[1]
     R[ROW_END] = row[1] - row[0]
     R[ROW_CONTINUOUS] -= row[2]
     R[ROW_TALLY + LOAD_MOVED] += row[2]
@@ -172,9 +179,9 @@ def start_job(R, j, cursor, log, arrays, y, out):
     R[ROW_ERROR] = 0.0
     R[ROW_GOOD] = 0.0
     R[ROW_FLAG] = 0.0
-    R[ROW_NEXT] = times[0] if times.shape[0] > 0 else math.inf
     if not enter_segment(R, j, 0, segments, y, out):
         return False
+    await_sample(R, times)
     R[ROW_H] = first_step(R)
     v = R[ROW_OUT]
     R[ROW_TALLY + V_MAX] = v
@@ -296,7 +303,7 @@ def follow(R, cursor, log, y, out, order):
 @njit(**PLAIN)
 def note(R, kind, tau, y, out, log, cursor):
     """Keep the tally of events, and the log where there is one."""
-    time = R[ROW_START] + tau
+    time = clock(R, tau)
     place = y[0] + R[ROW_TALLY + LOAD_MOVED] + load_advance(R, tau)
     if log.shape[0] > 0:
         i = cursor[LOGGED]
@@ -347,28 +354,43 @@ def decide(R, out):
 
 
 @njit(**PLAIN)
-def take_samples(R, row, times, samples, at_end, y):
-    """Write the state at every requested time up to now: from the dense output, or `at_end` of a run as it is."""
-    now = R[ROW_START] + R[ROW_TAU]
+def await_sample(R, times):
+    """How far into the segment the next requested time is, for the kernel's flag."""
     k = int(R[ROW_TALLY + TAKEN])
-    while k < times.shape[0] and (times[k] < now or (at_end and times[k] <= now)):
+    R[ROW_NEXT] = times[k] - R[ROW_START] if k < times.shape[0] else math.inf
+
+
+@njit(**PLAIN)
+def take_samples(R, row, times, samples, at_end, y):
+    """Write the state at every requested time: before now, from the dense output; `at_end`, now, as it is.
+
+    A breakpoint itself belongs to the segment that begins there, the end of the run to the last one.
+    """
+    arrived = R[ROW_TAU] >= R[ROW_END]
+    k = int(R[ROW_TALLY + TAKEN])
+    while k < times.shape[0]:
+        tau = times[k] - R[ROW_START]
         if at_end:
+            if times[k] > clock(R, R[ROW_TAU]):
+                break
             for i in range(N):
                 y[i] = R[ROW_Y + i]
         else:
-            dense_at(R, max((times[k] - R[ROW_START] - R[ROW_TAU_OLD]) / R[ROW_DONE], 0.0), y)
+            if times[k] >= R[ROW_STOP] or (tau >= R[ROW_TAU] and not arrived):
+                break
+            dense_at(R, min(max((tau - R[ROW_TAU_OLD]) / R[ROW_DONE], 0.0), 1.0), y)
         for i in range(N):
             samples[row, k, i] = y[i]
         k += 1
     R[ROW_TALLY + TAKEN] = k
-    R[ROW_NEXT] = times[k] if k < times.shape[0] else math.inf
+    await_sample(R, times)
 
 
 @njit(**PLAIN)
 def record(R, cursor, recorded):
     """The solver's own step."""
     i = cursor[RECORDED]
-    recorded[i, 0] = R[ROW_START] + R[ROW_TAU]
+    recorded[i, 0] = clock(R, R[ROW_TAU])
     recorded[i, 1] = R[ROW_SEGMENT]
     for c in range(N):
         recorded[i, 2 + c] = R[ROW_Y + c]
@@ -380,7 +402,7 @@ def finish(R, row, status, results):
     """Write a job's results."""
     statuses, final, tally = results[0], results[1], results[2]
     statuses[row] = status
-    final[row, 0] = R[ROW_START] + R[ROW_TAU]
+    final[row, 0] = clock(R, R[ROW_TAU])
     final[row, 1] = R[ROW_SEGMENT]
     final[row, 2] = R[ROW_ACCEPTED]
     final[row, 3] = R[ROW_REJECTED]
@@ -403,12 +425,11 @@ def go_on(R, j, cursor, arrays, results, y, out, order):
         R[ROW_Z] = R[ROW_Y + STATE_W]  # a guess for after the next jump
     if DENSE and good:
         lost = R[ROW_WATCH] > 0.0 and follow(R, cursor, log, y, out, order)
-        if R[ROW_NEXT] < R[ROW_START] + R[ROW_TAU]:
-            take_samples(R, j - j0, times, samples, False, y)
-        if lost:
-            return CONTACT_LOST
+        take_samples(R, j - j0, times, samples, False, y)
         if R[ROW_RECORD] > 0.0:
             record(R, cursor, recorded)
+        if lost:
+            return CONTACT_LOST
         if R[ROW_TALLY + DECIDED] > 0.0:
             return int(R[ROW_TALLY + DECIDED])
     if abs(R[ROW_OUT]) >= R[ROW_V_HIGH]:
@@ -421,12 +442,13 @@ def go_on(R, j, cursor, arrays, results, y, out, order):
         return TOO_MANY_STEPS
     while R[ROW_TAU] >= R[ROW_END]:
         k = int(R[ROW_SEGMENT]) + 1
-        if k >= segments.shape[1]:
-            take_samples(R, j - j0, times, samples, True, y)
+        s = j if segments.shape[0] > 1 else 0
+        if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
             return DONE
         h = R[ROW_H]
         if not enter_segment(R, j, k, segments, y, out):
             return NO_VELOCITY
+        await_sample(R, times)
         R[ROW_H] = h
         if R[ROW_RECORD] > 0.0:
             record(R, cursor, recorded)
@@ -461,6 +483,8 @@ def attend(R, l, ids, cursor, arrays, results, y, out, order):
         R[ROW_FLAG] = 0.0
         if status == RUNNING:
             return
+        if status != NO_VELOCITY:  # there is no state after that jump
+            take_samples(R, j - cursor[FIRST_JOB], arrays[4], results[3], True, y)
         finish(R, j - cursor[FIRST_JOB], status, results)
     while cursor[NEXT_JOB] < cursor[LAST_JOB]:
         j = cursor[NEXT_JOB]

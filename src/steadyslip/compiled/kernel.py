@@ -178,7 +178,7 @@ class KernelText:
         reduction = self.reduction
         groups = {
             "Y": n, "F": n, "OUT": 3, "GAP": 1, "CONTINUOUS": len(reduction.continuous), "Z": 1, "Z_SCALE": 1,
-            "TAU": 1, "H": 1, "END": 1, "START": 1, "SEGMENT": 1, "ATOL": n, "RTOL": 1,
+            "TAU": 1, "H": 1, "END": 1, "START": 1, "STOP": 1, "SEGMENT": 1, "ATOL": n, "RTOL": 1,
             "INPUT": 3, "SLOPE": 3, "AMPLITUDE": 3 * choice.harmonics, "OMEGA": 3 * choice.harmonics,
             "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
             "FAILURES": 1, "ERROR": 1,
@@ -373,7 +373,7 @@ class KernelText:
             "flag += 1.0 if failures >= 40.0 else 0.0",
             f"flag += 1.0 if abs(now0) >= {cell('V_HIGH')} else 0.0",
             f"flag += 1.0 if now2 <= {cell('SIGMA_LOW')} else 0.0",
-            f"flag += 1.0 if {cell('START')} + moved > {cell('NEXT')} else 0.0",
+            f"flag += 1.0 if moved > {cell('NEXT')} else 0.0",
             f"flag += {cell('RECORD')}*(1.0 if good else 0.0)",
             f"{cell('FLAG')} = (flag + event)*{cell('ACTIVE')}",
         ]

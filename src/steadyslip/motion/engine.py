@@ -16,7 +16,8 @@ from steadyslip.motion.setup import Jobs
 LANES = 24  # three vectors of eight doubles, see compiled.kernel
 CHUNK = 2048  # jobs per call: keeps the arrays small and Ctrl-C prompt
 QUOTA = 20_000  # passes between looks at the clock and at Ctrl-C, some tens of milliseconds
-INTERRUPTED, NO_STEADY, ILL_POSED = range(len(STATUSES), len(STATUSES) + 3)  # statuses that no kernel gives
+# statuses that no kernel gives
+INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATUSES) + 4)
 
 
 @dataclass

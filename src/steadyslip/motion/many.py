@@ -9,10 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.compiled.program import TALLY
+from steadyslip.compiled.program import STATUSES, TALLY
 from steadyslip.errors import ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.motion.engine import ILL_POSED, INTERRUPTED, LANES, NO_STEADY, Outcome, run_chunk, run_many
-from steadyslip.motion.observe import observable_units, observe, segment_of
+from steadyslip.motion.engine import (
+    ILL_POSED,
+    INTERRUPTED,
+    LANES,
+    NO_STEADY,
+    OUT_OF_RANGE,
+    Outcome,
+    run_chunk,
+    run_many,
+)
+from steadyslip.motion.observe import observable_units, observe, out_of_range, segment_of
 from steadyslip.motion.setup import Jobs, Options, prepare
 from steadyslip.motion.single import checked_times
 from steadyslip.motion.status import WORDS
@@ -21,6 +30,7 @@ from steadyslip.protocol import Protocol
 from steadyslip.records import resolve
 from steadyslip.slider import Slider
 
+REACHED_END = tuple(STATUSES.index(word) for word in ("done", "settled", "periodic"))
 EVENT_UNITS = dict(
     zip(TALLY, ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "1", "s", "s", "1"), strict=True)
 )
@@ -285,6 +295,7 @@ class _Store:
         final = outcome.final[ran]
         found = observe(jobs, machine, first, ran, final[:, 1].astype(int), final[:, 0], final[:, 4:])
         rows = np.arange(len(self.code))[where]
+        self._leaves_range(rows[ran], final[:, 0], out_of_range(found))
         for name, array in self.final.items():
             if name in found:
                 array[rows[ran]] = found[name]
@@ -292,9 +303,16 @@ class _Store:
             lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, 0]) & ~absent[:, None])
             segment = segment_of(jobs.segments, first + lane, self.times[k])
             found = observe(jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k])
+            self._leaves_range(rows[lane], self.times[k], out_of_range(found))
             for name, array in self.samples.items():
                 if name in found:
                     array[rows[lane], k] = found[name]
+
+    def _leaves_range(self, rows: np.ndarray, time: np.ndarray, bad: np.ndarray) -> None:
+        """Runs that reached their end, but with numbers that are none at some time."""
+        bad &= np.isin(self.code[rows], (*REACHED_END, OUT_OF_RANGE))
+        self.code[rows[bad]] = OUT_OF_RANGE
+        np.minimum.at(self.end, rows[bad], time[bad])
 
     def result(self, shape: tuple[int, ...], dims: tuple[str, ...], coords: Any) -> Ensemble:
         def shaped(array: np.ndarray) -> np.ndarray:

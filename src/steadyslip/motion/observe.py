@@ -68,6 +68,12 @@ def _advance(segments: Segments, where: Any, until: Array) -> Array:
     return moved
 
 
+def out_of_range(found: dict[str, Array]) -> Array:
+    """Where any observable is infinite or no number."""
+    bad: Array = ~np.logical_and.reduce([np.isfinite(values) for values in found.values()])
+    return bad
+
+
 @lru_cache(maxsize=64)
 def _function(model: Model) -> tuple[list[str], Callable[..., list[Any]]]:
     symbols = model.symbols

@@ -34,7 +34,8 @@ class History(Mapping[str, np.ndarray]):
     events : tuple of Event
         In the order of time.
     status : str
-        ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps`` or ``interrupted``.
+        ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
+        ``out of range`` (of floating point: the samples end before) or ``interrupted``.
     end : float
         Time reached, s: of the blow-up, of the loss of contact, or the end of the protocol.
     method : str

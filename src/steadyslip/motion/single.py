@@ -12,7 +12,7 @@ from steadyslip.compiled.program import Program
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import Event, events_of
-from steadyslip.motion.observe import observable_units, observe, segment_of
+from steadyslip.motion.observe import observable_units, observe, out_of_range, segment_of
 from steadyslip.motion.result import History
 from steadyslip.motion.setup import Jobs, Options, prepare
 from steadyslip.motion.status import WORDS, remedy
@@ -117,7 +117,7 @@ def _history(
     rig: Slider, plan: Protocol, jobs: Jobs, machine: Program, outcome: Outcome, requested: np.ndarray, own: bool
 ) -> History:
     status = WORDS[int(outcome.status[0])]
-    final = outcome.final[0]
+    final, end = outcome.final[0], float(outcome.final[0, 0])
     if own:
         time, segment, states = outcome.recorded[:, 0], outcome.recorded[:, 1].astype(int), outcome.recorded[:, 2:]
     else:
@@ -130,6 +130,11 @@ def _history(
     events = events_of(outcome.log)
     if status == "blow-up":
         events += (_last_event("blow-up", jobs, machine, final),)
+    if status == "done" and np.any(bad := out_of_range(found)):
+        first = int(np.argmax(bad))
+        status, end, time = "out of range", float(time[first]), time[:first]
+        found = {name: values[:first] for name, values in found.items()}
+        events = tuple(event for event in events if event.time <= end)
     return History(
         rig=rig,
         protocol=plan,
@@ -137,7 +142,7 @@ def _history(
         units=units,
         events=events,
         status=status,
-        end=float(final[0]),
+        end=end,
         method=machine.choice.method,
         rtol=jobs.options.rtol,
         steps=int(final[2]),

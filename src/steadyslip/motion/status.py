@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steadyslip.compiled.program import STATUSES
 
-WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed")
+WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range")
 
 REMEDIES = {
     "done": "",
@@ -23,6 +23,8 @@ REMEDIES = {
     "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off); see steadyslip.steady_state",
     "ill-posed": "without mass, friction falls at once when the block speeds up (or the normal stress answers too "
     "strongly to acceleration): the smallest lag left out decides the motion; give the slider mass or damping",
+    "out of range": "an observable leaves the range of floating point (1e308); look for a parameter that is too small "
+    "or too large by orders of magnitude (b, d_c, a normal stress near zero)",
     "running": "",
 }
 

@@ -12,10 +12,13 @@ import pytest
 import steadyslip as ss
 from dimensionless import MU, A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
+from steadyslip.motion.setup import Options, prepare
 from steadyslip.nonlinear import flow as flow_module
 from steadyslip.nonlinear.continuation import Curve, Failure
-from steadyslip.nonlinear.flow import Flow
+from steadyslip.nonlinear.flow import Flow, Runs
+from steadyslip.nonlinear.kicks import constant_inputs
 from steadyslip.nonlinear.shooting import multipliers
+from steadyslip.nonlinear.verify import verified
 from test_motion_oracle import LAWS
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -142,10 +145,9 @@ def test_multipliers_do_not_depend_on_the_number_of_segments():
         rates.append(s @ rates[-1])
     back = np.outer(rates[0] - whole[2] @ rates[-1], rates[-1]) / (rates[-1] @ rates[-1])
     pieces = np.array([whole[0], whole[1], whole[2] + back])  # the last brings the rate back: a closed motion
-    arrived = np.array([*rates[1:], rates[0]])
     together = (pieces[2] @ pieces[1] @ pieces[0])[None]
-    trivial, many = multipliers(pieces, np.array(rates), arrived)
-    single, one = multipliers(together, np.array(rates[:1]), np.array(rates[:1]))
+    trivial, many = multipliers(pieces, np.array(rates))
+    single, one = multipliers(together, np.array(rates[:1]))
     assert (trivial, single) == pytest.approx((1, 1), rel=1e-6)
     assert many[0] == pytest.approx(one[0], rel=1e-6)
     assert np.prod(many) == pytest.approx(np.linalg.det(together[0]), rel=1e-6)
@@ -225,6 +227,30 @@ def test_two_state_law_doubles_its_period_where_theory_says():
     assert branch.doubled["period"][0] == pytest.approx(2 * first.cycle.period, rel=1e-4)
     stable = branch.doubled["value"][branch.doubled["stable"]] / branch.onset.value
     assert (stable.min() > 0.857, stable.max() < 0.8663) == (True, True)
+
+
+def started(a_rig, **initial):
+    """Jobs of one run of a rig, and the kernel's state at its start, at the drive's velocity."""
+    one = np.ones(1)
+    jobs = prepare(a_rig, None, 1.0, {}, initial, Options())
+    jobs = replace(jobs, segments=constant_inputs(one, one * a_rig.drive.velocity, 0 * one, 0 * one))
+    state = np.zeros(Runs(jobs).size)
+    state[0], state[2:] = jobs.initial[0][0], jobs.initial[0][2:]
+    return jobs, state
+
+
+@pytest.mark.parametrize("mass", [0.0, 1.0])
+def test_motion_is_on_a_cycle_only_if_there_is_one(mass, damped):
+    """The cycle next to a motion is that of the branch; a motion that settles, or grows, is on none."""
+    rigs = [unit_rig("slip", 0.5, kappa, damping=0 if mass else 1e-3, mass=mass) for kappa in (0.4, 1.4)]
+    jobs, state = started(rigs[0], x=0.3)
+    found = verified(jobs, 0, state, patience=20)
+    (cycle,) = (damped if not mass else ss.cycles(rigs[0], doublings=0)).at(0.4 * A)
+    assert found.period == pytest.approx(cycle.period, rel=1e-8)
+    assert found.multipliers == pytest.approx(cycle.multipliers, rel=1e-5, abs=1e-8)
+    assert verified(jobs, 0, np.array(found._orbit[0][0])).period == pytest.approx(found.period, rel=1e-9)
+    jobs, state = started(rigs[1], x=0.3)
+    assert verified(jobs, 0, state, patience=20) is None
 
 
 def test_massless_branch_ends_in_blow_up():

@@ -168,12 +168,12 @@ class Forward:
     def _settings(self, table: Table, values: Values, sigma: Array, jobs: int) -> Array:
         """rtol, guess of the unknown and its scale, limit of steps, absolute tolerances."""
         reduction = self.program.reduction
-        scales = natural_scales(reduction, values.arguments, sigma)
+        scales, unknown = natural_scales(reduction, values.arguments, sigma)
         size = len(reduction.names)
         settings = np.empty((jobs, 4 + size * (1 + self.directions)))
         settings[:, 0] = self.rtol
         settings[:, 1] = 0.0
-        settings[:, 2] = scales["z"]
+        settings[:, 2] = unknown
         settings[:, 3] = MOST_STEPS * table.samples.shape[1] + 1000
         for i, name in enumerate(reduction.names):
             settings[:, 4 + i] = self.rtol * scales[name]

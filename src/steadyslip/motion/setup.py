@@ -118,7 +118,7 @@ class Jobs:
         """Constants, initial, settings and segment rows of some jobs."""
         arguments, sigma = self.part(start, stop)
         constants = machine.constants(arguments, sigma)
-        scales = natural_scales(self.reduction, arguments, sigma)
+        scales, unknown = natural_scales(self.reduction, arguments, sigma)
         rtol = self.options.rtol
         drive = dict(zip(self.values.model.parameters, arguments, strict=True))["drive.velocity"]
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
@@ -133,7 +133,7 @@ class Jobs:
                 "watch": float(watch),
                 "record": float(record),
                 "guess": _guess(self.reduction, arguments, sigma, initial, velocity),
-                "z_scale": scales["z"],
+                "z_scale": unknown,
                 "first_step": scales["x"] / drive,
                 "settled": self.options.settled,
                 "same": self.options.same,
@@ -300,8 +300,11 @@ def _eliminable(values: Values, sigma: Any) -> int | None:
     return None
 
 
-def natural_scales(reduction: Reduction, arguments: tuple[Any, ...], sigma: Any) -> dict[str, Any]:
-    """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance."""
+def natural_scales(reduction: Reduction, arguments: tuple[Any, ...], sigma: Any) -> tuple[dict[str, Any], Any]:
+    """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance.
+
+    By name; and the size of the unknown that is left to solve for, which has no name among them.
+    """
     model = reduction.model
     numbers = _numbers(model, arguments, sigma)
     count = _memory_count(model)
@@ -322,8 +325,7 @@ def natural_scales(reduction: Reduction, arguments: tuple[Any, ...], sigma: Any)
         scale = np.where(np.isfinite(scale) & (scale > 0), scale, np.where(own > 0, own, 1.0))
         scales[name] = np.minimum(scale, np.where(own > 0, np.maximum(own, scale * 1e-3), scale))
     scales["integral"] = x * x / drive
-    scales["z"] = drive**2 / x if reduction.model.inertial else scales["w"]
-    return scales
+    return scales, drive**2 / x if reduction.model.inertial else scales["w"]
 
 
 # -- where a run starts

@@ -30,7 +30,7 @@ class Cycle:
     peak_velocity, lowest_velocity : float
         m/s, located.
     amplitude : float
-        Half of ln(peak velocity/lowest velocity).
+        Half of ln(peak velocity/lowest velocity); infinite where the block stops or turns round.
     stress_drop : float
         Highest less lowest spring stress, Pa.
     lowest_normal_stress, highest_normal_stress : float
@@ -58,7 +58,7 @@ class Cycle:
     trivial: float
     stable: bool
     start: dict[str, float]
-    _state: tuple[float, ...] = field(default=(), repr=False)
+    _orbit: tuple[Array, Array] = field(default=(np.empty((0, 0)), np.empty(0)), repr=False)
 
     @property
     def growth(self) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -41,29 +42,41 @@ class Curve:
         Size of the last Newton step that counts as converged, relative to unknowns that exceed one.
     most_turn : float
         Largest angle (cosine) between tangents of neighbouring points.
+    weights : ndarray (n+1,), optional
+        Of the unknowns' squares in lengths and angles; one unless given.
     """
 
-    def __init__(self, equations: Equations, tolerance: float = 1e-9, most_turn: float = 0.94) -> None:
+    def __init__(
+        self, equations: Equations, tolerance: float = 1e-9, most_turn: float = 0.94, weights: Array | None = None
+    ) -> None:
         self.equations, self.tolerance, self.most_turn = equations, tolerance, most_turn
+        self.weights: Any = 1.0 if weights is None else weights
+        self.bend = float(np.sqrt((1 - most_turn) / (1 + most_turn)))
+        """tan of half the largest turn: how far an arc that turns by so much leaves its tangent, per length."""
+
+    def size(self, u: Array) -> float:
+        """Length of a difference of unknowns."""
+        return float(np.sqrt(np.sum(self.weights * u * u)))
 
     def start(self, guess: Array, tangent: Array) -> Point:
         """The solution nearest to a guess, across the direction given; its tangent points that way."""
         return self.corrected(guess, tangent, 0.0)
 
-    def corrected(self, guess: Array, tangent: Array, length: float) -> Point:
+    def corrected(self, guess: Array, tangent: Array, length: float, reach: float = np.inf) -> Point:
         """Newton's method on the plane through `guess` across `tangent`.
 
         Raises
         ------
         Failure
-            If it does not converge.
+            If it does not converge, or only farther than `reach` from the guess: on something else.
         """
         u = guess.copy()
+        across = self.weights * tangent
         before = np.inf
         for iteration in range(MOST_ITERATIONS):
             residual, jacobian = self.equations(u)
-            matrix = np.vstack([jacobian, tangent])
-            right = np.append(residual, tangent @ (u - guess))
+            matrix = np.vstack([jacobian, across])
+            right = np.append(residual, across @ (u - guess))
             try:
                 step = np.linalg.solve(matrix, right)
             except np.linalg.LinAlgError as error:
@@ -71,31 +84,49 @@ class Curve:
             if not np.all(np.isfinite(step)):
                 raise Failure("not finite")
             u = u - step
+            if self.size(u - guess) > (2 * reach if iteration == 0 else reach):
+                raise Failure("the equations lead elsewhere")
             size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
             if size <= self.tolerance or (size < 10 * self.tolerance and size > 0.3 * before):
                 along = np.zeros(len(u))
                 along[-1] = 1.0
                 direction = np.linalg.solve(matrix, along)
-                direction /= np.linalg.norm(direction)
-                return Point(u, direction, length, iteration + 1)
+                return Point(u, direction / self.size(direction), length, iteration + 1)
             if size > 2.0 * before and iteration > 2:
                 break
             before = size
         raise Failure("no convergence")
 
-    def follow(self, first: Point, step: float, least: float, most: float) -> Iterator[Point]:
+    def follow(
+        self, first: Point, step: float, least: float, most: float, accept: Callable[[Point], None] | None = None
+    ) -> Iterator[Point]:
         """Points along the curve from `first`, which is not among them.
 
-        Steps grow up to `most`, or to a fifth of the largest unknown where that is more.
-        Ends by raising `Failure` where steps of `least` no longer succeed.
+        A point is taken for the continuation of the one before only if it is as close to the tangent there as an arc
+        would be that turns no more than is allowed, and does turn no more. Steps grow up to `most`, or to a fifth of
+        the largest unknown where that is more.
+
+        Parameters
+        ----------
+        accept : callable, optional
+            Raises `Failure` for points that are refused for other reasons.
+
+        Raises
+        ------
+        Failure
+            Where steps of `least` no longer succeed.
         """
         here = first
         while True:
             try:
-                ahead = self.corrected(here.u + step * here.tangent, here.tangent, here.length + step)
-                turned = float(ahead.tangent @ here.tangent)
+                reach = self.bend * step + 100 * self.tolerance
+                guess = here.u + step * here.tangent
+                ahead = self.corrected(guess, here.tangent, here.length + step, reach)
+                turned = float(ahead.tangent @ (self.weights * here.tangent))
                 if turned < self.most_turn and step > 4 * least:
                     raise Failure("turns too sharply")
+                if accept is not None:
+                    accept(ahead)
             except Failure:
                 step *= SHRINK
                 if step < least:
@@ -121,11 +152,12 @@ class Curve:
         """
         a, b, side = 0.0, high.length - low.length, 0
         near, far = low, high
+        reach = 2 * self.bend * abs(b) + 100 * self.tolerance
         for _ in range(60):
             s = b - at_high * (b - a) / (at_high - at_low)
             if not a < s < b:
                 s = 0.5 * (a + b)
-            middle = self.corrected(low.u + s * low.tangent, low.tangent, low.length + s)
+            middle = self.corrected(low.u + s * low.tangent, low.tangent, low.length + s, reach)
             value = measure(middle)
             if (value > 0) == (at_low > 0):
                 a, at_low, near = s, value, middle

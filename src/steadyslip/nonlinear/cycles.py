@@ -12,6 +12,7 @@ from steadyslip.errors import ParameterError, Problem
 from steadyslip.nonlinear.branch import Cycle, CycleBranch, SpecialCycle
 from steadyslip.nonlinear.continuation import Curve, Failure, Point
 from steadyslip.nonlinear.flow import Flow, FlowFailure
+from steadyslip.nonlinear.measure import measured
 from steadyslip.nonlinear.onset import Onset, hopf
 from steadyslip.nonlinear.shooting import Orbit, Shooting
 from steadyslip.quantities import shown
@@ -159,9 +160,6 @@ class _Tracer:
         self.logarithmic = flow.domain.low == 0 and onset.value > 0
         self.unit_of_value = abs(onset.value) or 1.0
 
-    def curve(self, shooting: Shooting) -> Curve:
-        return Curve(shooting.equations, tolerance=max(1e-9, 100 * self.flow.noise / shooting.amplitude), most_turn=0.8)
-
     def shooting(self, fractions: Array) -> Shooting:
         return Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value)
 
@@ -177,7 +175,7 @@ class _Tracer:
         roots, vectors = np.linalg.eig(jacobian[0] * ratio)
         i = int(np.argmin(np.abs(roots - 1j * onset.angular_frequency)))
         vector = vectors[:, i] * flow.scales
-        vector *= setting.drive[0] / 2 / (1j * onset.angular_frequency * vector[0])  # unit amplitude of v/v0, in phase
+        vector *= setting.drive / 2 / (1j * onset.angular_frequency * vector[0])  # unit amplitude of v/v0, in phase
         start = 2 * vector.imag  # a quarter of a period before the peak
         shooting = self.shooting(np.ones(1))
         shooting.amplitude = amplitude
@@ -185,7 +183,7 @@ class _Tracer:
             Orbit((steady + amplitude * start)[None], 2 * np.pi / onset.angular_frequency, onset.value)
         )
         tangent = np.append(start / np.hypot(flow.scales, steady), [0.0, 0.0])
-        return self.curve(shooting).start(guess, tangent / np.linalg.norm(tangent)), shooting
+        return shooting.curve().start(guess, tangent / np.linalg.norm(tangent)), shooting
 
     # -- the branch
 
@@ -220,7 +218,7 @@ class _Tracer:
         yield here, ""
         count = 1
         while True:
-            curve = self.curve(shooting)
+            curve = shooting.curve()
             for point in self._until_failure(curve, here.point, step):
                 if isinstance(point, str):
                     yield here, point
@@ -241,7 +239,7 @@ class _Tracer:
                     yield known, f"most_points = {self.most} reached"
                     return
                 step, here = point.length - here.point.length, known
-                curve.tolerance = max(self.curve(shooting).tolerance, 0.01 * abs(known.cycle.trivial - 1))
+                curve.tolerance = max(shooting.curve().tolerance, 0.01 * abs(known.cycle.trivial - 1))
                 if self._too_long(known):
                     shooting, point = self._cut(shooting, point)
                     here = replace(known, point=point, shooting=shooting)
@@ -272,12 +270,12 @@ class _Tracer:
         if jacobian[0, 0] @ rates[0] <= 0:  # the block no longer speeds up where the cycle starts
             return "back at steady sliding, at another edge of stability"
         if abs(now.cycle.trivial - 1) > IMPRECISE:
-            if now.cycle.peak_velocity > LARGE * setting.drive[0] and not self.flow.reduction.model.inertial:
+            if now.cycle.peak_velocity > LARGE * setting.drive and not self.flow.reduction.model.inertial:
                 return ENDS["unbounded"]
             return "precision is lost; a smaller rtol may lead further"
         if now.cycle.growth > MOST_GROWTH:
             return ENDS["growth"]
-        if self.onset.kind == "degenerate" and now.cycle.peak_velocity > LARGE * setting.drive[0]:
+        if self.onset.kind == "degenerate" and now.cycle.peak_velocity > LARGE * setting.drive:
             return ENDS["unbounded"]
         longer = np.log(now.cycle.period / before.cycle.period)
         further = abs(now.cycle.value / before.cycle.value - 1)
@@ -332,7 +330,7 @@ class _Tracer:
         tangent = np.linalg.svd(jacobian)[2][-1]
         if tangent[[*range(self.flow.size), -2, -1]] @ direction < 0:
             tangent = -tangent
-        return self.curve(shooting).corrected(u, tangent, length)
+        return shooting.curve().corrected(u, tangent, length)
 
     # -- special points
 
@@ -358,7 +356,7 @@ class _Tracer:
         def measure(point: Point) -> float:
             return test(point, shooting)
 
-        curve = self.curve(shooting)
+        curve = shooting.curve()
         try:
             low, high = curve.located(before.point, now.point, measure, measure(before.point), measure(now.point))
         except Failure:
@@ -392,14 +390,14 @@ class _Tracer:
         tangent = np.append(vector * flow.scales / np.hypot(flow.scales, state), [0.0, 0.0])
         tangent /= np.linalg.norm(tangent)
         try:
-            first = self.curve(shooting).start(guess, tangent)
+            first = shooting.curve().start(guess, tangent)
         except Failure:
             return None
         return self.followed(shooting, first, size, doublings)
 
     def _state(self, cycle: Cycle) -> Array:
         """State variables at a cycle's start."""
-        return np.array(cycle._state)
+        return np.asarray(cycle._orbit[0][0])
 
     def at(self, low: Cycle, high: Cycle, value: float) -> Cycle:
         """The cycle at a value of the parameter between two neighbours: along the branch, then at the value itself."""
@@ -426,41 +424,12 @@ class _Tracer:
 
     def _known(self, shooting: Shooting, point: Point) -> _Known:
         """Everything about a cycle."""
-        orbit = shooting.orbit(point.u)
-        flow = self.flow
-        setting = flow.setting(orbit.value)
-        trivial, others = shooting.multipliers(point.u)
-        velocity, spring, normal = [], [], []
-        for state, share in zip(orbit.states, shooting.fractions, strict=True):
-            outcome = flow.watched(setting, state, share * orbit.period)
-            record = outcome.recorded
-            seen = flow.observed(setting, record[:, 0], record[:, 2:])
-            velocity.append(np.concatenate([outcome.log[:, 2], seen["v"]]))
-            normal.append(np.concatenate([outcome.log[:, 3], seen["normal_stress"]]))
-            spring.append(np.concatenate([outcome.log[:, 5], seen["spring_stress"]]))
-            if len(velocity) == 1:
-                names = [v.name for v in flow.reduction.model.variables]
-                start = {name: float(seen[name][0]) for name in names}
-                start["v"] = float(seen["v"][0])
-        v, t, sigma = (np.concatenate(part) for part in (velocity, spring, normal))
-        small = v.max() / v.min() - 1 < 1e-3
-        half = 0.5 * float((v.max() - v.min()) / v.mean()) if small else 0.5 * float(np.log(v.max() / v.min()))
-        cycle = Cycle(
-            value=orbit.value,
-            period=orbit.period,
-            peak_velocity=float(v.max()),
-            lowest_velocity=float(v.min()),
-            amplitude=half,
-            stress_drop=float(t.max() - t.min()),
-            lowest_normal_stress=float(sigma.min()),
-            highest_normal_stress=float(sigma.max()),
-            multipliers=tuple(complex(m) for m in others),
-            trivial=trivial,
-            stable=self._attracts(others, half),
-            start=start,
-            _state=tuple(float(x) for x in orbit.states[0]),
+        cycle, turns = measured(shooting, point.u)
+        if turns > 1:
+            raise Failure("a shorter cycle, run through several times")
+        return _Known(
+            point, shooting, replace(cycle, stable=self._attracts(np.array(cycle.multipliers), cycle.amplitude))
         )
-        return _Known(point, shooting, cycle)
 
     def _attracts(self, others: Array, amplitude: float) -> bool:
         """Whether all multipliers lie inside the unit circle; by the kind of onset where that is too close to tell."""

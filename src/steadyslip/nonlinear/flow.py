@@ -1,15 +1,18 @@
 """The motion over a given time as a smooth map of starting state and one parameter, with its derivative.
 
-Cycles are fixed points of this map. Inputs are steady: constant drive, no disturbance.
+Cycles are fixed points of this map. Inputs are constant: `Runs` takes them, and the rig, from prepared jobs, as they
+are; `Flow` leaves one parameter of a rig free, which is driven at its own velocity and not disturbed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from steadyslip.compiled.kernel import Choice
 from steadyslip.compiled.program import SETTINGS, Program, program
@@ -17,18 +20,19 @@ from steadyslip.compiled.reduction import TIME, V_LP, P, Q, Reduction
 from steadyslip.compiled.variational import with_sensitivities
 from steadyslip.errors import NotAvailable
 from steadyslip.expressions import array_function
-from steadyslip.motion.engine import Call, Outcome, run_tables
+from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
 from steadyslip.motion.observe import observe
-from steadyslip.motion.setup import METHODS, Options, automatic_method, initial_values, prepare
+from steadyslip.motion.setup import Jobs, Options, automatic_method, initial_values, prepare
 from steadyslip.motion.status import WORDS, remedy
 from steadyslip.nonlinear.continuation import Failure
-from steadyslip.protocol import Protocol, pack
+from steadyslip.protocol import Segments
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
 from steadyslip.values import Values, model_values
 
 Array = np.ndarray
 DONE = WORDS.index("done")
+NEVER = np.empty(0)
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
 
 
@@ -63,7 +67,9 @@ class Setting:
         The parameter, and the size of change that derivatives in it refer to.
     values : Values
         Of the model, arrays of one number.
-    sigma, drive : ndarray (1,)
+    sigma : ndarray (1,)
+    inputs : ndarray (3,)
+        Load-point velocity (m/s), disturbance and added normal stress (Pa).
     plain, varied : tuple of ndarray
         Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
     """
@@ -72,20 +78,25 @@ class Setting:
     unit: float
     values: Values
     sigma: Array
-    drive: Array
+    inputs: Array
     plain: tuple[Array, Array]
     varied: tuple[Array, Array]
 
+    @property
+    def drive(self) -> float:
+        """Velocity of the load point, m/s."""
+        return float(self.inputs[0])
 
-class Flow:
-    """Runs of a rig with one parameter left free.
+
+class Runs:
+    """Runs of one rig under constant inputs.
 
     Parameters
     ----------
-    rig : Slider
-    name : str
-        Full name of the free parameter.
-    branch : int
+    jobs : Jobs
+        Prepared, with one segment for each run.
+    which : int, optional
+        The run whose rig and inputs are meant.
     rtol : float, optional
         Error allowed per step; 1e-10 for explicit methods, 1e-9 for Rosenbrock methods unless given.
 
@@ -99,95 +110,53 @@ class Flow:
         Their natural sizes, at the rig's own parameter.
     time : float
         Natural time, s.
+
+    Raises
+    ------
+    NotAvailable
+        If the rig's motion is ill-posed, or pressed by a force prescribed in time.
     """
 
-    def __init__(self, rig: Slider, name: str, branch: int = 0, rtol: float | None = None) -> None:
-        self.rig, self.name, self.branch = rig, name, branch
-        address = rig.parameters()[name]
-        self.present = (name,) if address.role.structural else ()
-        self.domain = address.role.domain
-        self.options = Options(rtol=rtol or 1e-10, most_steps=1_000_000)
-        own = float(address.value)  # type: ignore[arg-type]
-        self.base = prepare(rig, None, 1.0, {name: np.array([own])}, {}, self.options, branch)
-        if not self.base.posed[0]:
+    def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None) -> None:
+        if not jobs.posed[which if len(jobs.posed) > 1 else 0]:
             raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
-        if self.base.values.model.imposed != 0:
+        if jobs.values.model.imposed != 0:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
-        self.reduction, self.size = self.base.reduction, len(self.base.reduction.state)
-        method = METHODS[self.options.method] or automatic_method(self.reduction)
+        self.reduction, self.size = jobs.reduction, len(jobs.reduction.state)
+        method = automatic_method(self.reduction)
         stiff = method != "tsit5"
-        if stiff and rtol is None:
-            self.options = replace(self.options, rtol=1e-9)
-            self.base = replace(self.base, options=self.options)
+        self.options = Options(rtol=rtol or (1e-9 if stiff else 1e-10), most_steps=1_000_000)
+        self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
-        self.machine = program(self.reduction.model, Choice(method), self.base.eliminate)
+        self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
         self.sensitive = _with_sensitivities(self.reduction, method)
-        self._settings: dict[float, Setting] = {}
-        row = self.setting(own).plain[1][0]
-        self.scales = row[-self.size :] / self.options.rtol
-        self.time = float(self.scales[0] / self.setting(own).drive[0])
+        arguments, sigma = jobs.part(which, which + 1)
+        own = replace(jobs.values, arguments=tuple(np.atleast_1d(a) for a in arguments), shape=(1,))
+        inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
+        self.own = self._set(own, np.atleast_1d(sigma), inputs)
+        self.scales = self.own.plain[1][0, -self.size :] / self.options.rtol
+        self.time = float(self.scales[0] / self.own.drive)
 
     # -- one rig
 
     def setting(self, value: float) -> Setting:
-        """The rig with the free parameter at a value.
+        """The rig as it is: there is no parameter."""
+        return self.own
 
-        Raises
-        ------
-        Failure
-            If the value is outside its domain, or steady sliding does not exist there.
-        """
-        if value not in self._settings:
-            if len(self._settings) > 64:
-                self._settings.clear()
-            self._settings[value] = self._made(value)
-        return self._settings[value]
-
-    def _made(self, value: float) -> Setting:
-        if not self.domain.contains(value):
-            raise Failure(f"{self.name} leaves its domain")
-        unit = abs(value) or 1.0
-        values = self._varied(np.array([value]))
-        sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
-        if not sigma[0] > 0:
-            raise Failure("lock-up or lift-off: steady sliding ceases to exist")
+    def _set(
+        self, values: Values, sigma: Array, inputs: Array, value: float = 0.0, unit: float = 1.0,
+        rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
+    ) -> Setting:  # fmt: skip
+        """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
         jobs = replace(self.base, values=values, sigma=sigma)
-        constants, _, settings, _ = jobs.tables(self.machine, 0, 1, True, True)
+        constants, _, settings, _ = jobs.tables(self.machine, self.which, self.which + 1, True, True)
         scales = settings[0, -self.size :]
         ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
         varied = np.concatenate([settings[0], ratio, scales])[None]
-        drive = np.atleast_1d(np.asarray(values.named()["drive.velocity"], dtype=float))
-        own = self.sensitive.constants(values.arguments, sigma)
-        return Setting(
-            value, unit, values, sigma, drive, (constants, settings), (self._with_rates(own, value, unit), varied)
-        )
-
-    def _with_rates(self, constants: Array, value: float, unit: float) -> Array:
-        """Constants and how fast they change with the parameter, per unit: central differences."""
-        beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
-        found = self.sensitive.constants(beside.arguments, steady_stress(beside))
-        if len(found) == 1:
-            found = np.repeat(found, 2, axis=0)
-        rates = (found[0] - found[1]) / (2 * DIFFERENCE)
-        drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
-        inputs = {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
-        return self.sensitive.text.constants.with_rates(constants, rates[None, None], inputs)
-
-    def _varied(self, around: Array) -> Values:
-        """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
-        if self.rig.axial_stiffness is None:
-            named = self.base.values.named() | {self.name: around}
-            return replace(self.base.values, arguments=tuple(named.values()))
-        return model_values(self.rig, {self.name: around}, self.present, self.branch)
-
-    def steady(self, value: float) -> Array:
-        """State in steady sliding."""
-        setting = self.setting(value)
-        continuous, _ = initial_values(self.reduction, setting.values, setting.sigma, {})
-        where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
-        guess = setting.plain[1][0, SETTINGS.index("guess")]
-        return np.array([where.get(symbol, guess) for symbol in self.reduction.state])
+        found = self.sensitive.constants(values.arguments, sigma)
+        varying = self.sensitive.text.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
+        return Setting(value, unit, values, sigma, inputs, (constants, settings), (varying, varied))
 
     # -- runs
 
@@ -205,7 +174,7 @@ class Flow:
         count, n = len(states), self.size
         initial = np.hstack([self._continuous(setting, states), self._unit(count)])
         settings = self._finer(setting.varied[1], amplitude)
-        final = self._advanced(self.sensitive, setting.varied[0], settings, initial, setting.drive, times)
+        final = self._advanced(self.sensitive, setting.varied[0], settings, initial, setting.inputs, times)
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return final[:, :n], matrix, final[:, n + n * n :]
 
@@ -224,14 +193,14 @@ class Flow:
     def _continuous(self, setting: Setting, states: Array) -> Array:
         with np.errstate(all="ignore"):
             found = _restored(self.reduction)(
-                *map(np.asarray, setting.values.arguments), setting.sigma, *states.T, setting.drive, 0.0, 0.0, 0.0
+                *map(np.asarray, setting.values.arguments), setting.sigma, *states.T, *setting.inputs, 0.0
             )
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
     def _advanced(
-        self, machine: Program, constants: Array, settings: Array, initial: Array, drive: Array, times: Array
+        self, machine: Program, constants: Array, settings: Array, initial: Array, inputs: Array, times: Array
     ) -> Array:
-        tables = (constants, np.ascontiguousarray(initial), settings, _segments(drive, times))
+        tables = (constants, np.ascontiguousarray(initial), settings, _rows(inputs, times))
         call = Call(machine, tables, len(times), np.empty(0))
         call.go(2**62)
         if np.any(call.status != DONE):
@@ -243,29 +212,125 @@ class Flow:
         count, n = len(states), self.size
         full = np.hstack([states, self._unit(count)])
         inputs = np.zeros((count, 7))
-        inputs[:, 0] = setting.drive
+        inputs[:, :3] = setting.inputs
         values = np.empty_like(full)
         own = np.zeros(count, dtype=np.int64)
         self.sensitive.module.field(*setting.varied, full, inputs, own, values)
         matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return values[:, :n], matrix, values[:, n + n * n :]
 
-    def watched(self, setting: Setting, state: Array, time: float) -> Outcome:
-        """One run with its events and steps."""
+    def watched(
+        self, setting: Setting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER
+    ) -> Outcome:
+        """One run with its events and steps, and samples at given times.
+
+        Raises
+        ------
+        FlowFailure
+            If it does not reach its end.
+        KeyboardInterrupt
+            If it was interrupted.
+        """
         initial = self._continuous(setting, state[None])
-        tables = (*setting.plain[:1], initial, setting.plain[1], _segments(setting.drive, np.array([time])))
-        return run_tables(self.machine, tables, np.empty(0))
+        settings = self._finer(setting.plain[1], amplitude)
+        settings[:, SETTINGS.index("watch")] = settings[:, SETTINGS.index("record")] = 1.0
+        tables = (*setting.plain[:1], initial, settings, _rows(setting.inputs, np.array([time])))
+        outcome = run_tables(self.machine, tables, times)
+        if outcome.status[0] == INTERRUPTED:
+            raise KeyboardInterrupt
+        if outcome.status[0] != DONE:
+            raise FlowFailure(WORDS[int(outcome.status[0])])
+        return outcome
 
     def observed(self, setting: Setting, times: Array, states: Array) -> dict[str, Array]:
         """All observables at given states."""
-        jobs = replace(self.base, values=setting.values, sigma=setting.sigma,
-                       segments=pack(Protocol.of(None), float(setting.drive[0]), float(times[-1]) or 1.0))  # fmt: skip
+        rows = _rows(setting.inputs, np.array([float(times[-1]) or 1.0]))[0]
+        waves = np.zeros((1, 1, 3, 0))
+        segments = Segments(
+            rows[None, :, 0], rows[None, :, 1], rows[None, :, 2], rows[None, :, 3:6], rows[None, :, 6:9],
+            waves, waves, waves,
+        )  # fmt: skip
+        jobs = replace(self.base, values=setting.values, sigma=setting.sigma, segments=segments)
         zero = np.zeros(len(times), dtype=int)
         return observe(jobs, self.machine, 0, zero, zero, times, states)
 
 
-def _segments(drive: Array, times: Array) -> Array:
+class Flow(Runs):
+    """Runs of a rig with one parameter left free.
+
+    Parameters
+    ----------
+    rig : Slider
+    name : str
+        Full name of the free parameter.
+    branch : int
+    rtol : float, optional
+        As for `Runs`.
+    """
+
+    def __init__(self, rig: Slider, name: str, branch: int = 0, rtol: float | None = None) -> None:
+        self.rig, self.name, self.branch = rig, name, branch
+        address = rig.parameters()[name]
+        self.present = (name,) if address.role.structural else ()
+        self.domain = address.role.domain
+        self._settings: dict[float, Setting] = {}
+        own = float(address.value)  # type: ignore[arg-type]
+        super().__init__(prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch), rtol=rtol)
+
+    def setting(self, value: float) -> Setting:
+        """The rig with the free parameter at a value.
+
+        Raises
+        ------
+        Failure
+            If the value is outside its domain, or steady sliding does not exist there.
+        """
+        if value not in self._settings:
+            if len(self._settings) > 64:
+                self._settings.clear()
+            self._settings[value] = self._made(value)
+        return self._settings[value]
+
+    def _made(self, value: float) -> Setting:
+        if not self.domain.contains(value):
+            raise Failure(f"{self.name} leaves its domain")
+        values = self._varied(np.array([value]))
+        sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
+        if not sigma[0] > 0:
+            raise Failure("lock-up or lift-off: steady sliding ceases to exist")
+        unit = abs(value) or 1.0
+        drive = np.ravel(values.named()["drive.velocity"])[0]
+        return self._set(values, sigma, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
+
+    def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
+        """How fast constants and inputs change with the parameter, per unit: central differences."""
+        beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
+        found = self.sensitive.constants(beside.arguments, steady_stress(beside))
+        if len(found) == 1:
+            found = np.repeat(found, 2, axis=0)
+        rates = (found[0] - found[1]) / (2 * DIFFERENCE)
+        drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
+        return rates[None, None], {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
+
+    def _varied(self, around: Array) -> Values:
+        """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
+        if self.rig.axial_stiffness is None:
+            named = self.base.values.named() | {self.name: around}
+            return replace(self.base.values, arguments=tuple(named.values()))
+        return model_values(self.rig, {self.name: around}, self.present, self.branch)
+
+    def steady(self, value: float) -> Array:
+        """State in steady sliding."""
+        setting = self.setting(value)
+        continuous, _ = initial_values(self.reduction, setting.values, setting.sigma, {})
+        where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
+        guess = setting.plain[1][0, SETTINGS.index("guess")]
+        return np.array([where.get(symbol, guess) for symbol in self.reduction.state])
+
+
+def _rows(inputs: Array, times: Array) -> Array:
+    """One segment of constant inputs for each run, as kernels read it."""
     rows = np.zeros((len(times), 1, 9))  # start, end, jump, values, slopes
     rows[:, 0, 1] = times
-    rows[:, 0, 3] = drive
+    rows[:, 0, 3:6] = inputs
     return rows

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.nonlinear.continuation import Failure
-from steadyslip.nonlinear.flow import Flow
+from steadyslip.nonlinear.continuation import Curve, Failure
+from steadyslip.nonlinear.flow import Runs
 
 Array = np.ndarray
 
@@ -32,7 +32,7 @@ class Shooting:
 
     Parameters
     ----------
-    flow : Flow
+    flow : Runs
     fractions : ndarray (K,)
         Share of the period that each segment takes; they add up to one.
     logarithmic : bool
@@ -41,11 +41,20 @@ class Shooting:
         Unit of the parameter otherwise.
     """
 
-    def __init__(self, flow: Flow, fractions: Array, logarithmic: bool, size: float) -> None:
+    def __init__(self, flow: Runs, fractions: Array, logarithmic: bool, size: float) -> None:
         self.flow, self.fractions = flow, fractions
         self.logarithmic, self.size = logarithmic, size
         self.amplitude = 1.0
         self._last: tuple[bytes, Array, Array] | None = None
+
+    def curve(self) -> Curve:
+        """The curve of these cycles, for continuation.
+
+        Its lengths and angles count the first state, period and parameter only: further segments are the same cycle.
+        """
+        weights = np.ones(self.segments * self.flow.size + 2)
+        weights[self.flow.size : -2] = 0.0
+        return Curve(self.equations, max(1e-9, 100 * self.flow.noise / self.amplitude), most_turn=0.8, weights=weights)
 
     @property
     def segments(self) -> int:
@@ -73,9 +82,11 @@ class Shooting:
         setting = flow.setting(orbit.value)
         times = self.fractions * orbit.period
         ends, sensitivity, slopes = flow.run(setting, orbit.states, times, self.amplitude)
-        rates, _, _ = flow.field(setting, ends)
-        start, gradient, across = flow.field(setting, orbit.states[:1])
-        drive, to_unknown = setting.drive[0], (orbit.value if self.logarithmic else self.size) / setting.unit
+        start, gradient, across = flow.field(setting, orbit.states)
+        rates = np.einsum(
+            "kij,kj->ki", sensitivity, start
+        )  # where mass is small, less noisy than the rates at the ends
+        drive, to_unknown = setting.drive, (orbit.value if self.logarithmic else self.size) / setting.unit
         residual = np.empty(count * n + 1)
         jacobian = np.zeros((count * n + 1, count * n + 2))
         stretch = self._stretch(orbit)
@@ -99,9 +110,9 @@ class Shooting:
 
     def multipliers(self, u: Array) -> tuple[float, Array]:
         """The trivial Floquet multiplier and the others, see `multipliers`."""
-        rates = [self.flow.field(self.flow.setting(self.orbit(u).value), y)[0] for y in (self.orbit(u).states,
-                 self._run(u)[0])]  # fmt: skip
-        return multipliers(self.sensitivities(u), *(rate / self.flow.scales for rate in rates))
+        orbit = self.orbit(u)
+        rates, _, _ = self.flow.field(self.flow.setting(orbit.value), orbit.states)
+        return multipliers(self.sensitivities(u), rates / self.flow.scales)
 
     def sensitivities(self, u: Array) -> Array:
         """∂(end)/∂(start) of every segment, in natural scales, (K, n, n)."""
@@ -117,8 +128,8 @@ class Shooting:
         return self._last[1:]
 
 
-def multipliers(sensitivities: Array, rates: Array, arrived: Array) -> tuple[float, Array]:
-    """Floquet multipliers from the sensitivities of consecutive segments, and the rates where each starts and ends.
+def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
+    """Floquet multipliers from the sensitivities of consecutive segments, and the rates where each starts.
 
     Returns
     -------
@@ -130,16 +141,20 @@ def multipliers(sensitivities: Array, rates: Array, arrived: Array) -> tuple[flo
     Notes
     -----
     Sensitivities carry the rates of one segment's start to those of the next. That direction is split off first, so
-    that another multiplier near one keeps its digits. Of what remains the block-cyclic matrix is formed, whose
+    that another multiplier near one keeps its digits. Where a cycle is very stable across (small mass), rounding in
+    the state is most of the rates, and rates carried along from the segment before are true; where it is unstable
+    they are worse. The multiplier tells which. Of what remains the block-cyclic matrix is formed, whose
     eigenvalues are the K-th roots of the multipliers: large and small ones keep their digits.
     """
     count, n, _ = sensitivities.shape
-    bases = [np.linalg.qr(rate[:, None], mode="complete")[0][:, 1:] for rate in rates]
-    trivial = 1.0
+    carried = np.roll(np.einsum("kij,kj->ki", sensitivities, rates), 1, axis=0)
+    trivial, along = min(
+        ((_carried_round(sensitivities, way), way) for way in (rates, carried)), key=lambda found: abs(found[0] - 1)
+    )
+    bases = [np.linalg.qr(way[:, None], mode="complete")[0][:, 1:] for way in along]
     cyclic = np.zeros((count * (n - 1), count * (n - 1)))
     for k in range(count):
         after = (k + 1) % count
-        trivial *= float(arrived[k] @ sensitivities[k] @ rates[k] / (arrived[k] @ arrived[k]))
         rows, columns = (slice(i * (n - 1), (i + 1) * (n - 1)) for i in (after, k))
         cyclic[rows, columns] = bases[after].T @ sensitivities[k] @ bases[k]
     if count == 1:
@@ -149,3 +164,10 @@ def multipliers(sensitivities: Array, rates: Array, arrived: Array) -> tuple[flo
         order = np.argsort(-np.abs(powers))
         found = np.array([np.mean(powers[order[i * count : (i + 1) * count]]) for i in range(n - 1)])
     return trivial, np.asarray(found[np.argsort(-np.abs(found))], dtype=complex)
+
+
+def _carried_round(sensitivities: Array, along: Array) -> float:
+    """By what factor one round multiplies the direction of motion."""
+    ends = np.einsum("kij,kj->ki", sensitivities, along)
+    starts = np.roll(along, -1, axis=0)
+    return float(np.prod(np.sum(starts * ends, axis=1) / np.sum(starts * starts, axis=1)))

@@ -1,12 +1,15 @@
 """Nothing that a person can type or hand over keeps the program busy for ever, is half read, or ends in a traceback."""
 
+import contextlib
 import math
+import os
 import time
 
+import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from steadyslip import Slider
+from steadyslip import Slider, read_record, read_rig
 from steadyslip.config import rig_from_text
 from steadyslip.config.lines import key_lines
 from steadyslip.config.toml import MOST_PARTS, NotToml, tables_of
@@ -201,3 +204,95 @@ def test_totals_without_an_area_are_told_of_it():
         with pytest.raises(ParameterError, match=rf"{name}.*add the contact's area to the rig file, \[slider\] area"):
             rig_from_text(RIG, changes=[f"{name}={total}"])
         rig_from_text(RIG, changes=[f"{name}={total}", "area=0.01 m^2"])
+
+
+# -- files
+
+
+@pytest.fixture(params=["pipe", "device", "huge", "folder", "missing", "null", "link to a device"])
+def no_file(request, tmp_path):
+    path = tmp_path / "input.txt"
+    if request.param == "pipe":
+        os.mkfifo(path)
+    elif request.param == "huge":
+        with open(path, "wb") as file:
+            file.truncate(10 * 2**30)
+    elif request.param == "folder":
+        path.mkdir()
+    elif request.param == "link to a device":
+        path.symlink_to("/dev/zero")
+    return {"device": "/dev/zero", "null": f"{path}\0"}.get(request.param, path)
+
+
+@pytest.mark.parametrize("ending", ["", ".h5", ".mat", ".parquet"])
+def test_what_is_no_regular_file_of_bounded_size_is_refused_at_once(no_file, ending):
+    path = str(no_file)
+    if ending and path.endswith(".txt"):
+        os.rename(path, path + ending) if os.path.lexists(path) else None
+        path += ending
+    begun = time.process_time()
+    for read in (read_rig, read_record):
+        with pytest.raises(SteadyslipError) as found:
+            read(path)
+        assert len(str(found.value)) < 400
+    assert time.process_time() - begun < 3  # with the import of pyarrow or h5py
+
+
+def test_texts_of_too_many_or_too_long_lines_are_refused(tmp_path):
+    path = tmp_path / "long.txt"
+    for text in ("1\n" * 2_100_000, "1 " * 200_000, "1\r" * 2_100_000):
+        path.write_text("time friction\n" + text)
+        with pytest.raises(SteadyslipError, match="HDF5 or Parquet"):
+            read_record(path)
+
+
+def test_hdf5_files_lead_nowhere_else(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path, other = tmp_path / "record.h5", tmp_path / "other.h5"
+    time_s = np.linspace(0.0, 10.0, 50)
+    with h5py.File(other, "w") as file:
+        file["secret"] = time_s
+    with h5py.File(path, "w") as file:
+        file["run/time"], file["run/friction"] = time_s, 0.6 + 0 * time_s
+        file["run/time"].attrs["units"] = "s"
+        file["run/again"] = file["run"]  # a circle
+        file["run/elsewhere"] = h5py.ExternalLink(str(other), "/")
+    assert len(read_record(path)) == 50
+    with h5py.File(path, "a") as file:
+        layout = h5py.VirtualLayout(shape=(50,), dtype="f8")
+        layout[:] = h5py.VirtualSource(str(other), "secret", shape=(50,))
+        file.create_virtual_dataset("run/normal", layout)
+    with pytest.raises(SteadyslipError, match="another file"):
+        read_record(path)
+    with h5py.File(path, "w") as file:
+        file.create_dataset("time", shape=(10**12,), chunks=(10**6,), dtype="f8", compression="gzip")
+    with pytest.raises(SteadyslipError, match="1000000000000 numbers"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("ending", [".h5", ".mat", ".parquet"])
+def test_damaged_records_are_one_message(tmp_path, ending):
+    path = tmp_path / f"record{ending}"
+    time_s = np.linspace(0.0, 10.0, 50)
+    if ending == ".h5":
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file["time"], file["friction"] = time_s, 0.6 + 0 * time_s
+    elif ending == ".mat":
+        from scipy.io import savemat
+
+        savemat(path, {"time": time_s, "friction": 0.6 + 0 * time_s}, do_compression=True)
+    else:
+        arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+        parquet.write_table(arrow.table({"time": time_s, "friction": 0.6 + 0 * time_s}), path)
+    whole = path.read_bytes()
+    random = np.random.default_rng(20261121)
+    for trial in range(60):
+        raw = bytearray(whole)
+        if trial % 3 == 0:
+            raw = raw[: random.integers(len(raw))]
+        else:
+            for place in random.integers(len(raw), size=1 + trial % 5):
+                raw[place] ^= 1 << random.integers(8)
+        path.write_bytes(bytes(raw))
+        with contextlib.suppress(SteadyslipError):
+            read_record(path)

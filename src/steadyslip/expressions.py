@@ -52,7 +52,8 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]  # SymPy's printers are unty
 def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Callable[..., list[Any]]:
     """A function of the arguments' values that returns the values of all expressions.
 
-    Common subexpressions are computed once; every argument may be a scalar or an array.
+    Common subexpressions are computed once; every argument may be a scalar or an array. What leaves the range of
+    floating point is inf or NaN, without a warning: Python's own floats would raise instead.
     """
     order = sorted(arguments, key=lambda symbol: symbol.name)
     names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(order)}
@@ -64,4 +65,10 @@ def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr
         printer=_Printer,
         cse=True,
     )
-    return function  # type: ignore[no-any-return]
+
+    def evaluate(*values: Any) -> list[Any]:
+        with np.errstate(all="ignore"):
+            found: list[Any] = function(*(np.float64(v) if isinstance(v, (int, float)) else v for v in values))
+        return found
+
+    return evaluate

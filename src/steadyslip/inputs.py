@@ -81,6 +81,22 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
     return content
 
 
+def check_file(path: str | PathLike[str], most: int) -> None:
+    """Refuse what `read_bytes` would, before another library opens it by its name.
+
+    Raises
+    ------
+    UnreadableFile
+    """
+    name = str(path)
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError) as error:
+        raise UnreadableFile(name, _reason(error)) from error
+    check_kind(name, found)
+    _check_size(name, found.st_size, most)
+
+
 def check_kind(name: str, found: os.stat_result) -> None:
     """Refuse what is not a regular file.
 
@@ -104,10 +120,10 @@ def _check_size(name: str, size: int, most: int) -> None:
         raise UnreadableFile(name, f"it has {_shown(size)}, more than the {_shown(most)} allowed")
 
 
-def _reason(error: OSError) -> str:
+def _reason(error: OSError | ValueError) -> str:
     if isinstance(error, FileNotFoundError):
         return "no such file"
-    return (error.strerror or str(error)).lower()
+    return (getattr(error, "strerror", None) or str(error)).lower()
 
 
 def _shown(size: int) -> str:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, fields
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from steadyslip.config.changes import apply
@@ -25,6 +24,7 @@ from steadyslip.config.layout import (
 from steadyslip.config.lines import key_lines, line_of
 from steadyslip.config.toml import NotToml, Table, tables_of
 from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, came, unknown_name
+from steadyslip.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.protocol import Protocol
 from steadyslip.quantities import numbers, parse
 from steadyslip.records import (
@@ -69,15 +69,11 @@ def text_of(path: str | PathLike[str]) -> str:
     """The text of a rig file."""
     name = str(path)
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise _failed(name, "no such file") from error
-    except IsADirectoryError as error:
-        raise _failed(name, "is a folder; give a rig file in TOML") from error
+        return read_bytes(path, MOST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise _failed(name, "is not UTF-8 text; a rig file is plain text in TOML") from error
-    except OSError as error:
-        raise _failed(name, f"cannot be read ({error.strerror or error})") from error
+    except UnreadableFile as error:
+        raise _failed(name, error.reason) from error
 
 
 def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:

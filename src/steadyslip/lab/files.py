@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.errors import NotAvailable, ParameterError, Problem, SteadyslipError
+from steadyslip.inputs import check_file, read_bytes
 
 Array = np.ndarray
 MISSING = {"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "nat", "#n/a", "-nan"}
 SHOWN = 8  # bad lines that a message lists
+MOST_TEXT, MOST_BINARY = 2**26, 2**31  # bytes of a file
+MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines of a text, characters of one
+MOST_VALUES = 2**26  # numbers of a file
+MOST_DATASETS = 10_000
+_BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 
 
 @dataclass
@@ -53,27 +60,25 @@ def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = Fa
     ParameterError
         If lines are damaged.
     """
-    if not path.exists():
-        raise NotAvailable(f"{str(path)!r}: no such file")
-    if path.is_dir():
-        raise NotAvailable(f"{str(path)!r} is a folder; give a file of columns")
-    reader = {
-        ".h5": _hdf5, ".hdf5": _hdf5, ".hdf": _hdf5, ".nc": _hdf5, ".mat": _matlab, ".parquet": _parquet,
-        ".pq": _parquet,
-    }.get(path.suffix.lower())  # fmt: skip
-    try:
-        if reader is not None:
-            return reader(path, table)
+    kind, reader = FORMATS.get(path.suffix.lower(), ("text", None))
+    if reader is None:
         return _text(path, skip_bad_lines)
-    except OSError as error:
-        raise NotAvailable(f"cannot read {str(path)!r}: {error.strerror or error}") from error
+    check_file(path, MOST_BINARY)
+    try:
+        return reader(path, table)
+    except SteadyslipError:
+        raise
+    except MemoryError as error:
+        raise NotAvailable(f"cannot read {str(path)!r}: it does not fit into memory") from error
+    except Exception as error:  # the readers of foreign formats raise whatever a damaged file brings about
+        raise NotAvailable(f"cannot read {str(path)!r} as {kind}: {type(error).__name__}: {error}") from error
 
 
 # -- text
 
 
 def _text(path: Path, skip_bad_lines: bool) -> Columns:
-    raw, notes = path.read_bytes(), []
+    raw, notes = read_bytes(path, MOST_TEXT), []
     if b"\0" in raw[:4096]:
         message = f"{str(path)!r} is not text; allowed endings of other formats: .h5, .hdf5, .mat, .parquet"
         raise NotAvailable(message)
@@ -82,6 +87,10 @@ def _text(path: Path, skip_bad_lines: bool) -> Columns:
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
         notes.append("the file is not UTF-8; read as Latin-1")
+    longest = max(map(len, text.splitlines()), default=0) if sum(map(text.count, _BREAKS)) <= MOST_LINES else None
+    if longest is None or longest > MOST_LINE:
+        which = f"lines of more than {MOST_LINE} characters" if longest else f"more than {MOST_LINES} lines"
+        raise NotAvailable(f"{str(path)!r} has {which}; give so large a record as HDF5 or Parquet, or thin it out")
     numbered = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
     comments = [(i, line.lstrip("#%; \t")) for i, line in numbered if line.lstrip()[:1] in ("#", "%")]
     rows = [(i, line) for i, line in numbered if line.lstrip()[:1] not in ("#", "%")]
@@ -246,16 +255,13 @@ def _hdf5(path: Path, table: str | None) -> Columns:
         import h5py
     except ImportError as error:
         raise _needs("h5py", path) from error
-    try:
-        with h5py.File(path, "r") as file:
-            group = file
-            if table is not None:
-                if table not in file:
-                    raise NotAvailable(f"{str(path)!r} has no group {table!r}; it has {', '.join(_groups(file))}")
-                group = file[table]
-            return _from_datasets(path, dict(_datasets(group, h5py)))
-    except OSError as error:
-        raise NotAvailable(f"cannot read {str(path)!r} as HDF5: {error}") from error
+    with h5py.File(path, "r") as file:
+        group = file
+        if table is not None:
+            if table not in file:
+                raise NotAvailable(f"{str(path)!r} has no group {table!r}; it has {', '.join(_groups(file))}")
+            group = file[table]
+        return _from_datasets(path, dict(_datasets(group, h5py)))
 
 
 def _groups(file: Any) -> list[str]:
@@ -265,20 +271,28 @@ def _groups(file: Any) -> list[str]:
 
 
 def _datasets(group: Any, h5py: Any) -> Iterator[tuple[str, tuple[Array, str | None]]]:
-    """Numeric arrays below a group, with their units; columns of compound tables too."""
+    """Numeric arrays below a group, with their units; columns of compound tables too. Nothing outside the file."""
+    items: dict[str, Any] = {}
     if isinstance(group, h5py.Dataset):
-        group = {group.name.rpartition("/")[2]: group}
-    for name, item in group.items():
-        if isinstance(item, h5py.Group):
-            yield from _datasets(item, h5py)
-            continue
+        items[group.name.rpartition("/")[2]] = group
+    else:  # each object once, however links go round; none behind a link to another file
+        group.visititems(items.__setitem__)
+    chosen = {name: item for name, item in items.items() if isinstance(item, h5py.Dataset)}
+    if len(chosen) > MOST_DATASETS:
+        raise NotAvailable(f"the file has {len(chosen)} datasets; allowed: up to {MOST_DATASETS}")
+    size = sum(item.size or 0 for item in chosen.values())
+    if size > MOST_VALUES:
+        raise NotAvailable(f"the file has {size} numbers; allowed: up to {MOST_VALUES}; name a group with table=")
+    for name, item in chosen.items():
+        if item.is_virtual or item.external:
+            raise NotAvailable(f"dataset {name!r} takes its numbers from another file; copy them into this one")
         raw = item.attrs.get("units", item.attrs.get("unit"))
         unit = raw.decode() if isinstance(raw, bytes) else None if raw is None else str(raw)
         if item.dtype.names:
             for column in item.dtype.names:
                 yield column, (np.asarray(item[column]), None)
         elif item.dtype.kind in "iuf":
-            yield str(name), (np.asarray(item[()]), unit)
+            yield name.rpartition("/")[2], (np.asarray(item[()]), unit)
 
 
 def _from_datasets(path: Path, found: dict[str, tuple[Array, str | None]]) -> Columns:
@@ -308,14 +322,15 @@ def _from_datasets(path: Path, found: dict[str, tuple[Array, str | None]]) -> Co
 
 
 def _matlab(path: Path, table: str | None) -> Columns:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     try:
+        size = sum(math.prod(shape) for _, shape, _ in whosmat(path))
+        if size > MOST_VALUES:
+            raise NotAvailable(f"{str(path)!r} has {size} numbers; allowed: up to {MOST_VALUES}")
         found = loadmat(path, squeeze_me=True, struct_as_record=True)
     except NotImplementedError:  # version 7.3 is HDF5
         return _hdf5(path, table)
-    except (ValueError, TypeError, KeyError) as error:
-        raise NotAvailable(f"cannot read {str(path)!r} as MATLAB file: {error}") from error
     content = {name: value for name, value in found.items() if not name.startswith("__")}
     if table is not None:
         if table not in content:
@@ -340,13 +355,22 @@ def _parquet(path: Path, table: str | None) -> Columns:
         raise _needs("pyarrow", path) from error
     if table is not None:
         raise NotAvailable(f"{str(path)!r}: a Parquet file has one table; leave table= away")
-    try:
-        content = parquet.read_table(path)
-    except (ValueError, OSError) as error:
-        raise NotAvailable(f"cannot read {str(path)!r} as Parquet: {error}") from error
+    about = parquet.ParquetFile(path).metadata
+    if about.num_rows * about.num_columns > MOST_VALUES:
+        size = about.num_rows * about.num_columns
+        raise NotAvailable(f"{str(path)!r} has {size} numbers; allowed: up to {MOST_VALUES}")
+    content = parquet.read_table(path)
     numeric: dict[str, tuple[Array, str | None]] = {}
     for name in content.column_names:
         column = content.column(name).to_numpy()
         if column.dtype.kind in "iuf":
             numeric[name] = (column, None)
     return _from_datasets(path, numeric)
+
+
+FORMATS: dict[str, tuple[str, Callable[[Path, str | None], Columns]]] = {
+    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".nc"), ("HDF5", _hdf5)),
+    ".mat": ("MATLAB file", _matlab),
+    **dict.fromkeys((".parquet", ".pq"), ("Parquet", _parquet)),
+}
+"""Readers by the ending of a name; everything else is text."""

@@ -11,7 +11,12 @@ Quantities are SI floats, stresses per unit nominal area; parameters have dotted
 package, and the command line's help, stay quick.
 """
 
+from importlib import import_module
+
 import lazy_loader
 
+from steadyslip import pictures
+
+pictures.figures_from(lambda: import_module("steadyslip.figures"))  # the one place that knows both
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __version__ = "0.1.0"

@@ -18,6 +18,7 @@ from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.nonlinear.onset import Onset, onset_at, parameter_along
+from steadyslip.pictures import draw
 from steadyslip.slider import Slider
 from steadyslip.steady import SteadySliding, steady_states
 from steadyslip.values import Values, axial_projection, model_values
@@ -109,9 +110,7 @@ class Analysis:
 
     def plot(self, ax: Any = None) -> Any:
         """Root locus in the stiffness; see `steadyslip.figures.root_locus`."""
-        from steadyslip import figures
-
-        return figures.root_locus(self.rig, ax=ax)
+        return draw(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units per unit area (with an area, forces as well), as ``--json`` prints it."""

@@ -1,10 +1,15 @@
-"""Figures: each takes a rig or a run and ``ax=None``, returns the Axes, labels with units and never shows.
+"""Figures: each takes a rig or a result and ``ax=None``, returns the Axes, labels with units and never shows.
 
-The only part of the package that imports matplotlib.
+The only part of the package that imports matplotlib. What ``result.plot()`` draws is registered below.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from steadyslip.analysis import Analysis
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.lab import corner, fit, prediction, record
@@ -13,6 +18,11 @@ from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
+from steadyslip.lab import Draws, Fit, Prediction, Record
+from steadyslip.motion import History
+from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
+from steadyslip.pictures import register_figures
+from steadyslip.sweep import MapResult, Refined, Sensitivity
 
 __all__ = [
     "ANGLES",
@@ -33,3 +43,21 @@ __all__ = [
     "stability_chart",
     "threshold_map",
 ]
+
+
+def _locus(found: Analysis, ax: Axes | None = None, **options: Any) -> Axes:
+    return root_locus(found.rig, ax, **options)
+
+
+register_figures(Analysis, locus=_locus)
+register_figures(History, history=history, phase=phase_plane)
+register_figures(CycleBranch, branch=cycle_branch)
+register_figures(HopfCurve, curve=hopf_curve)
+register_figures(Basin, basin=basin)
+register_figures(Record, record=record)
+register_figures(Fit, fit=fit, corner=corner)
+register_figures(Draws, corner=corner)
+register_figures(Prediction, prediction=prediction)
+register_figures(MapResult, map=map_figure)
+register_figures(Refined, refined=refined)
+register_figures(Sensitivity, sensitivity=sensitivity)

@@ -16,6 +16,7 @@ from steadyslip.lab.uncertainty import Draws, normal_draws
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.nonlinear.threshold import threshold_map
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
 from steadyslip.values import model_values
@@ -129,9 +130,7 @@ class Prediction:
         -------
         matplotlib.axes.Axes
         """
-        from steadyslip import figures
-
-        return figures.prediction(self, ax=ax)
+        return draw(self, ax=ax)
 
 
 def predict(

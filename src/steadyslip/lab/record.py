@@ -12,6 +12,7 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.lab.steps import Step, initial_rate, normal_steps, velocity_steps
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown
 from steadyslip.records import Parameter, checked_number, real
 
@@ -199,9 +200,7 @@ class Record:
         -------
         array of matplotlib.axes.Axes
         """
-        from steadyslip import figures
-
-        return figures.record(self, ax=ax)
+        return draw(self, ax=ax)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the columns as text, units in the header, in the form that `read_record` understands.

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.lab.comparison import Comparison
 from steadyslip.lab.identify import Combination
 from steadyslip.lab.noise import Noise
 from steadyslip.lab.plan import Plan
 from steadyslip.lab.unknowns import Space
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_error, shown_range
 from steadyslip.records import resolve
 from steadyslip.slider import Slider
@@ -305,9 +306,4 @@ class Fit:
         -------
         array of matplotlib.axes.Axes
         """
-        from steadyslip import figures
-
-        kinds: dict[str, Any] = {"fit": figures.fit, "corner": figures.corner}
-        if kind not in kinds:
-            raise NotAvailable(unknown_name("kind of plot", kind, kinds))
-        return kinds[kind](self, ax=ax)
+        return draw(self, kind, ax=ax)

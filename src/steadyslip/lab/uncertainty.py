@@ -10,6 +10,7 @@ import numpy as np
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.lab.least_squares import minimise
 from steadyslip.lab.result import Fit
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_error, shown_range
 
 Array = np.ndarray
@@ -65,9 +66,7 @@ class Draws:
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the parameters against each other."""
-        from steadyslip import figures
-
-        return figures.corner(self, ax=ax)
+        return draw(self, ax=ax)
 
 
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:

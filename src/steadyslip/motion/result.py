@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable, unknown_name
+from steadyslip.errors import unknown_name
 from steadyslip.motion.events import Event, SlipEvent, slip_events
 from steadyslip.motion.status import remedy
+from steadyslip.pictures import draw
 from steadyslip.protocol import Protocol
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
@@ -152,12 +153,7 @@ class History(Mapping[str, np.ndarray]):
         -------
         matplotlib.axes.Axes or array of them
         """
-        from steadyslip import figures
-
-        kinds: dict[str, Any] = {"history": figures.history, "phase": figures.phase_plane}
-        if kind not in kinds:
-            raise NotAvailable(unknown_name("kind of plot", kind, kinds))
-        return kinds[kind](self, ax=ax)
+        return draw(self, kind, ax=ax)
 
 
 def _plain(record: Any) -> dict[str, Any]:

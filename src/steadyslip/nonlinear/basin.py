@@ -23,6 +23,7 @@ from steadyslip.nonlinear.kicks import (
     leading_eigenvalue,
     outcomes_of,
 )
+from steadyslip.pictures import draw
 from steadyslip.progress import progress_bar
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_states
@@ -63,9 +64,7 @@ class Basin:
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the basin; see `steadyslip.figures.basin`."""
-        from steadyslip import figures
-
-        return figures.basin(self, ax=ax)
+        return draw(self, ax=ax)
 
 
 def basin(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.nonlinear.onset import Onset
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
 
@@ -175,9 +176,7 @@ class CycleBranch:
 
     def plot(self, kind: str = "branch", ax: Any = None) -> Any:
         """Draw the branch; see `steadyslip.figures.cycle_branch`."""
-        from steadyslip import figures
-
-        return figures.cycle_branch(self, ax=ax)
+        return draw(self, kind, ax=ax)
 
     def __str__(self) -> str:
         lines = [

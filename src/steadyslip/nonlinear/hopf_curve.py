@@ -19,6 +19,7 @@ from steadyslip.linear.search import Search
 from steadyslip.linear.stiffness import characteristic
 from steadyslip.nonlinear.continuation import Curve, Failure, Point, turned_round
 from steadyslip.nonlinear.onset import coefficients, kinds, parameter_along
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
 from steadyslip.values import Values, checked_array, model_values
@@ -87,9 +88,7 @@ class HopfCurve:
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the edge, coloured by the kind of onset; see `steadyslip.figures.hopf_curve`."""
-        from steadyslip import figures
-
-        return figures.hopf_curve(self, ax=ax)
+        return draw(self, ax=ax)
 
     def __str__(self) -> str:
         a, b = self.names

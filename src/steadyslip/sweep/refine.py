@@ -21,6 +21,7 @@ import numpy as np
 from steadyslip.config import protocol_from_text
 from steadyslip.config.layout import find_law
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown
 from steadyslip.sweep.axes import SAMPLE
 from steadyslip.sweep.measures import Measure
@@ -100,9 +101,7 @@ class Refined:
 
     def plot(self, ax: Any = None) -> Any:
         """Draw new points and edge; see `steadyslip.figures.refined`."""
-        from steadyslip import figures
-
-        return figures.refined(self, ax=ax)
+        return draw(self, ax=ax)
 
 
 def refine(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_range
 from steadyslip.slider import Slider
 from steadyslip.sweep import export
@@ -203,9 +204,7 @@ class MapResult:
 
     def plot(self, x: str | None = None, y: str | None = None, show: str | None = None, **options: Any) -> Any:
         """Draw it; see `steadyslip.figures.map_figure`."""
-        from steadyslip import figures
-
-        return figures.map_figure(self, x, y, show, **options)
+        return draw(self, x=x, y=y, show=show, **options)
 
 
 def _percent(share: float) -> str:

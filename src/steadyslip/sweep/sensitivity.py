@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.pictures import draw
 from steadyslip.slider import Slider
 from steadyslip.sweep.axes import Samples
 from steadyslip.sweep.plan import Map, evaluate
@@ -95,9 +96,7 @@ class Sensitivity:
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the shares as bars; see `steadyslip.figures.sensitivity`."""
-        from steadyslip import figures
-
-        return figures.sensitivity(self, ax=ax)
+        return draw(self, ax=ax)
 
 
 def sensitivity(

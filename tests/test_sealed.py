@@ -39,9 +39,13 @@ def test_every_length_counts():
 @pytest.mark.parametrize(
     ("kind", "of", "message"),
     [
-        (Kind("fit", 2, 1000, "fit again"), "", "'x' holds a fit, not a run; simulate again"),
-        (Kind("run", 3, 1000, ""), "", "'x' is a run in version 3 of the layout, this program reads version 2; simul"),
-        (RUN, "that", "'x' is a run of something else; simulate again"),
+        (
+            Kind("fit", 2, 1000, "fit again"),
+            "",
+            "it holds a fit and is not a steadyslip run; simulate again",
+        ),
+        (Kind("run", 3, 1000, ""), "", "its layout has version 3, and this program reads version 2"),
+        (RUN, "that", "cannot read 'x': it is a run of something else; simulate again"),
     ],
 )
 def test_what_is_something_else_is_said(kind, of, message):

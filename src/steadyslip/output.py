@@ -1,4 +1,4 @@
-"""Files of results: which endings there are, refused before anything is computed; netCDF written whole and read."""
+"""Files of results: which endings there are, refused before anything is computed; files written whole."""
 
 from __future__ import annotations
 
@@ -90,20 +90,3 @@ def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
     """
     with whole_file(path) as temporary:
         dataset.to_netcdf(temporary, engine="netcdf4")
-
-
-def read_dataset(path: str | PathLike[str]) -> Any:
-    """Read a netCDF file into memory.
-
-    Raises
-    ------
-    NotAvailable
-        If it cannot be read.
-    """
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="netcdf4", decode_times=False) as file:
-            return file.load()
-    except (OSError, ValueError) as error:
-        raise NotAvailable(f"cannot read {str(path)!r}: {error}") from error

@@ -63,23 +63,25 @@ def unseal(raw: bytes, path: str | PathLike[str], kind: Kind, of: str = "") -> m
     NotAvailable
         If `raw` is not a sealed file of this kind and version, is of something else, or is not what was written.
     """
-    name = repr(str(path))
+
+    def refusal(reason: str) -> NotAvailable:
+        return NotAvailable(f"cannot read {str(path)!r}: {reason}; {kind.remedy}")
+
     found = _LINE.search(raw, max(0, len(raw) - _LONGEST))
     if found is None:
-        raise NotAvailable(
-            f"{name} is not a {kind.name} of this program, is damaged, or was written by an earlier version or changed "
-            f"by another program; {kind.remedy}"
+        raise refusal(
+            f"it is not a steadyslip {kind.name}, is damaged, or was written by an earlier version or changed by "
+            "another program"
         )
     content = memoryview(raw)
     if hashlib.sha256(content[: len(raw) - _DIGEST]).hexdigest().encode() != found[4]:
-        raise NotAvailable(f"{name} is damaged: its content is not what was written; {kind.remedy}")
+        raise refusal("it is damaged, its content is not what was written")
     if found[1] != kind.name.encode():
-        raise NotAvailable(f"{name} holds a {found[1].decode()}, not a {kind.name}; {kind.remedy}")
+        raise refusal(f"it holds a {found[1].decode()} and is not a steadyslip {kind.name}")
     if int(found[2]) != kind.version:
-        versions = f"version {int(found[2])} of the layout, this program reads version {kind.version}"
-        raise NotAvailable(f"{name} is a {kind.name} in {versions}; {kind.remedy}")
+        raise refusal(f"its layout has version {int(found[2])}, and this program reads version {kind.version}")
     if found[3] != _name(of).encode():
-        raise NotAvailable(f"{name} is a {kind.name} of something else; {kind.remedy}")
+        raise refusal(f"it is a {kind.name} of something else")
     return content[: found.start()]
 
 

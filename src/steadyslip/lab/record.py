@@ -226,6 +226,31 @@ class Record:
 _OPTIONAL = ("normal", "shear", "displacement", "velocity")
 
 
+def whole_record(source: str, notes: tuple[str, ...], integrated: bool, **columns: Array | None) -> Record:
+    """A record from columns that were clean once.
+
+    Raises
+    ------
+    ParameterError
+        If they are not: times that do not rise, numbers that are not finite, too few of them.
+    """
+    present = {name: frozen(values) for name, values in columns.items() if values is not None}
+    time, normal = present["time"], present.get("normal")
+    problems = [Problem(name, "is not finite throughout") for name, a in present.items() if not np.all(np.isfinite(a))]
+    if len(time) < FEWEST_ROWS:
+        problems.append(Problem("time", f"has {len(time)} samples; a record needs {FEWEST_ROWS} or more"))
+    elif not np.all(np.diff(time) > 0):
+        problems.append(Problem("time", "does not rise throughout"))
+    if normal is not None and not np.all(normal > 0):
+        problems.append(Problem("normal", "is not > 0 throughout"))
+    if problems:
+        raise ParameterError(problems, title=source)
+    return Record(
+        **{name: present.get(name) for name in ("time", "friction", *_OPTIONAL)},  # type: ignore[arg-type]
+        source=source, notes=notes, integrated=integrated,
+    )  # fmt: skip
+
+
 def frozen(values: Any) -> Array:
     """A copy as floats that cannot be written to."""
     array = np.array(values, dtype=float)

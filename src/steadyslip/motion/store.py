@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable
+from steadyslip.compiled.methods import METHODS
+from steadyslip.compiled.program import LOG_KINDS
+from steadyslip.errors import NotAvailable, SteadyslipError
 from steadyslip.motion.events import Event
-from steadyslip.output import read_dataset, write_dataset
+from steadyslip.motion.observe import observable_units
+from steadyslip.motion.status import WORDS
+from steadyslip.sealed import Kind
+from steadyslip.tables import Column, Table, write_table
 
 if TYPE_CHECKING:
     from steadyslip.motion.result import History
 
-_EVENT_FIELDS = {"velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m"}
+RUN = Kind("run", 2, 2**29, "simulate again and save the run anew")
+MOST_EVENTS = 10**6
+_EVENT_UNITS = {
+    "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
+}  # fmt: skip
+_ATTRIBUTES = {
+    "rig": str, "status": str, "end": float, "method": str, "rtol": float, "steps": int, "rejected": int,
+    "steadyslip": str,
+}  # fmt: skip
 
 
 def to_dataset(history: History) -> Any:
@@ -30,7 +44,7 @@ def to_dataset(history: History) -> Any:
     events = history.events
     variables |= {
         f"event_{name}": ("event", np.array([getattr(e, name) for e in events], dtype=float), {"units": unit})
-        for name, unit in {"time": "s", **_EVENT_FIELDS}.items()
+        for name, unit in _EVENT_UNITS.items()
     }
     variables["event_kind"] = ("event", np.array([e.kind for e in events], dtype=object), {})
     attributes = {
@@ -52,48 +66,79 @@ def save(history: History, path: str | PathLike[str]) -> None:
     Raises
     ------
     NotAvailable
-        If the file cannot be written.
+        If the file cannot be written, or the run is too large for one.
     """
-    write_dataset(to_dataset(history), path)
+    if len(history.events) > MOST_EVENTS:
+        message = f"the run has {len(history.events)} events, a file holds up to {MOST_EVENTS}; simulate a shorter time"
+        raise NotAvailable(f"cannot write {str(path)!r}: {message}")
+    write_table(path, RUN, to_dataset(history))
 
 
 def load_history(path: str | PathLike[str]) -> History:
     """Read a history that `History.save` wrote.
 
+    Nothing in the file is executed; damage is found, whatever it is.
+
     Raises
     ------
     NotAvailable
-        If the file is not one of ours or cannot be read.
+        If the file is not one of ours, is damaged, or cannot be read.
     """
     from steadyslip.config import protocol_from_text, rig_from_text
+    from steadyslip.model import build_model
     from steadyslip.motion.result import History
     from steadyslip.protocol import Protocol
 
-    dataset = read_dataset(path)
-    if "rig" not in dataset.attrs or "time" not in dataset:
-        raise NotAvailable(f"{str(path)!r} is not a steadyslip history: it has no rig in it")
-    text = str(dataset.attrs["rig"])
-    data = {"t": dataset["time"].values}
-    units = {"t": "s"}
-    for name, variable in dataset.data_vars.items():
-        if variable.dims == ("time",):
-            data[str(name)] = variable.values
-            units[str(name)] = str(variable.attrs["units"])
-    columns = [dataset[f"event_{name}"].values for name in ("time", *_EVENT_FIELDS)]
-    kinds = [str(kind) for kind in dataset["event_kind"].values]
+    table = Table(path, RUN, _ATTRIBUTES)
+    attributes = table.attributes
+    _check_words(table)
+    try:
+        rig = rig_from_text(attributes["rig"], str(path))
+        protocol = protocol_from_text(attributes["rig"], str(path)) or Protocol()
+        units = {"t": "s"} | observable_units(build_model(rig))
+    except SteadyslipError as error:
+        raise table.fault(f"its rig is refused: {error}") from error
+    columns = {"time" if name == "t" else name: Column(("time",), unit) for name, unit in units.items()}
+    columns |= {f"event_{name}": Column(("event",), unit) for name, unit in _EVENT_UNITS.items()}
+    found = table.columns(columns | {"event_kind": Column(("event",), text=True)})
+    if table.sizes["event"] > MOST_EVENTS:
+        raise table.fault(f"it has {table.sizes['event']} events, allowed are {MOST_EVENTS}")
+    kinds = found["event_kind"]
+    if unknown := set(kinds) - set(LOG_KINDS[1:]):
+        raise table.fault(f"it has an event of unknown kind, {unknown.pop()!r:.40}")
+    moments = zip(*(found[f"event_{name}"].tolist() for name in _EVENT_UNITS), strict=True)
+    data = {name: found["time" if name == "t" else name] for name in units}
+    _check_samples(table, data)
     return History(
-        rig=rig_from_text(text, str(path)),
-        protocol=protocol_from_text(text, str(path)) or Protocol(),
+        rig=rig,
+        protocol=protocol,
         data=data,
         units=units,
-        events=tuple(Event(k, *(float(x) for x in row)) for k, *row in zip(kinds, *columns, strict=True)),
-        status=str(dataset.attrs["status"]),
-        end=float(dataset.attrs["end"]),
-        method=str(dataset.attrs["method"]),
-        rtol=float(dataset.attrs["rtol"]),
-        steps=int(dataset.attrs["steps"]),
-        rejected=int(dataset.attrs["rejected"]),
+        events=tuple(Event(kind, *row) for kind, row in zip(kinds, moments, strict=True)),
+        **{name: attributes[name] for name in ("status", "end", "method", "rtol", "steps", "rejected")},
     )
+
+
+def _check_words(table: Table) -> None:
+    attributes = table.attributes
+    known = {"status": WORDS, "method": tuple(METHODS)}
+    for name, words in known.items():
+        if attributes[name] not in words:
+            raise table.fault(f"{name} is {attributes[name]!r:.40}; allowed: {', '.join(words)}")
+    if not (math.isfinite(attributes["end"]) and 0 < attributes["rtol"] < 1):
+        raise table.fault(f"end is {attributes['end']!r} and rtol {attributes['rtol']!r}")
+    if attributes["steps"] < 0 or attributes["rejected"] < 0:
+        raise table.fault("it has a negative number of steps")
+
+
+def _check_samples(table: Table, data: dict[str, np.ndarray]) -> None:
+    """Times rise, and a run that is done has a number for everything."""
+    if not (np.all(np.isfinite(data["t"])) and np.all(np.diff(data["t"]) >= 0)):
+        raise table.fault("its times do not rise")
+    if table.attributes["status"] == "done":
+        for name, values in data.items():
+            if not np.all(np.isfinite(values)):
+                raise table.fault(f"it says that it is done, but {name} is not finite throughout")
 
 
 def to_csv(history: History, path: str | PathLike[str]) -> None:

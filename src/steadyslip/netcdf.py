@@ -1,0 +1,183 @@
+"""The classic netCDF format (CDF-1 and CDF-2), read as data: every size is checked before anything is made of it.
+
+The format is a list of dimensions, attributes and variables, then the numbers of each variable in one piece, all big
+endian (NetCDF Users Guide, appendix B). Record dimensions, which we do not write, are refused. Nothing that is read
+takes more room than the file itself.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+Array = np.ndarray
+T = TypeVar("T")
+_DIMENSIONS, _VARIABLES, _ATTRIBUTES = 10, 11, 12
+_TYPES = {1: "i1", 2: "S1", 3: ">i2", 4: ">i4", 5: ">f4", 6: ">f8"}
+_MOST = 100_000  # entries of all lists
+_LONGEST = 1000  # numbers of an attribute
+_DEEPEST = 32  # dimensions of a variable
+
+
+class FormatError(ValueError):
+    """The content is not what the format allows."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An array in a file.
+
+    Attributes
+    ----------
+    dims : tuple of str
+    shape : tuple of int
+    dtype : str
+        As NumPy has it, big endian; ``S1`` for text.
+    attributes : dict
+    """
+
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    dtype: str
+    attributes: dict[str, Any]
+    content: memoryview = field(repr=False)
+
+    def numbers(self) -> Array:
+        """A copy in the machine's own byte order."""
+        stored = np.frombuffer(self.content, self.dtype).reshape(self.shape)
+        return stored.astype(stored.dtype.newbyteorder("="))
+
+    def texts(self) -> list[str]:
+        """Rows of a table of characters."""
+        width = self.shape[1]
+        rows = (self.content[i * width : (i + 1) * width] for i in range(self.shape[0]))
+        return [_text(row) for row in rows]
+
+
+@dataclass(frozen=True)
+class File:
+    """What a file holds.
+
+    Attributes
+    ----------
+    dims : dict of str to int
+    attributes : dict
+        Text, numbers, or arrays of them.
+    variables : dict of str to Variable
+    """
+
+    dims: dict[str, int]
+    attributes: dict[str, Any]
+    variables: dict[str, Variable]
+
+
+def read(content: bytes | memoryview) -> File:
+    """Take a file apart.
+
+    Raises
+    ------
+    FormatError
+        If it is not a classic netCDF file without record dimensions.
+    """
+    return _Reader(memoryview(content)).file()
+
+
+class _Reader:
+    """Goes through a header from its beginning to its end."""
+
+    def __init__(self, content: memoryview) -> None:
+        self.content, self.place = content, 0
+        self.filled, self.listed = 0, 0  # so that what is named often is not read often
+
+    def file(self) -> File:
+        magic = bytes(self.take(4))
+        if magic not in (b"CDF\1", b"CDF\2"):
+            raise FormatError("is not a classic netCDF file")
+        self.offset = ">i" if magic == b"CDF\1" else ">q"
+        self.number()  # of records
+        dims = self.entries(_DIMENSIONS, self.dimension)
+        self.dims = list(dims.items())
+        attributes = self.entries(_ATTRIBUTES, self.attribute)
+        return File(dims, attributes, self.entries(_VARIABLES, self.variable))
+
+    def take(self, count: int) -> memoryview:
+        """The next bytes; what fills up to a multiple of four is passed over."""
+        end = self.place + count
+        if count < 0 or end > len(self.content):
+            raise FormatError("ends too early")
+        found = self.content[self.place : end]
+        self.place = end + -count % 4
+        return found
+
+    def number(self, form: str = ">i") -> int:
+        return int(struct.unpack(form, self.take(struct.calcsize(form)))[0])
+
+    def name(self) -> str:
+        return _text(self.take(self.number()))
+
+    def entries(self, tag: int, entry: Callable[[], T]) -> dict[str, T]:
+        """A list of named things."""
+        found: dict[str, T] = {}
+        kind, count = self.number(), self.number()
+        self.listed += count
+        if kind not in (tag, 0) or count < 0 or self.listed > _MOST or (kind == 0 and count):
+            raise FormatError("has a damaged list")
+        for _ in range(count):
+            name = self.name()
+            if name in found:
+                raise FormatError(f"has {name!r} twice")
+            found[name] = entry()
+        return found
+
+    def dimension(self) -> int:
+        length = self.number()
+        if length < 1:
+            raise FormatError("has a record dimension or a negative length")
+        return length
+
+    def attribute(self) -> Any:
+        kind, count = self.type(), self.number()
+        if kind != "S1" and count > _LONGEST:
+            raise FormatError(f"has an attribute of {count} numbers")
+        values = self.take(count * np.dtype(kind).itemsize)
+        if kind == "S1":
+            return _text(values)
+        numbers = np.frombuffer(values, kind)
+        return numbers.item() if count == 1 else numbers.tolist()
+
+    def type(self) -> str:
+        kind = self.number()
+        if kind not in _TYPES:
+            raise FormatError(f"has numbers of an unknown type, {kind}")
+        return _TYPES[kind]
+
+    def variable(self) -> Variable:
+        rank = self.number()
+        if not 0 <= rank <= _DEEPEST:
+            raise FormatError(f"has a variable of {rank} dimensions")
+        places = [self.number() for _ in range(rank)]
+        if any(not 0 <= place < len(self.dims) for place in places):
+            raise FormatError("has a variable over an unknown dimension")
+        own = [self.dims[place] for place in places]
+        attributes = self.entries(_ATTRIBUTES, self.attribute)
+        kind = self.type()
+        self.number()  # its size, which follows from the rest and may not fit here
+        begin = self.number(self.offset)
+        shape = tuple(length for _, length in own)
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        self.filled += size
+        if begin < 0 or begin + size > len(self.content) or self.filled > len(self.content):
+            raise FormatError(f"has too few bytes for a variable of shape {shape}")
+        return Variable(tuple(n for n, _ in own), shape, kind, attributes, self.content[begin : begin + size])
+
+
+def _text(content: memoryview) -> str:
+    try:
+        return bytes(content).rstrip(b"\0").decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise FormatError("has text that is not UTF-8") from error

@@ -154,3 +154,62 @@ def test_simulate_says_what_is_wrong(arguments, words):
     assert done.returncode == 2
     assert words in done.stderr
     assert "Traceback" not in done.stderr
+
+
+# -- whatever becomes of the answer, one message and a status that says what it was
+
+
+def shell(line: str, **options) -> subprocess.CompletedProcess[str]:
+    line = line.replace("steadyslip", f"{sys.executable} -m steadyslip")
+    return subprocess.run(["bash", "-c", line], capture_output=True, text=True, encoding="utf-8", **options)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("command", [f"analyze {EXAMPLE}", f"analyze {EXAMPLE} --json", "schema", "--help"])
+def test_an_answer_that_cannot_be_written_is_an_error(command):
+    done = shell(f"steadyslip {command} > /dev/full")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "No space left" in done.stderr
+
+
+def test_a_closed_pipe_is_no_error_message():
+    done = shell(f"steadyslip analyze {EXAMPLE} --json | true; exit ${{PIPESTATUS[0]}}")
+    assert (done.returncode, done.stderr) == (141, "")
+    assert shell(f"steadyslip analyze {EXAMPLE} >&-").stderr == ""
+
+
+def test_a_deleted_working_folder_is_said(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    done = shell(f"cd {gone}; rmdir {gone}; steadyslip map {EXAMPLE} -o map.zarr")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "working folder" in done.stderr
+
+
+def test_help_shows_brackets_as_they_are():
+    assert "[map]" in run("sensitivity", "--help").stdout
+
+
+def test_every_end_has_its_status(capsys, monkeypatch):
+    from steadyslip import cli, errors
+
+    def ends(error):
+        def command():
+            raise error
+
+        return cli._status(command)
+
+    monkeypatch.delenv("STEADYSLIP_DEBUG", raising=False)
+    assert ends(errors.NotAvailable("no such thing")) == 2
+    assert capsys.readouterr().err == "error: no such thing\n"
+    assert ends(KeyboardInterrupt()) == 130
+    assert ends(SystemExit(1)) == 1
+    assert ends(MemoryError()) == 2
+    assert "memory" in capsys.readouterr().err
+    assert ends(KeyError("over")) == 70
+    message = capsys.readouterr().err
+    assert "fault of steadyslip" in message
+    assert message.count("\n") == 1
+    monkeypatch.setenv("STEADYSLIP_DEBUG", "1")
+    with pytest.raises(KeyError):
+        ends(KeyError("over"))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,10 +16,21 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     help="Stability of frictional sliding: will it slide steadily, what would make it, how far is the edge.",
 )
 
 RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'")]
+
+
+def say(text: str) -> None:
+    """Print an answer; that it cannot be written is an error like any other."""
+    from steadyslip.output import answering
+
+    with answering():
+        typer.echo(text)
+
+
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),
@@ -29,7 +42,7 @@ def _start(version: Annotated[bool, typer.Option("--version", help="print the ve
     if version:
         from steadyslip import __version__
 
-        typer.echo(f"steadyslip {__version__}")
+        say(f"steadyslip {__version__}")
         raise typer.Exit
 
 
@@ -72,18 +85,18 @@ def analyze(
                 data["formula"] = None
         import json
 
-        typer.echo(json.dumps(data, indent=2, allow_nan=False))
+        say(json.dumps(data, indent=2, allow_nan=False))
     else:
         head, _, rest = str(result).partition("\n")
         colour = {True: typer.colors.GREEN, False: typer.colors.RED, None: typer.colors.YELLOW}[result.stable]
-        typer.secho(head, bold=True, fg=colour)
-        typer.echo(rest)
+        say(typer.style(head, bold=True, fg=colour))
+        say(rest)
         if formula:
             try:
                 equation = result.formula()
-                typer.echo(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
+                say(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
             except NotAvailable as reason:
-                typer.echo(f"\nNo formula: {reason}")
+                say(f"\nNo formula: {reason}")
     if require_stable and not result.stable:
         raise typer.Exit(1)
 
@@ -101,9 +114,9 @@ def _predicted(
     if as_json:
         import json
 
-        typer.echo(json.dumps(best.to_dict() | {"prediction": found.to_dict()}, indent=2, allow_nan=False))
+        say(json.dumps(best.to_dict() | {"prediction": found.to_dict()}, indent=2, allow_nan=False))
     else:
-        typer.echo(f"{found}\n\nWith the best values\n{best}")
+        say(f"{found}\n\nWith the best values\n{best}")
     if require_stable and not found.probability_stable >= 0.95:
         raise typer.Exit(1)
 
@@ -145,17 +158,17 @@ def fit(
         data = plain(found, comparison)
         if draws is not None:
             data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
-        typer.echo(json.dumps(data, indent=2, allow_nan=False))
+        say(json.dumps(data, indent=2, allow_nan=False))
         return
     for record in found.plan.records:
-        typer.echo(f"{record}\n")
+        say(f"{record}\n")
     if comparison is not None:
-        typer.echo(f"{comparison}\n")
-    typer.echo(str(found))
+        say(f"{comparison}\n")
+    say(str(found))
     if draws is not None:
-        typer.echo(f"\n{draws}")
+        say(f"\n{draws}")
     for path in output or ():
-        typer.echo(f"wrote {path}")
+        say(f"wrote {path}")
 
 
 @app.command()
@@ -194,11 +207,11 @@ def simulate(
     if as_json:
         import json
 
-        typer.echo(json.dumps(history.to_dict(), indent=2, allow_nan=False))
+        say(json.dumps(history.to_dict(), indent=2, allow_nan=False))
         return
-    typer.echo(history.summary())
+    say(history.summary())
     for path in output or ():
-        typer.echo(f"wrote {path}")
+        say(f"wrote {path}")
 
 
 @app.command()
@@ -292,13 +305,13 @@ def map_(
     if as_json:
         import json
 
-        typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        say(json.dumps(found.to_dict(), indent=2, allow_nan=False))
         return
-    typer.echo(str(found))
+    say(str(found))
     if edge is not None:
-        typer.echo(f"\n{edge}")
+        say(f"\n{edge}")
     for path in others:
-        typer.echo(f"wrote {path}")
+        say(f"wrote {path}")
 
 
 @app.command()
@@ -331,11 +344,11 @@ def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[
     if as_json:
         import json
 
-        typer.echo(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+        say(json.dumps(result.to_dict(), indent=2, allow_nan=False))
         return
-    typer.echo(str(result))
+    say(str(result))
     for path in output:
-        typer.echo(f"wrote {path}")
+        say(f"wrote {path}")
 
 
 @app.command()
@@ -346,9 +359,9 @@ def reproduce(
     from steadyslip.reproduce import paper_table, reproduce as run
 
     written = run(folder)
-    typer.echo(paper_table())
+    say(str(paper_table()))
     for path in written:
-        typer.echo(f"wrote {path}")
+        say(f"wrote {path}")
 
 
 @app.command()
@@ -358,21 +371,83 @@ def schema() -> None:
 
     from steadyslip.config import json_schema
 
-    typer.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
 
 
 def main() -> None:
-    """Entry point: bad input ends with one clear message and status 2, never a traceback."""
-    from steadyslip.errors import SteadyslipError
+    """Entry point: whatever comes, one clear message at most, and a status that says what it was.
 
+    0 answered, 1 answered but not stable (``--require-stable``), 2 no answer (the message says why), 70 a fault of
+    this program, 130 interrupted (what there is has been given), 141 nobody reads the answer any more.
+    """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
             stream.reconfigure(errors="replace")
+    sys.exit(_status(app))
+
+
+def _status(command: Callable[[], object]) -> int:
+    """Run, and turn everything that can happen into a status."""
+    from steadyslip.errors import SteadyslipError
+    from steadyslip.output import OutputClosed
+
+    status = 0
     try:
-        app()
+        command()
+    except SystemExit as left:
+        status = left.code if isinstance(left.code, int) else 0 if left.code is None else 2
+    except KeyboardInterrupt:
+        status = 130
+    except OutputClosed:
+        status = 141
     except SteadyslipError as error:
-        typer.secho(f"error: {error}", err=True, fg=typer.colors.RED if sys.stderr.isatty() else None)
-        sys.exit(2)
+        status = _failed(str(error), 2)
+    except MemoryError:
+        status = _failed("there is not enough memory for this; ask for fewer points, samples or runs", 2)
+    except OSError as error:
+        status = _failed(_system_fault(error), 2)
+    except Exception as error:
+        if "STEADYSLIP_DEBUG" in os.environ:
+            raise
+        what = f"{type(error).__name__}: {error}"[:300]
+        status = _failed(
+            f"a fault of steadyslip itself, please report it with the command and its files: {what} "
+            "(STEADYSLIP_DEBUG=1 shows where)",
+            70,
+        )
+    return _flushed(status)
+
+
+def _system_fault(error: OSError) -> str:
+    try:
+        os.getcwd()
+    except OSError:
+        return "the working folder does not exist any more; change to one that does"
+    where = f"{str(error.filename)!r}: " if error.filename else ""
+    return f"{where}{error.strerror or error}"
+
+
+def _failed(message: str, status: int) -> int:
+    with suppress(OSError):
+        typer.secho(f"error: {message}", err=True, fg=typer.colors.RED if sys.stderr and sys.stderr.isatty() else None)
+    return status
+
+
+def _flushed(status: int) -> int:
+    """What is left in the buffers must go out now: later nobody could say that it did not."""
+    from steadyslip.output import discard_output
+
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        status = 141
+    except (OSError, ValueError) as error:
+        status = _failed(f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}", 2)
+    else:
+        return status
+    discard_output()
+    return status
 
 
 if __name__ == "__main__":

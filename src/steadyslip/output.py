@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -13,6 +14,40 @@ from typing import Any
 from steadyslip.errors import NotAvailable
 
 FIGURES = (".png", ".svg", ".pdf")
+
+
+class OutputClosed(Exception):
+    """Nobody reads the standard output any more, as after ``| head``."""
+
+
+@contextmanager
+def answering() -> Iterator[None]:
+    """What is printed inside is out at the end.
+
+    Raises
+    ------
+    OutputClosed
+    NotAvailable
+        If the standard output cannot be written, as on a full disk.
+    """
+    try:
+        yield
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        discard_output()
+        raise OutputClosed from None
+    except OSError as error:
+        discard_output()
+        raise NotAvailable(f"cannot write to the standard output: {error.strerror or error}") from error
+
+
+def discard_output() -> None:
+    """Let what is still buffered go nowhere, so that nothing fails when Python ends."""
+    with suppress(OSError, ValueError, AttributeError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
 
 
 def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
@@ -26,7 +61,7 @@ def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
     for path in paths:
         if path.suffix.lower() not in allowed:
             raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are {', '.join(allowed)}")
-        if not path.absolute().parent.is_dir():
+        if not path.parent.is_dir():
             raise NotAvailable(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
 
 

@@ -105,6 +105,38 @@ class Part:
     many: bool = False
 
 
+@dataclass(frozen=True)
+class Condition:
+    """A relation that numbers of a record must obey together.
+
+    Attributes
+    ----------
+    name : str
+        Field that a message names.
+    holds : bool or ndarray of bool
+        Per rig, where the numbers are arrays.
+    message : str
+        What came and what is allowed, with places ``{}`` for `numbers`.
+    numbers : tuple of float or ndarray
+        On which the condition depends.
+    """
+
+    name: str
+    holds: Any
+    message: str
+    numbers: tuple[Any, ...] = ()
+
+    def problem(self, name: str = "") -> Problem | None:
+        """What is wrong, at the first position where it is; None if the condition holds."""
+        holds = np.asarray(self.holds)
+        if np.all(holds):
+            return None
+        arrays = np.broadcast_arrays(holds, *self.numbers)
+        where = tuple(int(i) for i in np.argwhere(~arrays[0])[0])
+        place = f" (at position {where})" if arrays[0].size > 1 else ""
+        return Problem(name or self.name, self.message.format(*(repr(float(a[where])) for a in arrays[1:])) + place)
+
+
 Role = Parameter | Option | Part | Samples
 _ROLE = "steadyslip"
 R = TypeVar("R", bound="Record")
@@ -190,11 +222,16 @@ class Record:
             except ParameterError as error:
                 problems += [p.under(item.name) for p in error.problems]
         problems = problems or list(self.inconsistencies())
+        problems = problems or [p for condition in self.conditions() if (p := condition.problem()) is not None]
         if problems:
             raise ParameterError(problems, title=type(self).__name__)
 
     def inconsistencies(self) -> Iterator[Problem]:
-        """Problems that involve several fields; called once each field is valid by itself."""
+        """Problems with which fields are given together; called once each field is valid by itself."""
+        yield from ()
+
+    def conditions(self) -> Iterator[Condition]:
+        """Relations between several numbers; valid for single numbers, and for arrays in a `twin`."""
         yield from ()
 
     def __repr__(self) -> str:
@@ -311,6 +348,21 @@ def parameters(record: Record, prefix: str = "") -> dict[str, Address]:
         elif isinstance(role, Part) and value is not None:
             found |= parameters(value, prefix if role.inline else f"{name}.")
     return found
+
+
+def conditions(record: Record, prefix: str = "") -> Iterator[tuple[str, Condition]]:
+    """Every condition below `record`, with the dotted name of the field that it is about."""
+    items = {item.name: item for item in fields(record)}  # type: ignore[arg-type]
+    for condition in record.conditions():
+        yield field_name(record, items[condition.name], prefix), condition
+    for item in items.values():
+        role, value = role_of(item), getattr(record, item.name)
+        name = field_name(record, item, prefix)
+        if isinstance(role, Part) and role.many:
+            for index, member in enumerate(value, start=1):
+                yield from conditions(member, f"{name}.{index}.")
+        elif isinstance(role, Part) and value is not None:
+            yield from conditions(value, prefix if role.inline else f"{name}.")
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:

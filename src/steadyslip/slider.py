@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from steadyslip.contact import ContactLaw
 from steadyslip.drive import Drive
 from steadyslip.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.friction import FrictionLaw
 from steadyslip.records import (
     Address,
+    Condition,
     Record,
     nonnegative,
     parameter,
@@ -54,13 +57,17 @@ class Slider(Record, section="slider"):
     def inconsistencies(self) -> Iterator[Problem]:
         if self.stiffness is not None and self.axial_stiffness is not None:
             yield Problem("axial_stiffness", "given beside stiffness; give one of the two")
-        if self.stiffness is None and self.axial_stiffness is None and not self.drive.proportional():
-            yield Problem("stiffness", "missing; give stiffness such as '9 GPa/m' (or a drive with gain kp > 0)")
         if self.axial_stiffness is not None and not self.contact.has_axis():
             yield Problem(
                 "axial_stiffness",
                 f"the contact {self.contact.name!r} has no axis at an angle; give stiffness instead",
             )
+
+    def conditions(self) -> Iterator[Condition]:
+        if self.stiffness is None and self.axial_stiffness is None:
+            message = "missing; give stiffness such as '9 GPa/m' (or a drive with gain kp > 0)"
+            gain = self.drive.proportional()
+            yield Condition("stiffness", np.asarray(gain) > 0, message, (gain,))
 
     def parameters(self) -> dict[str, Address]:
         """Every parameter of the rig by dotted name: declaration and present value."""

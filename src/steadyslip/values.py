@@ -14,7 +14,7 @@ from steadyslip.errors import ParameterError, Problem, QuantityError, UnknownNam
 from steadyslip.expressions import array_function
 from steadyslip.model import Model, build_model
 from steadyslip.quantities import parse
-from steadyslip.records import Parameter, twin
+from steadyslip.records import Parameter, Record, conditions, twin
 from steadyslip.slider import Slider
 
 Vary = Mapping[str, Any]
@@ -36,6 +36,8 @@ class Values:
         xarray.DataArray): ``wrap(array, name, unit, extra_dims)``.
     branch : int
         Which steady sliding is meant where there are several, by rising normal stress.
+    valid : bool or ndarray of bool
+        Where the values obey the conditions that several obey together; false somewhere only for a scan.
     """
 
     model: Model
@@ -43,6 +45,7 @@ class Values:
     shape: tuple[int, ...]
     wrap: Callable[..., Any]
     branch: int = 0
+    valid: Any = True
 
     @property
     def size(self) -> int:
@@ -63,7 +66,9 @@ class Values:
         return dict(zip(self.model.parameters, self.arguments, strict=True))
 
 
-def model_values(rig: Slider, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0) -> Values:
+def model_values(
+    rig: Slider, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False
+) -> Values:
     """The model of a rig and its parameters' values.
 
     Parameters
@@ -76,20 +81,47 @@ def model_values(rig: Slider, vary: Vary | None = None, present: Iterable[str] =
         Parameters that are zero but kept in the equations, as for `build_model`.
     branch : int, optional
         Which steady sliding is meant where there are several, by rising normal stress.
+    scan : bool, optional
+        Whether values are steps of a search, which goes beyond the conditions that numbers obey together (a rod
+        shorter than its crank): these are marked in `Values.valid` instead of refused.
 
     Raises
     ------
     ParameterError
-        If names are unknown, values are outside their domain, or shapes do not broadcast; all problems
-        are listed.
+        If names are unknown, values are outside their domain or break a condition with others, or shapes do not
+        broadcast; all problems are listed.
     """
     varied, wrap, shape = _varied(rig, vary or {})
+    valid = _checked_together(rig, varied, "", scan) if varied else True
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
     model = build_model(rig, present=[*structural, *present])
     values = {name: address.value for name, address in rig.parameters().items()} | varied
     if "slider.stiffness" not in varied:
         values["slider.stiffness"] = _sliding_stiffness(rig, values)
-    return Values(model, tuple(values[name] for name in model.parameters), shape, wrap, branch)
+    return Values(model, tuple(values[name] for name in model.parameters), shape, wrap, branch, valid)
+
+
+def check_together(record: Record, prefix: str, varied: Mapping[str, Any]) -> None:
+    """Refuse arrays of a record's numbers that break a condition which they obey together.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter, the first bad value and its position.
+    """
+    _checked_together(record, varied, prefix, scan=False)
+
+
+def _checked_together(record: Record, varied: Mapping[str, Any], prefix: str, scan: bool) -> Any:
+    """Where all conditions hold."""
+    found = list(conditions(twin(record, varied, prefix), prefix))
+    problems = [] if scan else [p for name, condition in found if (p := condition.problem(name)) is not None]
+    if problems:
+        raise ParameterError(problems)
+    valid: Any = True
+    for _, condition in found:
+        valid = valid & np.asarray(condition.holds)
+    return valid
 
 
 def _sliding_stiffness(rig: Slider, values: Mapping[str, Any]) -> Any:

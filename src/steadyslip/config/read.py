@@ -353,4 +353,9 @@ def _contradictions(law: type[Record], valid: Mapping[str, Any], given: set[str]
         else:
             value = item.default
         object.__setattr__(partial, item.name, value)
-    return list(partial.inconsistencies())
+    found = list(partial.inconsistencies())
+    for condition in partial.conditions():
+        problem = condition.problem()
+        if problem is not None and not any(math.isnan(number) for number in condition.numbers):
+            found.append(problem)
+    return found

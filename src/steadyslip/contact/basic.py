@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import sympy as sp
 
 from steadyslip.contact.law import Expression, Motion, PreloadedContact
-from steadyslip.errors import Problem
-from steadyslip.records import nonnegative, parameter, positive, real
+from steadyslip.records import Condition, nonnegative, parameter, positive, real
 
 
 class Constant(PreloadedContact, name="constant"):
@@ -25,13 +24,14 @@ class Prescribed(PreloadedContact, name="prescribed"):
     amplitude: float = parameter("Pa", nonnegative, "amplitude of the oscillation", default=0.0)
     period: float | None = parameter("s", positive, "period of the oscillation", default=None)
 
-    def inconsistencies(self) -> Iterator[Problem]:
-        yield from super().inconsistencies()
+    def conditions(self) -> Iterator[Condition]:
         mean = self.preload if self.preload is not None else self.steady_normal_stress
-        if self.amplitude and self.period is None:
-            yield Problem("period", "missing; amplitude needs a period, such as '10 s'")
-        if mean is not None and self.amplitude >= mean:
-            yield Problem("amplitude", f"got {self.amplitude!r}; allowed: less than the mean {mean!r} Pa")
+        if self.period is None:
+            message = "missing; amplitude needs a period, such as '10 s'"
+            yield Condition("period", self.amplitude == 0, message, (self.amplitude,))
+        if mean is not None:
+            message = "got {}; allowed: less than the mean {} Pa"
+            yield Condition("amplitude", self.amplitude < mean, message, (self.amplitude, mean))
 
     def imposed(self, time: Expression) -> Expression:
         if self.period is None:

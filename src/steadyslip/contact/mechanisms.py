@@ -13,7 +13,7 @@ import sympy as sp
 
 from steadyslip.contact.law import ContactLaw, Expression, Motion, PreloadedContact
 from steadyslip.errors import Problem
-from steadyslip.records import acute, angle, nonnegative, option, parameter, positive, real, turn
+from steadyslip.records import Condition, acute, angle, nonnegative, option, parameter, positive, real, turn
 from steadyslip.units import deg
 
 
@@ -52,12 +52,10 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
     rod_length: float = parameter("m", positive, "connecting-rod length, longer than the crank")
     stroke: str = option("pull", "push", doc="whether the rod pulls the slider or pushes it", default="pull")
 
-    def inconsistencies(self) -> Iterator[Problem]:
-        yield from super().inconsistencies()
-        if self.rod_length <= self.crank_radius:
-            yield Problem(
-                "rod_length", f"got {self.rod_length!r}; allowed: more than crank_radius {self.crank_radius!r}"
-            )
+    def conditions(self) -> Iterator[Condition]:
+        longer = self.rod_length > self.crank_radius
+        message = "got {}; allowed: more than crank_radius {}"
+        yield Condition("rod_length", longer, message, (self.rod_length, self.crank_radius))
 
     def _tangent(self) -> Expression:
         """tan ψ from the geometry."""

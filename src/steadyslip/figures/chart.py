@@ -66,7 +66,7 @@ def stability_chart(
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a whole number >= 2")])
 
     def status(a: Any, b: Any) -> Any:
-        return status_of(model_values(rig, {first.name: first.at(a), second.name: second.at(b)}))
+        return status_of(model_values(rig, {first.name: first.at(a), second.name: second.at(b)}, scan=True))
 
     ax = axes_or_new(ax)
 

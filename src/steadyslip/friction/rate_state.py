@@ -11,7 +11,7 @@ from steadyslip.expressions import asinh_exp
 from steadyslip.friction.evolution import Evolution, Nagata, Slip
 from steadyslip.friction.law import Expression, FrictionLaw
 from steadyslip.friction.normal_memory import LinkerDieterich, NoMemory, NormalMemory, PrakashClifton
-from steadyslip.records import Record, nonnegative, option, parameter, part, parts, positive, real
+from steadyslip.records import Condition, Record, nonnegative, option, parameter, part, parts, positive, real
 
 
 class State(Record):
@@ -62,8 +62,6 @@ class RateState(FrictionLaw, name="rate-state"):
             yield Problem("evolution", "nagata is defined for one state; use slip, aging or prz")
         if isinstance(self.normal_memory, PrakashClifton):
             yield Problem("normal_memory", "prakash-clifton is not defined with nagata; use none or linker-dieterich")
-        if self.b == 0:
-            yield Problem("b", "got 0; nagata divides by b, use aging instead")
 
     def _normal_memory_problems(self) -> Iterator[Problem]:
         memory = self.normal_memory
@@ -81,8 +79,14 @@ class RateState(FrictionLaw, name="rate-state"):
             yield Problem("normal_memory.alpha", "given beside the states' own alpha; their sum is α")
         if not given and memory.alpha is None:
             yield Problem("normal_memory.alpha", f"missing; allowed: {nonnegative.text}")
-        if self.states and not given and sum(state.b for state in self.states) == 0:
-            yield Problem("states", "Σb = 0 leaves no way to share α; give each state its own alpha")
+
+    def conditions(self) -> Iterator[Condition]:
+        if isinstance(self.evolution, Nagata):
+            yield Condition("b", self.b != 0, "got 0; nagata divides by b, use aging instead", (self.b,))
+        if isinstance(self.normal_memory, LinkerDieterich) and self.states and self.states[0].alpha is None:
+            total = sum(state.b for state in self.states)
+            message = "Σb = 0 leaves no way to share α; give each state its own alpha"
+            yield Condition("states", total != 0, message, (total,))
 
     # The parts of the law; each is valid for numbers and for symbols.
 

@@ -12,7 +12,7 @@ from steadyslip.errors import ParameterError, Problem
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.records import Parameter
 from steadyslip.slider import Slider
-from steadyslip.values import checked_array
+from steadyslip.values import checked_array, model_values
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,8 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, br
     full = rig.resolve(name)
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, between)
+    if limits is not None:
+        model_values(rig, {full: np.asarray(limits)}, present_zeros(rig), branch)  # refuses what breaks a condition
     return Search(rig, full, present_zeros(rig), branch).boundaries(limits)
 
 

@@ -6,8 +6,10 @@ may be zero (a rig without mass), rig by rig.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +17,25 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-quietly = np.errstate(all="ignore")  # overflow ends as inf or NaN, which every function here expects
+P = ParamSpec("P")
+R = TypeVar("R")
 _NEARLY_REAL = 1e-6  # relative imaginary part below which a root in β² is tried as a boundary
 _SAME = 1e-9  # relative distance below which two boundaries in k are one
+
+
+def quietly(function: Callable[P, R]) -> Callable[P, R]:
+    """Overflow ends as inf or NaN, which every function here expects.
+
+    A fresh `numpy.errstate` for every call: one instance that decorates functions which call each other, or run in
+    several threads, leaves NumPy's error state changed (before NumPy 2).
+    """
+
+    @wraps(function)
+    def inner(*args: P.args, **kwargs: P.kwargs) -> R:
+        with np.errstate(all="ignore"):
+            return function(*args, **kwargs)
+
+    return inner
 
 
 def degrees(c: Array) -> NDArray[np.int64]:

@@ -27,6 +27,7 @@ from steadyslip.values import Values, model_values
 _PER_DECADE = 40
 _DECADES = 6
 _LINEAR = 721
+_ROUNDING = 64  # units of the last place within which two conditions are one
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 
 
@@ -77,14 +78,16 @@ class Search:
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
 
     def values(self, x: Any) -> Values:
-        return model_values(self.rig, {self.name: x}, self.present, self.branch)
+        return model_values(self.rig, {self.name: x}, self.present, self.branch, scan=True)
 
     # -- the range
 
     def grid(self, between: tuple[float, float] | None) -> Any:
-        """Sample values, rising; the rig's own value is one of them."""
-        if between is not None:
-            return self._grid_between(*between)
+        """Sample values of rigs that can be built, rising; the rig's own value is one of them."""
+        samples = self._whole_grid() if between is None else self._grid_between(*between)
+        return samples[np.broadcast_to(self.values(samples).valid, samples.shape)]
+
+    def _whole_grid(self) -> Any:
         domain = self.role.domain
         if np.isfinite(domain.high):
             inset = 1e-9 * (domain.high - domain.low)
@@ -184,11 +187,25 @@ class Search:
         return low, high
 
     def _described(self, low: float, high: float) -> Boundary:
+        low, high = self._past_rounding(low, high)
         below, above = (int(s) for s in self.status(np.array([low, high])))
         kind, frequency = self._kind(low, high, below, above)
         stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
         middle = low + 0.5 * (high - low)
         return Boundary(self.name, float(middle), (float(low), float(high)), kind, frequency, stable, self.role.unit)
+
+    def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
+        """A wider bracket where steady sliding ends within rounding of the edge.
+
+        The static stiffness vanishes there too, so that rounding alone decides which of the two is met first.
+        """
+        reach = _ROUNDING * max(np.spacing(abs(low)), np.spacing(abs(high)))
+        wide = np.array([low - reach, high + reach])
+        if not np.all(self.role.domain.contains(wide)):
+            return low, high
+        status = self.status(wide)
+        absent = np.any(status == ABSENT) and not np.all(status == ABSENT) and not np.any(status == UNKNOWN)
+        return (float(wide[0]), float(wide[1])) if absent else (low, high)
 
     def _kind(self, low: float, high: float, below: int, above: int) -> tuple[str, float]:
         if ABSENT in (below, above):

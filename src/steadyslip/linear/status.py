@@ -15,10 +15,11 @@ ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
 
 
 def status(values: Values) -> Any:
-    """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed included) or UNKNOWN (beyond floating point)."""
+    """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed too) or UNKNOWN (out of floating point, or no rig)."""
     with np.errstate(all="ignore"):
         exists = np.isfinite(steady_stress(values))
         c = characteristic(values)
         verdict = np.where(is_hurwitz(c), STABLE, UNSTABLE)
         known = np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN)
-        return np.where(exists, known, np.where(out_of_range(values), UNKNOWN, ABSENT))
+        found = np.where(exists, known, np.where(out_of_range(values), UNKNOWN, ABSENT))
+        return np.where(values.valid, found, UNKNOWN)

@@ -20,7 +20,7 @@ from steadyslip.protocol import Protocol, Segments, pack
 from steadyslip.records import parameters, twin
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
-from steadyslip.values import Values, model_values
+from steadyslip.values import Values, check_together, model_values
 
 METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4", "tsit5": "tsit5", "rodas4": "rodas4",
            "rodas5p": "rodas5p"}  # fmt: skip
@@ -192,7 +192,9 @@ def prepare(
     plan = Protocol.of(protocol)
     own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
     changed = _protocol_values(plan, {name: value for name, value in vary.items() if name not in own})
-    plan = twin(plan, changed, "protocol.") if changed else plan
+    if changed:
+        check_together(plan, "protocol.", changed)
+        plan = twin(plan, changed, "protocol.")
     values = model_values(rig, own, branch=branch)
     _refuse_singular(rig, values)
     final = plan.until if until is None else until

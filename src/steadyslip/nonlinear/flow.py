@@ -317,7 +317,7 @@ class Flow(Runs):
         if self.rig.axial_stiffness is None:
             named = self.base.values.named() | {self.name: around}
             return replace(self.base.values, arguments=tuple(named.values()))
-        return model_values(self.rig, {self.name: around}, self.present, self.branch)
+        return model_values(self.rig, {self.name: around}, self.present, self.branch, scan=True)
 
     def steady(self, value: float) -> Array:
         """State in steady sliding."""

@@ -214,7 +214,11 @@ class _Plane:
         for column, role in zip((first, second), self.roles, strict=True):
             if not np.all(role.domain.contains(column)):
                 raise Failure("outside the domain")
-        return model_values(self.rig, dict(zip(self.names, (first, second), strict=True)), self.present, self.branch)
+        both = dict(zip(self.names, (first, second), strict=True))
+        found = model_values(self.rig, both, self.present, self.branch, scan=True)
+        if not np.all(found.valid):
+            raise Failure("outside the domain")
+        return found
 
     def _polynomials(self, u: Array) -> tuple[Array, Array]:
         """P(iβ) and the sum of the sizes of its terms."""

@@ -191,7 +191,7 @@ def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
 
 def _flat(rig: Slider, name: str, at: Any, branch: int) -> Values:
     present = (name,) if rig.parameters()[name].role.structural else ()
-    return model_values(rig, {name: np.asarray(at, dtype=float)}, present, branch)
+    return model_values(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
 
 
 def _growth_slope(rig: Slider, name: str, edge: Boundary, branch: int) -> float:

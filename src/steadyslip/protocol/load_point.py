@@ -11,7 +11,7 @@ from steadyslip.errors import ParameterError, Problem
 from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
 from steadyslip.protocol.protocol import Piece
 from steadyslip.protocol.shapes import Harmonic, table_problems
-from steadyslip.records import count, nonnegative, parameter, positive, real, samples
+from steadyslip.records import Condition, count, nonnegative, parameter, positive, real, samples
 
 
 class VelocityStep(Piece, name="velocity-step"):
@@ -54,9 +54,10 @@ class SlideHoldSlide(Piece, name="slide-hold-slide"):
     slide: float = parameter("s", positive, "time of sliding between holds")
     repeats: float = parameter("1", count, "number of holds")
 
-    def inconsistencies(self) -> Iterator[Problem]:
-        if self.repeats >= 1 and np.isinf(self._times()[0, -1]):
-            yield Problem("factor", f"got {self.factor!r}; the holds grow out of the range of floating point")
+    def conditions(self) -> Iterator[Condition]:
+        message = "got {}; the holds grow out of the range of floating point"
+        if np.all(np.asarray(self.repeats) >= 1):
+            yield Condition("factor", np.isfinite(self._times()[:, -1]), message, (self.factor,))
 
     def curve(self, before: Any) -> Curve:
         times = self._times()

@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.errors import Problem
 from steadyslip.protocol.curves import Curve, Wave, column, knots
 from steadyslip.protocol.protocol import Piece
-from steadyslip.records import nonnegative, parameter, positive, real, samples
+from steadyslip.records import Condition, nonnegative, parameter, positive, real, samples
 
 
 class StressStep(Piece):
@@ -55,11 +55,13 @@ class Harmonic(Piece):
     until: float | None = parameter("s", positive, "end; without it the wave goes on", default=None)
     phase: float = parameter("rad", real, "phase at the start", default=0.0)
 
-    def inconsistencies(self) -> Iterator[Problem]:
-        if self.until is not None and self.until <= self.at:
-            yield Problem("until", f"got {self.until!r}; allowed: a time after the start at = {self.at!r} s")
-        if math.isinf(2 * math.pi / self.period):
-            yield Problem("period", f"got {self.period!r}; it is too short for floating point")
+    def conditions(self) -> Iterator[Condition]:
+        if self.until is not None:
+            message = "got {}; allowed: a time after the start at = {} s"
+            yield Condition("until", self.until > self.at, message, (self.until, self.at))
+        with np.errstate(over="ignore"):
+            finite = np.isfinite(2 * math.pi / np.asarray(self.period))
+        yield Condition("period", finite, "got {}; it is too short for floating point", (self.period,))
 
     def wave(self) -> Wave:
         return Wave(

@@ -147,6 +147,19 @@ class Map:
             except ParameterError as error:
                 problems += (p.under("map.over") for p in error.problems)
         self._set("axes", tuple(axes))
+        if not problems:
+            problems += (p.under("map.over") for p in self._allowed_together())
+
+    def _allowed_together(self) -> tuple[Problem, ...]:
+        """What is wrong with the corners of the map, where several axes meet."""
+        known = self.rig.parameters()
+        axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
+        corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
+        try:
+            model_values(self.rig, {a.name: ends for a, ends in zip(axes, corners, strict=True)})
+        except ParameterError as error:
+            return error.problems
+        return ()
 
     def known(self) -> dict[str, Address]:
         """All parameters that may vary, by full name."""
@@ -178,7 +191,7 @@ class Map:
         if any(one.moves for one in self.compute) and role.adds_state:
             return ()  # simulated regime by regime
         try:
-            model_values(self.rig, {name: np.asarray(values, dtype=float)})
+            model_values(self.rig, {name: np.asarray(values, dtype=float)}, scan=True)
         except ParameterError as error:
             return error.problems
         except SteadyslipError as error:

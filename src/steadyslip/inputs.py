@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from os import PathLike
+from pathlib import Path
 
 from steadyslip.errors import NotAvailable
 
@@ -95,6 +96,24 @@ def check_file(path: str | PathLike[str], most: int) -> None:
         raise UnreadableFile(name, _reason(error)) from error
     check_kind(name, found)
     _check_size(name, found.st_size, most)
+
+
+def inside(root: Path, key: str) -> Path:
+    """The file below a folder that `key`, names joined by ``/``, says; it need not be there.
+
+    Raises
+    ------
+    UnreadableFile
+        If that leads out of the folder, or through a symbolic link.
+    """
+    path = root
+    for part in key.split("/"):
+        path = path / part
+        if part in ("", ".", "..") or "\0" in part:
+            raise UnreadableFile(str(path), "no file has this name")
+        if path.is_symlink():
+            raise UnreadableFile(str(path), "it is a link, which may lead anywhere; remove it")
+    return path
 
 
 def check_kind(name: str, found: os.stat_result) -> None:

@@ -12,9 +12,11 @@ signature, so what is inside is checked as well.
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from dataclasses import dataclass
 from os import PathLike
+from typing import Any
 
 from steadyslip.errors import NotAvailable
 from steadyslip.inputs import read_bytes
@@ -110,6 +112,11 @@ def read_sealed(path: str | PathLike[str], kind: Kind, of: str = "", *, private:
         If it cannot be read, and as `unseal`.
     """
     return unseal(read_bytes(path, kind.most, private=private), path, kind, of)
+
+
+def fingerprint(data: Any) -> str:
+    """A checksum of plain data as JSON, whatever the order of names and however it is laid out."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def _name(of: str) -> str:

@@ -27,6 +27,7 @@ LARGEST_CHUNK = 2**20  # points; bounds the memory of a worker
 LEAST_CHUNKS = 32  # so that all workers have something to do until the end
 SHORT = 0.2  # seconds; chunks are not made shorter than this to have more of them
 MOST_AXIS = 10**7  # values along one axis, which is kept in memory
+MOST_CHUNKS = 2 * 10**6  # each is a few files
 
 AnyMeasure = Measure | FunctionMeasure
 
@@ -246,7 +247,8 @@ class Map:
         """Points that take about half a second."""
         seconds = self.seconds
         points = min(SECONDS / seconds, LARGEST_CHUNK)
-        return max(1, int(max(min(points, self.size / LEAST_CHUNKS), min(points, SHORT / seconds))))
+        least = -(-2 * self.size // MOST_CHUNKS)  # the last chunk of a row may be a small one
+        return max(1, int(max(min(points, self.size / LEAST_CHUNKS), min(points, SHORT / seconds))), least)
 
     def probes(self) -> dict[str, Any]:
         """Parameters at some points of the map, always the same."""

@@ -88,13 +88,19 @@ class MapResult:
         import xarray as xr
 
         try:
-            return xr.open_zarr(self.path, chunks=None, consolidated=True, decode_times=False, mask_and_scale=False)
+            return xr.open_zarr(
+                self._store.folder.with_read_only(True),
+                chunks=None,
+                consolidated=True,
+                decode_times=False,
+                mask_and_scale=False,
+            )
         except (ValueError, RuntimeError, OSError) as error:  # coordinates are read at once
             raise self._store.damage("coordinates", error) from error
 
     def words(self, name: str) -> tuple[str, ...]:
         """What the numbers 0, 1, ... of an array of kinds stand for; empty for other arrays."""
-        meanings = str(self._store.array(self._known(name)).attrs.get("flag_meanings", ""))
+        meanings = str(self._store.layout.arrays[self._known(name)].attributes.get("flag_meanings", ""))
         return tuple(word.replace("_", " ") for word in meanings.split()[1:])
 
     def _known(self, name: str) -> str:
@@ -106,7 +112,7 @@ class MapResult:
         """SI unit of a result or parameter."""
         if name not in (*self.results, *self.parameters):
             raise ParameterError([Problem("name", unknown_name("array", name, (*self.results, *self.parameters)))])
-        return str(self._store.array(name).attrs["units"])
+        return str(self._store.layout.arrays[name].attributes["units"])
 
     def statistics(self) -> dict[str, dict[str, float]]:
         """What the finished chunks hold: shares of kinds; of numbers the least, the greatest and how many exist."""
@@ -132,12 +138,20 @@ class MapResult:
         return found
 
     def _blocks(self, name: str) -> Iterator[np.ndarray]:
-        """A result in pieces of many chunks; what is not computed is fill value."""
-        first = self._store.chunks[0]
-        row = self.size // self.shape[0]
-        step = first * max(1, BLOCK // (first * row))
-        for start in range(0, self.shape[0], step):
-            yield self.read(name, slice(start, start + step))
+        """A result in pieces of many chunks; those of which nothing is computed are left out."""
+        store = self._store
+        marks = store.marks_of_grid() != 0
+        extra = int(np.prod(store.layout.arrays[name].shape[len(self.dims) :], dtype=int))
+        rest = [int(np.prod(self.shape[axis + 1 :], dtype=int)) * extra for axis in range(len(self.dims))]
+        axis = next(i for i, n in enumerate(rest) if n * store.chunks[i] <= BLOCK or i + 1 == len(rest))
+        several = max(1, BLOCK // (store.chunks[axis] * rest[axis]))  # chunks along that axis
+        for outer in np.argwhere(marks.any(axis=tuple(range(axis, marks.ndim)))):
+            before = tuple(slice(int(i) * c, (int(i) + 1) * c) for i, c in zip(outer, store.chunks, strict=False))
+            own = marks[tuple(outer)]
+            for start in range(0, own.shape[0], several):
+                if own[start : start + several].any():
+                    along = slice(start * store.chunks[axis], (start + several) * store.chunks[axis])
+                    yield self.read(name, (*before, along))
 
     def read(self, name: str, region: Any = ...) -> np.ndarray:
         """Values of a result or parameter.
@@ -151,7 +165,7 @@ class MapResult:
 
     def __str__(self) -> str:
         done, count = self.finished
-        lines = [str(self._store.group.attrs["title"])]
+        lines = [self._store.layout.title]
         state = "complete" if done == count else f"{done} of {count} chunks; run it again for the rest"
         lines.append(f"  {'in ' + str(self.path):<24}{state}")
         for name, found in self.statistics().items():
@@ -168,7 +182,7 @@ class MapResult:
 
     def __repr__(self) -> str:
         done, count = self.finished
-        return f"<MapResult: {self._store.group.attrs['title']}, {done} of {count} chunks>"
+        return f"<MapResult: {self._store.layout.title}, {done} of {count} chunks>"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units: what is computed, how far, and its statistics."""

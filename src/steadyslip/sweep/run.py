@@ -14,10 +14,11 @@ from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.motion.engine import available_cores
 from steadyslip.progress import progress_bar
 from steadyslip.sweep.cluster import run_cluster
+from steadyslip.sweep.layout import versions
 from steadyslip.sweep.local import run_here, run_local
 from steadyslip.sweep.plan import Map
 from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.store import Store, check_path, open_or_create, versions
+from steadyslip.sweep.store import Store, check_path, open_or_create
 from steadyslip.sweep.work import Done, job_of
 
 SHORT = 2.0  # seconds of work for which no processes are started

@@ -13,25 +13,24 @@ import json
 import os
 import shutil
 import uuid
-import warnings
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steadyslip.config import rig_from_text, rig_to_text
+from steadyslip.config import rig_from_text
 from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.inputs import UnreadableFile, inside, read_bytes
 from steadyslip.slider import Slider
-from steadyslip.sweep.axes import COMPLETE, SAMPLE, Generated
-from steadyslip.sweep.plan import Map, differences, roles
+from steadyslip.sweep.axes import COMPLETE, SAMPLE
+from steadyslip.sweep.layout import coordinates, lay_out, read_layout
+from steadyslip.sweep.plan import Map, differences
 
-FORMAT = 1
 _WRITTEN = 1 << 32  # added to every checksum, so that none is the zero of a chunk not done
-_VERSIONS = ("numpy", "scipy", "numba", "zarr")
+_MARK = 8  # bytes
 
 
 class Store:
@@ -40,30 +39,31 @@ class Store:
     Attributes
     ----------
     path : Path
+    layout : Layout
+        What its metadata say.
     """
 
     def __init__(self, path: Path) -> None:
         import zarr
 
+        from steadyslip.sweep.folder import MapFolder
+
         self.path = path
+        self.layout = layout = read_layout(path)
+        self.definition, self.version, self.versions = layout.definition, layout.version, layout.versions
+        self.dims, self.results, self.rig_text = layout.dims, layout.results, layout.rig_text
+        self.shape, self.chunks, self.grid = layout.shape, layout.chunks, layout.grid
+        self.sampled, self.generated = layout.sampled, layout.generated
+        writable = os.access(path, os.W_OK)
+        self.folder: Any = MapFolder(path, read_only=not writable)
+        self.folder.sizes = {name: one.unpacked for name, one in layout.arrays.items() if name != COMPLETE}
         try:
-            self.group: Any = zarr.open_group(str(path), mode="r+" if os.access(path, os.W_OK) else "r")
-            attributes = dict(self.group.attrs)
-            if int(str(attributes.get("steadyslip_map", 0))) != FORMAT:
-                raise KeyError("steadyslip_map")
-            self.definition: dict[str, Any] = json.loads(str(attributes["definition"]))
-            self.version = str(attributes["steadyslip"])
-            self.versions: dict[str, str] = json.loads(str(attributes["versions"]))
-            self.rig_text = str(attributes["rig"])
-            self.dims: tuple[str, ...] = tuple(json.loads(str(attributes["dims"])))
-            self.results: tuple[str, ...] = tuple(json.loads(str(attributes["results"])))
+            self.group: Any = zarr.open_group(
+                self.folder, mode="r+" if writable else "r", zarr_format=3, use_consolidated=True
+            )
             self.marks: Any = self.group[COMPLETE]
         except (OSError, KeyError, ValueError, TypeError) as error:
-            raise NotAvailable(
-                f"{str(path)!r} exists and is not a map of this program, or its zarr.json is damaged; give another "
-                "name, or move it away"
-            ) from error
-        self.grid: tuple[int, ...] = tuple(int(n) for n in self.marks.shape)
+            raise self.damage("zarr.json", error) from error
         self._arrays: dict[str, Any] = {}
 
     def array(self, name: str) -> Any:
@@ -74,28 +74,10 @@ class Store:
 
     # -- what it holds -----------------------------------------------------------------------------------
 
-    @cached_property
-    def shape(self) -> tuple[int, ...]:
-        return tuple(int(n) for n in self.array(self.results[0]).shape[: len(self.dims)])
-
-    @cached_property
-    def chunks(self) -> tuple[int, ...]:
-        return tuple(int(n) for n in self.array(self.results[0]).chunks[: len(self.dims)])
-
     @property
     def count(self) -> int:
         """Number of chunks."""
         return int(np.prod(self.grid, dtype=int))
-
-    @cached_property
-    def sampled(self) -> tuple[str, ...]:
-        """Parameters along the sample dimension."""
-        return tuple(self.definition["samples"].get("over", ()))
-
-    @cached_property
-    def generated(self) -> tuple[str, ...]:
-        """Those of them whose values are written chunk by chunk."""
-        return self.sampled if "method" in self.definition["samples"] else ()
 
     def read(self, name: str, region: Any = ...) -> np.ndarray:
         """Values of one of its arrays.
@@ -106,9 +88,13 @@ class Store:
             If a file is damaged.
         """
         try:
-            return np.asarray(self.array(name)[region])
+            values = np.asarray(self.array(name)[region])
         except (ValueError, RuntimeError, OSError) as error:  # as Zarr says it
             raise self.damage(name, error) from error
+        words = self.layout.arrays[name].attributes.get("flag_meanings")
+        if words is not None and values.size and not (values.min() >= -1 and values.max() + 1 < len(words.split())):
+            raise self.damage(name, ValueError("it has kinds that it has no words for"))
+        return values
 
     def damage(self, what: str, error: Exception) -> NotAvailable:
         """What to say of files that cannot be read."""
@@ -128,9 +114,10 @@ class Store:
 
     def region(self, number: int) -> tuple[slice, ...]:
         """The points of a chunk."""
-        place = np.unravel_index(number, self.grid)
+        indices = np.unravel_index(number, self.grid)
         return tuple(
-            slice(int(i) * c, min((int(i) + 1) * c, n)) for i, c, n in zip(place, self.chunks, self.shape, strict=True)
+            slice(int(i) * c, min((int(i) + 1) * c, n))
+            for i, c, n in zip(indices, self.chunks, self.shape, strict=True)
         )
 
     def points(self, number: int) -> int:
@@ -195,40 +182,66 @@ class Store:
     def _holds(self, number: int, mark: int) -> bool:
         try:
             return mark == self._checksum(number)
-        except OSError:
+        except UnreadableFile:
             return False
 
     def _marks(self) -> np.ndarray:
+        """Of all chunks; only files that are there are looked at."""
+        found = np.zeros(self.grid, dtype=np.uint64)
+        self._collect(found, inside(self.path, f"{COMPLETE}/c"), ())
+        return found.reshape(-1)
+
+    def marks_of_grid(self) -> np.ndarray:
+        """Marks in the shape of the grid of chunks; 0 where a chunk is not done."""
+        return self._marks().reshape(self.grid)
+
+    def _collect(self, found: np.ndarray, folder: Path, at: tuple[int, ...]) -> None:
         try:
-            return np.asarray(self.marks[...]).reshape(-1)
-        except Exception:  # a damaged mark, whatever zarr says of it
-            return np.array([self._mark(n) for n in range(self.count)], dtype=np.uint64)
+            entries = list(os.scandir(folder))
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        for entry in entries:
+            if not entry.name.isdecimal() or len(entry.name) > 9 or int(entry.name) >= self.grid[len(at)]:
+                continue  # what a process that was killed left
+            here = (*at, int(entry.name))
+            if len(here) == len(self.grid):
+                found[here] = self._mark_in(Path(entry.path))
+            elif entry.is_dir(follow_symlinks=False):
+                self._collect(found, Path(entry.path), here)
 
     def _mark(self, number: int) -> int:
+        indices = np.unravel_index(number, self.grid)
+        return self._mark_in(inside(self.path, "/".join([COMPLETE, "c", *(str(int(i)) for i in indices)])))
+
+    def _mark_in(self, file: Path) -> int:
+        """A mark; 0 if there is none, or it is damaged."""
         try:
-            return int(np.asarray(self.marks[np.unravel_index(number, self.grid)]))
-        except Exception:  # as above
+            content = read_bytes(file, _MARK, links=False)
+        except UnreadableFile:
             return 0
+        return int.from_bytes(content, "little") if len(content) == _MARK else 0
 
     def _has_samples(self, number: int) -> bool:
         """Whether a chunk is the one that writes the sample parameters of its part of the sample dimension."""
-        place = np.unravel_index(number, self.grid)
-        return bool(self.generated) and not any(int(i) for i in place[:-1])
+        indices = np.unravel_index(number, self.grid)
+        return bool(self.generated) and not any(int(i) for i in indices[:-1])
 
     def _files(self, number: int) -> list[Path]:
         """The files of a chunk, in a fixed order."""
-        place = tuple(int(i) for i in np.unravel_index(number, self.grid))
-        keys = [(name, (*place, *(0,) * (self.array(name).ndim - len(place)))) for name in self.results]
+        indices = tuple(int(i) for i in np.unravel_index(number, self.grid))
+        rank = {name: len(one.shape) for name, one in self.layout.arrays.items()}
+        keys = [(name, (*indices, *(0,) * (rank[name] - len(indices)))) for name in self.results]
         if self._has_samples(number):
-            keys += [(name, place[-1:]) for name in self.generated]
-        return [self.path / name / self.array(name).metadata.encode_chunk_key(key) for name, key in keys]
+            keys += [(name, indices[-1:]) for name in self.generated]
+        return [inside(self.path, "/".join([name, "c", *map(str, key)])) for name, key in keys]
 
     def _checksum(self, number: int) -> int:
         total = 0
+        most = max(one.unpacked for one in self.layout.arrays.values()) + 64
         for file in self._files(number):
-            try:
-                total = zlib.crc32(file.read_bytes(), zlib.crc32(b"+", total))
-            except FileNotFoundError:
+            if file.exists():
+                total = zlib.crc32(read_bytes(file, most, links=False), zlib.crc32(b"+", total))
+            else:
                 total = zlib.crc32(b"-", total)
         return total | _WRITTEN
 
@@ -242,7 +255,8 @@ class Store:
 
     def restore(self, plan: Map) -> None:
         """Write coordinates again that are not those of the map, which no mark covers."""
-        for name, values in _coordinates(plan).items():
+        for name, values in coordinates(plan).items():
+            inside(self.path, f"{name}/c/0")
             try:
                 intact = np.array_equal(np.asarray(self.array(name)[:]), values)
             except Exception:  # damaged, whatever zarr says of it
@@ -310,24 +324,12 @@ def open_or_create(path: Path, plan: Map) -> Store:
     return store
 
 
-def _coordinates(plan: Map) -> dict[str, np.ndarray]:
-    """Parameters whose values are written when the store is made."""
-    found = {axis.name: axis.values for axis in plan.axes}
-    if plan.sampling and not isinstance(plan.sampling, Generated):
-        found |= plan.sampling.part(0, plan.sampling.points)
-    return found
-
-
 def _create(path: Path, plan: Map) -> None:
     """Lay out a store under a temporary name and move it into place, so that there is never half a store."""
     new = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.new")
     try:
         new.mkdir()
-        _lay_out(new, plan)
-        for file in new.rglob("*"):
-            if file.is_file():  # nothing recalculates these
-                with open(file, "rb") as written:
-                    os.fsync(written.fileno())
+        lay_out(new, plan)
         os.rename(new, path)
     except Exception as error:
         shutil.rmtree(new, ignore_errors=True)
@@ -341,77 +343,6 @@ def _create(path: Path, plan: Map) -> None:
 def cannot_write(path: Path, error: OSError) -> NotAvailable:
     """What to say of a failure to write."""
     return NotAvailable(f"cannot write {str(path)!r}: {(error.strerror or str(error)).lower()}")
-
-
-def _lay_out(path: Path, plan: Map) -> None:
-    import zarr
-    from zarr.codecs import BloscCodec, BytesCodec, Crc32cCodec
-
-    from steadyslip import __version__
-
-    try:
-        rig = rig_to_text(plan.rig, plan.protocol)
-    except ParameterError:
-        rig = ""
-    outputs = plan.outputs()
-    group = zarr.create_group(str(path), zarr_format=3)
-    group.attrs.update(
-        {
-            "steadyslip_map": FORMAT,
-            "title": str(plan),
-            "rig": rig,
-            "definition": json.dumps(plan.definition()),
-            "dims": json.dumps(plan.dims),
-            "results": json.dumps([output.name for output in outputs]),
-            "steadyslip": __version__,
-            "versions": json.dumps(versions()),
-            "coordinates": " ".join(plan.sampling.names) if plan.sampling else "",
-        }
-    )
-
-    def array(name: str, dims: Any, shape: Any, chunks: Any, dtype: str, fill: Any, **attributes: Any) -> Any:
-        wide = np.dtype(dtype).itemsize > 1
-        packed = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle" if wide else "noshuffle")
-        return group.create_array(
-            name, shape=tuple(shape), chunks=tuple(chunks), dtype=dtype, fill_value=fill, dimension_names=tuple(dims),
-            compressors=(packed, Crc32cCodec()), serializer=BytesCodec() if wide else "auto", attributes=attributes,
-        )  # fmt: skip
-
-    known = roles(plan)
-    given = _coordinates(plan)
-    for name in plan.varied:
-        n = len(given[name]) if name in given else plan.shape[-1]
-        part = n if name in given else plan.chunks[-1]
-        dim = name if name in plan.dims else SAMPLE
-        made = array(name, [dim], [n], [part], "float64", np.nan, units=known[name].unit, long_name=known[name].doc)
-        if name in given:
-            made[:] = given[name]
-    for output in outputs:
-        sizes = [size for _, size in output.extra]
-        attributes: dict[str, Any] = {"units": output.unit, "long_name": output.meaning}
-        if output.flags:
-            attributes["flag_values"] = list(range(-1, len(output.flags)))
-            attributes["flag_meanings"] = " ".join(word.replace(" ", "_") for word in ("not computed", *output.flags))
-        array(
-            output.name, [*plan.dims, *(dim for dim, _ in output.extra)], [*plan.shape, *sizes],
-            [*plan.chunks, *sizes], output.dtype, output.fill, **attributes,
-        )  # fmt: skip
-    grid = [-(-n // c) for n, c in zip(plan.shape, plan.chunks, strict=True)]
-    group.create_array(
-        COMPLETE, shape=tuple(grid), chunks=(1,) * len(grid), dtype="uint64", fill_value=0, compressors=None,
-        dimension_names=[f"{dim}_chunk" for dim in plan.dims],
-        attributes={"units": "1", "long_name": "checksum of each finished chunk, 0 until then"},
-    )  # fmt: skip
-    with warnings.catch_warnings():  # readers list nothing then; the specification is on its way
-        warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(str(path))
-
-
-def versions() -> dict[str, str]:
-    """Of the packages that numbers depend on."""
-    from importlib.metadata import version
-
-    return {name: version(name) for name in _VERSIONS}
 
 
 def check_path(path: Path) -> None:

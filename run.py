@@ -3,10 +3,11 @@
 
     python3 run.py analyze examples/inclined-spring.toml   any steadyslip command
     python3 run.py test                                    the tests
+    python3 run.py test --oldest                           a fast part of them with the oldest supported versions
     python3 run.py check                                   lint, format, types, import layers
 
 The first call makes a virtual environment in .venv beside this file and installs the pinned versions
-of pins.txt there; later calls only run.
+of pins.txt there; later calls only run. The oldest versions, pins-oldest.txt, have .venv-oldest to themselves.
 """
 
 import hashlib
@@ -15,9 +16,38 @@ import subprocess
 import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-HOME = os.path.join(HERE, ".venv")
-BIN = os.path.join(HOME, "Scripts" if os.name == "nt" else "bin")
-PYTHON = os.path.join(BIN, "python.exe" if os.name == "nt" else "python")
+
+
+class Home:
+    """A virtual environment beside this file, and the versions that it holds."""
+
+    def __init__(self, name, pins):
+        self.path = os.path.join(HERE, name)
+        self.pins = os.path.join(HERE, pins)
+        self.bin = os.path.join(self.path, "Scripts" if os.name == "nt" else "bin")
+        self.python = os.path.join(self.bin, "python.exe" if os.name == "nt" else "python")
+
+
+NEWEST = Home(".venv", "pins.txt")
+OLDEST = Home(".venv-oldest", "pins-oldest.txt")
+
+# One route through each package that we stand on: numbers, formulas, kernels, figures, files, maps, fits, options.
+OLDEST_TESTS = (
+    "tests/test_closed_forms.py",
+    "tests/test_rig_files.py",
+    "tests/test_figures.py",
+    "tests/test_command_line.py::test_verdict_on_the_example",
+    "tests/test_command_line.py::test_require_stable",
+    "tests/test_command_line.py::test_bad_input_is_one_message_and_status_2",
+    "tests/test_command_line.py::test_simulate_runs_the_protocol_of_the_file",
+    "tests/test_fits.py::test_scipy_finds_the_same_minimum",
+    "tests/test_records.py::test_hdf5_matlab_and_parquet",
+    "tests/test_maps.py::test_a_map_holds_what_the_functions_give",
+    "tests/test_maps.py::test_samples_in_a_map",
+    "tests/test_maps.py::test_exports_hold_the_same",
+)
+# Old packages warn of what newer ones around them deprecate; only with pins.txt a warning is an error.
+OLDEST_OPTIONS = ("-o", "filterwarnings=default", "-p", "no:cacheprovider")
 
 CHECKS = (
     ("ruff", "check", "."),
@@ -33,35 +63,38 @@ def main(arguments):
     if not arguments:
         sys.exit(__doc__.strip())
     command, rest = arguments[0], arguments[1:]
+    if command == "test" and "--oldest" in rest:
+        install(OLDEST, "test-oldest")
+        chosen = [word for word in rest if word != "--oldest"]
+        return call(OLDEST.python, "-m", "pytest", *OLDEST_OPTIONS, *(chosen or OLDEST_TESTS), folder=HERE)
     if command == "test":
-        install("test")
-        return call(PYTHON, "-m", "pytest", *rest, folder=HERE)
+        install(NEWEST, "test")
+        return call(NEWEST.python, "-m", "pytest", *rest, folder=HERE)
     if command == "check":
-        install("test")
-        return max([call(os.path.join(BIN, name), *options, folder=HERE) for name, *options in CHECKS])
-    install()
-    return call(PYTHON, "-m", "steadyslip", *arguments)
+        install(NEWEST, "test")
+        return max([call(os.path.join(NEWEST.bin, name), *options, folder=HERE) for name, *options in CHECKS])
+    install(NEWEST)
+    return call(NEWEST.python, "-m", "steadyslip", *arguments)
 
 
-def install(extra=""):
-    """Bring .venv up to date with pyproject.toml and pins.txt, for use or for tests as well."""
-    pins = os.path.join(HERE, "pins.txt")
+def install(home, extra=""):
+    """Bring an environment up to date with pyproject.toml and its pins, for use or for tests as well."""
     state = hashlib.sha256()
-    for name in (pins, os.path.join(HERE, "pyproject.toml")):
+    for name in (home.pins, os.path.join(HERE, "pyproject.toml")):
         with open(name, "rb") as file:
             state.update(file.read())
     for wanted in {extra, "test"}:  # an environment for tests serves for use too
-        stamp = os.path.join(HOME, "installed-%s" % (wanted or "use"))
+        stamp = os.path.join(home.path, "installed-%s" % (wanted or "use"))
         if os.path.exists(stamp) and open(stamp).read() == state.hexdigest():
             return
-    print("setting up .venv (once) ...", file=sys.stderr, flush=True)
-    if not os.path.exists(PYTHON):
+    print("setting up %s (once) ..." % os.path.basename(home.path), file=sys.stderr, flush=True)
+    if not os.path.exists(home.python):
         # without pip: some systems ship Python without the module that puts pip into an environment
-        require(sys.executable, "-m", "venv", "--without-pip", HOME)
+        require(sys.executable, "-m", "venv", "--without-pip", home.path)
     target = HERE + ("[%s]" % extra if extra else "")
     quiet = ("--quiet", "--disable-pip-version-check")
-    require(sys.executable, "-m", "pip", "--python", PYTHON, "install", *quiet, "-c", pins, "-e", target)
-    with open(os.path.join(HOME, "installed-%s" % (extra or "use")), "w") as file:
+    require(sys.executable, "-m", "pip", "--python", home.python, "install", *quiet, "-c", home.pins, "-e", target)
+    with open(os.path.join(home.path, "installed-%s" % (extra or "use")), "w") as file:
         file.write(state.hexdigest())
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import steadyslip
 from steadyslip import figures
-from steadyslip.config.layout import PROTOCOL, has_choice, is_per_area, own_fields, sections, selector, total_unit
+from steadyslip.config.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.protocol import Protocol
+from steadyslip.quantities import is_per_area, total_unit
 from steadyslip.records import Option, Parameter, Part, Record, Samples
 from steadyslip.slider import Slider
 

@@ -298,15 +298,50 @@ def described(expected: str) -> str:
     return "a number without unit" if expected == "1" else f"a quantity in {expected}"
 
 
+def is_per_area(unit_name: str) -> bool:
+    """Whether a quantity is per unit area inside and a total (N, N/m, kg, ...) of a rig with an area."""
+    return unit(unit_name)[1].mass == 1
+
+
+def total_unit(unit_name: str) -> str:
+    """Name of the unit of the total that belongs to a per-area unit."""
+    _, dimension = unit(unit_name)
+    wanted = dimension.times(_AREA)
+    for candidate in ("N", "N/m", "N s/m", "N/m/s", "kg"):
+        if unit(candidate)[1] == wanted:
+            return candidate
+    return f"{unit_name} m^2"
+
+
+def outside(unit_name: str, area: float | None) -> tuple[float, str]:
+    """Factor and unit in which people give and get a quantity: of the whole contact where the rig has an area.
+
+    Everything that is read, printed, drawn or written as a table goes through this one place.
+
+    >>> outside("Pa/m", 0.01), outside("Pa/m", None), outside("m/s", 0.01)
+    ((0.01, 'N/m'), (1.0, 'Pa/m'), (1.0, 'm/s'))
+    """
+    return (area, total_unit(unit_name)) if area is not None and is_per_area(unit_name) else (1.0, unit_name)
+
+
 _SHOWN_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
 
-def shown(value: float, si_unit: str, digits: int = 4) -> str:
-    """A value for people: prefixed unit and a few digits, angles in degrees.
+def stress_name(name: str, area: float | None) -> str:
+    """Name of a stress for people: the force that it is in a rig with an area."""
+    return name if area is None else name.replace("stress", "force")
+
+
+def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
+    """A value for people: prefixed unit and a few digits, angles in degrees, totals where the rig has an `area`.
 
     >>> shown(8.72093e9, "Pa/m"), shown(-0.7853981633974483, "rad"), shown(0.0145, "1")
     ('8.721 GPa/m', '-45 deg', '0.0145')
+    >>> shown(8.72093e9, "Pa/m", area=0.01)
+    '87.21 MN/m'
     """
+    factor, si_unit = outside(si_unit, area)
+    value = value * factor
     if si_unit == "1":
         return f"{value:.{digits}g}"
     if si_unit == "rad":
@@ -338,12 +373,14 @@ def shown_error(value: float, error: float, si_unit: str) -> str:
     return f"{number} ± {error / factor:.2g} {name}".rstrip()
 
 
-def shown_range(low: float, high: float, si_unit: str) -> str:
+def shown_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:
     """Two values for people, in the unit in which the second reads best.
 
     >>> shown_range(8.52e-6, 1.195e-5, "m")
     '8.52 to 11.95 um'
     """
+    factor, si_unit = outside(si_unit, area)
+    low, high = low * factor, high * factor
     number, _, name = shown(high, si_unit).partition(" ")
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
         return f"{shown(low, si_unit)} to {shown(high, si_unit)}"

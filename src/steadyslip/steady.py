@@ -19,7 +19,7 @@ import sympy as sp
 from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.expressions import array_function
 from steadyslip.model import Model
-from steadyslip.quantities import shown
+from steadyslip.quantities import shown, stress_name
 from steadyslip.slider import Slider
 from steadyslip.values import Values, model_values
 
@@ -47,11 +47,13 @@ class SteadySliding:
     friction: float
     states: dict[str, float]
     units: dict[str, str] = field(repr=False)
+    area: float | None = field(default=None, repr=False)
 
     def __str__(self) -> str:
         rows = [
-            f"steady sliding at {shown(self.velocity, 'm/s')}: normal stress {shown(self.normal_stress, 'Pa')}, "
-            f"shear stress {shown(self.shear_stress, 'Pa')}, friction {self.friction:.4g}"
+            f"steady sliding at {shown(self.velocity, 'm/s')}: {stress_name('normal stress', self.area)} "
+            f"{shown(self.normal_stress, 'Pa', area=self.area)}, {stress_name('shear stress', self.area)} "
+            f"{shown(self.shear_stress, 'Pa', area=self.area)}, friction {self.friction:.4g}"
         ]
         rows += [f"  {name} = {shown(value, self.units[name])}" for name, value in self.states.items()]
         return "\n".join(rows)
@@ -97,7 +99,7 @@ def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
         spring = numbers.pop("spring_stress")
         friction = numbers.pop("friction")
         units = {name: values.model.observables[name][1] for name in numbers}
-        results.append(SteadySliding(velocity, float(sigma), shear, spring, friction, numbers, units))
+        results.append(SteadySliding(velocity, float(sigma), shear, spring, friction, numbers, units, rig.area))
     return tuple(results)
 
 
@@ -232,7 +234,8 @@ def explain_absence(rig: Slider, values: Values) -> NoSteadySliding:
     remaining = load + offset
     return NoSteadySliding(
         "no steady sliding: lift-off. The motion takes away more normal stress than the contact has: "
-        f"{shown(load, 'Pa')} less {shown(-offset, 'Pa')} leaves {shown(remaining, 'Pa')}, must be > 0",
+        f"{shown(load, 'Pa', area=rig.area)} less {shown(-offset, 'Pa', area=rig.area)} leaves "
+        f"{shown(remaining, 'Pa', area=rig.area)}, must be > 0",
         "lift-off",
         remaining,
     )

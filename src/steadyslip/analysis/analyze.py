@@ -19,6 +19,7 @@ from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.nonlinear.onset import Onset, onset_at, parameter_along
 from steadyslip.pictures import draw
+from steadyslip.quantities import shown, stress_name
 from steadyslip.slider import Slider
 from steadyslip.steady import SteadySliding, steady_states
 from steadyslip.values import Values, axial_projection, model_values
@@ -264,10 +265,11 @@ def _warnings(
     """What a reader must know beside the verdict."""
     found = []
     if len(states) > 1:
-        stresses = ", ".join(f"{s.normal_stress:.4g} Pa" for s in states)
+        stresses = ", ".join(shown(s.normal_stress, "Pa", area=rig.area) for s in states)
         found.append(
-            f"steady sliding is possible at {len(states)} normal stresses ({stresses}); "
-            f"this verdict is for the one at {states[values.branch].normal_stress:.4g} Pa"
+            f"steady sliding is possible at {len(states)} values of {stress_name('normal stress', rig.area)} "
+            f"({stresses}); "
+            f"this verdict is for the one at {shown(states[values.branch].normal_stress, 'Pa', area=rig.area)}"
         )
     if not rig.friction.memory():
         found.append(

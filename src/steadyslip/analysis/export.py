@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from steadyslip.quantities import outside
+
 if TYPE_CHECKING:
     from steadyslip.analysis.analyze import Analysis
     from steadyslip.linear.boundary import Margin
@@ -43,7 +45,7 @@ def as_dict(analysis: Analysis) -> dict[str, Any]:
         "time_to_double": analysis.time_to_double,
         "onset": None if analysis.onset is None else _onset(analysis.onset),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
-        "boundaries": [row for margin in analysis.margins for row in _edges(margin)],
+        "boundaries": [row for margin in analysis.margins for row in _edges(margin, analysis.rig.area)],
         "warnings": list(analysis.warnings),
     }
     if analysis.rig.area is not None:
@@ -64,8 +66,9 @@ def _onset(onset: Onset) -> dict[str, Any]:
     }
 
 
-def _edges(margin: Margin) -> list[dict[str, Any]]:
-    """One row an edge; distances are from the rig's own value."""
+def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
+    """One row an edge; distances are from the rig's own value; with an area, totals stand beside."""
+    factor, unit = outside(margin.unit, area)
     return [
         {
             "parameter": edge.parameter,
@@ -80,6 +83,7 @@ def _edges(margin: Margin) -> list[dict[str, Any]]:
             "relative_distance": (edge.value - margin.value) / abs(margin.value) if margin.value else None,
             "nearest": edge is margin.edge,
         }
+        | ({} if unit == edge.unit else {"total": edge.value * factor, "total_unit": unit})
         for edge in margin.edges
     ]
 

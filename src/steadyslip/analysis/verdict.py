@@ -6,7 +6,6 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
-from steadyslip.config.layout import is_per_area, total_unit
 from steadyslip.errors import NotAvailable
 from steadyslip.linear import small_signal
 from steadyslip.linear.cubic import hopf_line
@@ -133,10 +132,7 @@ def _why_all(analysis: Analysis) -> str:
 
 def _quantity(analysis: Analysis, value: float, unit: str) -> str:
     """A value per unit area, or for the whole area where the rig has one, as in its file."""
-    area = analysis.rig.area
-    if area is None or not is_per_area(unit):
-        return shown(value, unit)
-    return shown(value * area, total_unit(unit))
+    return shown(value, unit, area=analysis.rig.area)
 
 
 def _stiffness(analysis: Analysis, value: float) -> str:
@@ -184,7 +180,7 @@ def _survived(kick: Threshold) -> str:
         return f"every {kick.kick} step in the range searched is survived"
     what = {"velocity": "a velocity step to", "displacement": "a displacement step of",
             "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
-    return f"survives {what} {shown(kick.amount, kick.unit)}; more leads to {kick.outcome}"
+    return f"survives {what} {shown(kick.amount, kick.unit, area=kick.rig.area)}; more leads to {kick.outcome}"
 
 
 def _disturbance(analysis: Analysis) -> str:

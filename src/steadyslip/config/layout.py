@@ -10,7 +10,6 @@ from typing import Any
 from steadyslip.drive import Drive
 from steadyslip.errors import ParameterError, Problem, unknown_name
 from steadyslip.protocol import Piece, Protocol
-from steadyslip.quantities import Dimension, unit
 from steadyslip.records import Part, Record, Role, role_of
 from steadyslip.slider import Slider
 
@@ -80,18 +79,3 @@ def own_fields(law: type[Record]) -> Iterator[tuple[Field[Any], Role]]:
         if law is Slider and isinstance(role, Part):
             continue
         yield item, role
-
-
-def is_per_area(unit_name: str) -> bool:
-    """Whether a quantity is per unit area inside and a total (N, N/m, kg, ...) in a file with an area."""
-    return unit(unit_name)[1].mass == 1
-
-
-def total_unit(unit_name: str) -> str:
-    """Name of the unit of the total that belongs to a per-area unit."""
-    _, dimension = unit(unit_name)
-    wanted = dimension.times(Dimension(length=2))
-    for candidate in ("N", "N/m", "N s/m", "N/m/s", "kg"):
-        if unit(candidate)[1] == wanted:
-            return candidate
-    return f"{unit_name} m^2"

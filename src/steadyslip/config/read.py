@@ -15,18 +15,16 @@ from steadyslip.config.layout import (
     Section,
     find_law,
     has_choice,
-    is_per_area,
     own_fields,
     sections,
     selector,
-    total_unit,
 )
 from steadyslip.config.lines import key_lines, line_of
 from steadyslip.config.toml import NotToml, Table, tables_of
 from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, came, unknown_name
 from steadyslip.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.protocol import Protocol
-from steadyslip.quantities import numbers, parse
+from steadyslip.quantities import is_per_area, numbers, parse, total_unit
 from steadyslip.records import (
     Parameter,
     Part,

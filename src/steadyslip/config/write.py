@@ -7,9 +7,10 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from steadyslip.config.layout import PROTOCOL, has_choice, is_per_area, own_fields, sections, selector, total_unit
+from steadyslip.config.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.errors import ParameterError, Problem
 from steadyslip.protocol import Protocol
+from steadyslip.quantities import outside
 from steadyslip.records import Option, Parameter, Part, Record, Samples
 from steadyslip.slider import Slider
 
@@ -87,18 +88,13 @@ def _member(family: type[Record], member: Record, name: str, path: str, area: fl
 def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
     if isinstance(role, Option):
         return str(value).lower() if isinstance(value, bool) else f'"{value}"'
-    factor, unit = _written(role.unit, area)
+    factor, unit = outside(role.unit, area)
     number = f"{value:.0f}" if role.domain.whole else repr(float(value) * factor)
     return number + (f"  # {unit}" if unit != "1" else "")
 
 
 def _column(role: Samples, values: tuple[float, ...], area: float | None) -> str:
     """A list of numbers, on as many lines as it needs."""
-    factor, unit = _written(role.unit, area)
+    factor, unit = outside(role.unit, area)
     text = wrap(", ".join(repr(value * factor) for value in values), 100, break_on_hyphens=False)
     return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
-
-
-def _written(unit: str, area: float | None) -> tuple[float, str]:
-    """Factor and unit in which a quantity is written."""
-    return (area, total_unit(unit)) if area is not None and is_per_area(unit) else (1.0, unit)

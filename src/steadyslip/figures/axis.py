@@ -73,7 +73,7 @@ def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> Axis:
     low, high = _default_range(rig, full, address.role, value) if limits is None else _given(full, address.role, limits)
     log = low > 0 and high / low > 100
     typical = value if low <= value <= high and value else math.sqrt(low * high) if log else max(abs(low), abs(high))
-    factor, unit_name = display_unit(address.role.unit, typical)
+    factor, unit_name = display_unit(address.role.unit, typical, rig.area)
     return Axis(full, low, high, log, factor, labelled(full, unit_name))
 
 

@@ -57,7 +57,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     ax = axes_or_new(ax)
     ax.axvline(0.0, color=BLACK, linewidth=1, zorder=1, label="_imaginary axis")
     ax.axhline(0.0, color=BLACK, linewidth=0.5, alpha=0.4, zorder=1, label="_real axis")
-    factor, unit_name = display_unit("Pa/m", edges[0] if edges else own or float(np.median(k)))
+    factor, unit_name = display_unit("Pa/m", edges[0] if edges else own or float(np.median(k)), rig.area)
     colour = np.broadcast_to(k[:, None] / factor, roots.shape)
     present = np.isfinite(roots)
     points = ax.scatter(

@@ -21,6 +21,7 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
+from steadyslip.quantities import stress_name
 from steadyslip.sweep.result import MapResult
 from steadyslip.sweep.view import View
 
@@ -46,11 +47,11 @@ def shown_name(found: MapResult, view: View, show: str | None) -> str | None:
 class Scale:
     """How a column of SI values is put on an axis."""
 
-    def __init__(self, name: str, unit: str, values: Array, spaced: bool = True) -> None:
+    def __init__(self, name: str, unit: str, values: Array, spaced: bool = True, area: float | None = None) -> None:
         finite = np.abs(values[np.isfinite(values) & (values != 0)])
         typical = float(np.median(finite)) if len(finite) else 1.0
-        self.factor, self.unit = display_unit(unit, typical)
-        self.label = labelled(short(name), self.unit)
+        self.factor, self.unit = display_unit(unit, typical, area)
+        self.label = labelled(stress_name(short(name), area), self.unit)
         good = values[np.isfinite(values)]
         self.log = bool(len(good)) and bool(good.min() > 0) and bool(good.max() / good.min() >= MANY)
         if spaced and self.log and len(good) > 2:  # as the grid is spaced
@@ -62,7 +63,9 @@ class Scale:
 
 def place_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
     """Label and scale the axes for the parameters of a view."""
-    scales = [Scale(n, found.unit(n), p, not view.scattered) for n, p in zip(view.names, view.places, strict=True)]
+    scales = [
+        Scale(n, found.unit(n), p, not view.scattered, found.area) for n, p in zip(view.names, view.places, strict=True)
+    ]
     ax.set_xlabel(scales[0].label)
     ax.set_xscale("log" if scales[0].log else "linear")
     if len(scales) == 2:

@@ -56,7 +56,7 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     values = np.asarray(view.values[name])[order]
     unit = found.unit(name)
     finite = values[np.isfinite(values)]
-    scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False)
+    scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area)
     if values.ndim == 3:  # intervals and their ends
         top = finite.max() * 3 if len(finite) else 1.0
         for i in range(values.shape[1]):
@@ -106,7 +106,7 @@ def scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
         values = np.asarray(view.values[name], dtype=float)
         if values.ndim > 1:
             raise ParameterError([Problem("show", f"{name!r} has several numbers a point; choose another result")])
-        up = Scale(name, found.unit(name), values, spaced=False)
+        up = Scale(name, found.unit(name), values, spaced=False, area=found.area)
         across.append(up(np.where(np.isfinite(values), values, np.nan)))
         ax.set_yscale("log" if up.log else "linear")
         ax.set_ylabel(labelled(name.replace("_", " "), up.unit))

@@ -37,7 +37,7 @@ def plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) 
     elif regions:
         _regions(ax, found, view, x, y)
     if name is not None and regions:
-        _contours(ax, x, y, view.values[name], name, found.unit(name))
+        _contours(ax, x, y, view.values[name], name, found)
     elif name is not None:
         _colours(ax, found, view, x, y, name, scale)
     line = _edge(ax, x, y, view)
@@ -87,14 +87,14 @@ def _share_of_stable(ax: Axes, x: Array, y: Array, view: View) -> None:
         ax.clabel(lines, fontsize="small")
 
 
-def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, unit: str) -> None:
+def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: MapResult) -> None:
     good = values[np.isfinite(values)]
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
         return
     if name == "safety_factor":
         levels, factor, label = [s for s in SAFETY if good.min() < s < good.max()], 1.0, "k/k_cr"
     else:
-        factor, shown_unit = display_unit(unit, float(np.median(np.abs(good))) or 1.0)
+        factor, shown_unit = display_unit(found.unit(name), float(np.median(np.abs(good))) or 1.0, found.area)
         levels, label = _levels(good / factor), f"{short(name)} ({shown_unit})"
     if not levels:
         return
@@ -133,18 +133,18 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         for code in np.unique(values[values >= 0]):
             entry(ax, Patch(facecolor=colours[int(code)], label=words[int(code)]))
         return
-    factor, unit, norm = scale or colour_scale([values], found.unit(name))
+    factor, unit, norm = scale or colour_scale([values], found.unit(name), found.area)
     mesh = ax.pcolormesh(x, y, np.where(np.isfinite(values), values, np.nan) / factor, cmap="cividis", norm=norm,
                          shading="nearest", rasterized=True)  # fmt: skip
     ax.figure.colorbar(mesh, ax=ax, label=labelled(name.replace("_", " "), unit))
 
 
-def colour_scale(fields: Sequence[Array], unit: str) -> tuple[float, str, Any]:
+def colour_scale(fields: Sequence[Array], unit: str, area: float | None) -> tuple[float, str, Any]:
     """Size and name of the unit shown, and the norm that suits all fields."""
     values = np.concatenate([f[np.isfinite(f)].reshape(-1) for f in fields])
     if not len(values):
         return 1.0, unit, Normalize(0, 1)
-    factor, name = display_unit(unit, float(np.median(np.abs(values))) or 1.0)
+    factor, name = display_unit(unit, float(np.median(np.abs(values))) or 1.0, area)
     low, high = np.quantile(values, [0.001, 0.999])
     positive = values[values > 0]
     if low >= 0 and len(positive) and high / np.quantile(positive, 0.02) >= MANY:
@@ -203,7 +203,7 @@ def _mark_own(
         return
     ax.plot(*zip(at, nearest, strict=True), color=VERMILION, linewidth=1.2, linestyle=":", zorder=4)
     words = ", ".join(
-        f"{short(name)} {shown(float(value * scale.factor), found.unit(name), 3)}"
+        f"{short(name)} {shown(float(value * scale.factor), found.unit(name), 3, found.area)}"
         for name, value, scale in zip(view.names, nearest, scales, strict=True)
     )
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",

@@ -11,10 +11,19 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from steadyslip.errors import NoSteadySliding, ParameterError, Problem
-from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILION, axes_or_new, display_unit, labelled
+from steadyslip.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    VERMILION,
+    axes_or_new,
+    display_unit,
+    labelled,
+)
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
-from steadyslip.quantities import shown
+from steadyslip.quantities import shown, stress_name
 from steadyslip.steady import steady_state
 
 if TYPE_CHECKING:
@@ -48,9 +57,11 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     _velocity_panel(run, panels[0], time)
     panels[1].plot(time, run["friction"], color=BLUE)
     panels[1].set_ylabel("friction τ/σ (1)")
-    stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)))
+    stress_factor, stress_unit = display_unit(
+        "Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)), run.rig.area
+    )
     panels[2].plot(time, run["normal_stress"] / stress_factor, color=BLUE)
-    panels[2].set_ylabel(labelled("normal stress", stress_unit))
+    panels[2].set_ylabel(labelled(stress_name("normal stress", run.rig.area), stress_unit))
     panels[2].set_xlabel(labelled("time", unit))
     slips = run.slip_events if len(run.slip_events) < _SPANS else ()
     for panel in panels:
@@ -123,14 +134,14 @@ def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: st
     with np.errstate(all="ignore"):
         u = np.where(moving, np.log(np.where(moving, run["v"], 1.0) / drive), np.nan)
     shows = np.abs(u) < _DECADES * np.log(10)
-    factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)))
+    factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), run.rig.area)
     x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
     ax.plot(x, y, color=color, label=label or None, linewidth=1)
     _arrows(ax, x, y, color)
     if not ax.get_xlabel():
         _steady_line(run, ax, x, factor)
         ax.set_xlabel("ln(v/v0) (1)")
-        ax.set_ylabel(labelled("spring stress", unit))
+        ax.set_ylabel(labelled(stress_name("spring stress", run.rig.area), unit))
     return ax
 
 

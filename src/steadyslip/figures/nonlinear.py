@@ -46,7 +46,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
     """
     ax = axes_or_new(ax)
-    factor, unit = display_unit(branch.unit, branch.onset.value)
+    factor, unit = display_unit(branch.unit, branch.onset.value, branch.rig.area)
     drive = branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
     onset_speed = branch.onset.value if branch.along == "drive.velocity" else drive
@@ -104,7 +104,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     factors, names = [], []
     for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
-        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))))
+        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.area)
         factors.append(factor)
         names.append(labelled(name.rpartition(".")[2].replace("_", " "), shown_unit))
     x, y = curve.first / factors[0], curve.second / factors[1]

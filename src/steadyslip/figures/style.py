@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from steadyslip.quantities import shown, unit
+from steadyslip.quantities import outside, shown, unit
 
 # Okabe & Ito (2008): told apart with every common kind of colour vision
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
@@ -53,14 +53,16 @@ def write(ax: Axes, stem: Path, kinds: tuple[str, ...] = ("png", "svg")) -> list
     return paths
 
 
-def display_unit(si_unit: str, typical: float) -> tuple[float, str]:
+def display_unit(si_unit: str, typical: float, area: float | None = None) -> tuple[float, str]:
     """Size in SI units, and name, of the unit in which people read a value of this size.
+
+    With an `area`, quantities per unit area are drawn for the whole of it: divided by the size they are in N, ...
 
     >>> display_unit("Pa/m", 9e9), display_unit("rad", 0.1)[1]
     ((1000000000.0, 'GPa/m'), 'deg')
     """
-    name = shown(typical, si_unit).partition(" ")[2]
-    factor = unit(name)[0] if name else 1.0
+    name = shown(typical, si_unit, area=area).partition(" ")[2]
+    factor = (unit(name)[0] if name else 1.0) / outside(si_unit, area)[0]
     return factor, name.replace("^2", "²").replace("^3", "³").replace("um", "µm")
 
 

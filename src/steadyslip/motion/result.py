@@ -15,7 +15,7 @@ from steadyslip.motion.events import Event, SlipEvent, slip_events
 from steadyslip.motion.status import remedy
 from steadyslip.pictures import draw
 from steadyslip.protocol import Protocol
-from steadyslip.quantities import shown
+from steadyslip.quantities import outside, shown, stress_name
 from steadyslip.slider import Slider
 
 
@@ -83,7 +83,7 @@ class History(Mapping[str, np.ndarray]):
 
     def summary(self) -> str:
         """What happened, in a few lines."""
-        v = self.data["v"]
+        v, area = self.data["v"], self.rig.area
         lines = [f"{self.message}"]
         if len(v):
             reached = [*v, *(event.velocity for event in self.events)]  # extremes lie between samples
@@ -92,13 +92,15 @@ class History(Mapping[str, np.ndarray]):
                 f"at the end {shown(v[-1], 'm/s')}"
             )
             stress = self.data["normal_stress"]
-            lines.append(f"normal stress   {shown(float(stress.min()), 'Pa')} to {shown(float(stress.max()), 'Pa')}")
+            low, high = (shown(float(x), "Pa", area=area) for x in (stress.min(), stress.max()))
+            lines.append(f"{stress_name('normal stress', area):<16}{low} to {high}")
         slips = self.slip_events
         if slips:
             last = slips[-1]
             lines.append(
-                f"slip events     {len(slips)}; the last: peak {shown(last.peak_velocity, 'm/s')}, stress drop "
-                f"{shown(last.stress_drop, 'Pa')}, slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
+                f"slip events     {len(slips)}; the last: peak {shown(last.peak_velocity, 'm/s')}, "
+                f"{stress_name('stress drop', area)} {shown(last.stress_drop, 'Pa', area=area)}, "
+                f"slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
             )
             if len(slips) > 1:
                 lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
@@ -126,7 +128,16 @@ class History(Mapping[str, np.ndarray]):
             "slip_events": [_plain(event) for event in self.slip_events],
             "events": [_plain(event) for event in self.events],
             "units": self.units,
-        }
+        } | self._forces(last)
+
+    def _forces(self, last: dict[str, float]) -> dict[str, Any]:
+        """With an area, the last values of the whole contact."""
+        totals = {name: outside(self.units[name], self.rig.area) for name in last}
+        found = {name: (last[name] * f, u) for name, (f, u) in totals.items() if u != self.units[name]}
+        if not found:
+            return {}
+        final = {name: value if np.isfinite(value) else None for name, (value, _) in found.items()}
+        return {"forces": {"area": self.rig.area, "final": final, "units": {n: u for n, (_, u) in found.items()}}}
 
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions in its attributes."""

@@ -14,6 +14,7 @@ from steadyslip.errors import NotAvailable, SteadyslipError
 from steadyslip.motion.events import Event
 from steadyslip.motion.observe import observable_units
 from steadyslip.motion.status import WORDS
+from steadyslip.quantities import outside
 from steadyslip.sealed import Kind
 from steadyslip.tables import Column, Table, write_table
 
@@ -142,7 +143,7 @@ def _check_samples(table: Table, data: dict[str, np.ndarray]) -> None:
 
 
 def to_csv(history: History, path: str | PathLike[str]) -> None:
-    """Write the samples as comma-separated text.
+    """Write the samples as comma-separated text, forces of the whole contact where the rig has an area.
 
     Raises
     ------
@@ -150,8 +151,10 @@ def to_csv(history: History, path: str | PathLike[str]) -> None:
         If the file cannot be written.
     """
     names = list(history.data)
-    header = ",".join(f"{name} ({history.units[name]})" for name in names)
+    written = [outside(history.units[name], history.rig.area) for name in names]
+    header = ",".join(f"{name} ({unit})" for name, (_, unit) in zip(names, written, strict=True))
+    table = np.column_stack([history.data[name] * factor for name, (factor, _) in zip(names, written, strict=True)])
     try:
-        np.savetxt(path, np.column_stack([history.data[n] for n in names]), "%.15g", ",", header=header, comments="")
+        np.savetxt(path, table, "%.15g", ",", header=header, comments="")
     except OSError as error:
         raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error

@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.nonlinear.onset import Onset
 from steadyslip.pictures import draw
-from steadyslip.quantities import shown
+from steadyslip.quantities import outside, shown, stress_name
 from steadyslip.slider import Slider
 
 Array = np.ndarray
@@ -147,8 +147,10 @@ class CycleBranch:
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write one row for each cycle, units in the header."""
         names = {"value": self.unit} | UNITS
-        table = np.column_stack([self[name].astype(float) for name in names] + [self["stable"].astype(float)])
-        header = ",".join([f"{name} ({unit})" for name, unit in names.items()] + ["stable"]).replace(
+        written = {name: outside(unit, self.rig.area) for name, unit in names.items()}
+        columns = [self[name].astype(float) * factor for name, (factor, _) in written.items()]
+        table = np.column_stack([*columns, self["stable"].astype(float)])
+        header = ",".join([*(f"{name} ({unit})" for name, (_, unit) in written.items()), "stable"]).replace(
             "value", self.along, 1
         )
         np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.12g")
@@ -179,22 +181,21 @@ class CycleBranch:
         return draw(self, kind, ax=ax)
 
     def __str__(self) -> str:
-        lines = [
-            f"cycles along {self.along} from a {self.onset.kind} onset at {shown(self.onset.value, self.unit, 6)}: "
-            f"{len(self.cycles)} cycles"
-        ]
+        area = self.rig.area
+        edge = shown(self.onset.value, self.unit, 6, area)
+        lines = [f"cycles along {self.along} from a {self.onset.kind} onset at {edge}: {len(self.cycles)} cycles"]
         if self.cycles:
             v = self["peak_velocity"], self["lowest_velocity"]
             period, drop = self["period"], self["stress_drop"]
             lines += [
                 f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}",
                 f"  period       {shown(float(period.min()), 's')} to {shown(float(period.max()), 's')}",
-                f"  stress drop  up to {shown(float(drop.max()), 'Pa')}",
+                f"  {stress_name('stress drop', area):<13}up to {shown(float(drop.max()), 'Pa', area=area)}",
                 f"  stable       {_stretches(self)}",
             ]
         for point in self.special:
             lines.append(
-                f"  {point.kind} at {shown(point.cycle.value, self.unit, 7)} "
+                f"  {point.kind} at {shown(point.cycle.value, self.unit, 7, area)} "
                 f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
             )
         lines.append(f"  ends: {self.end}")
@@ -213,7 +214,6 @@ def _stretches(branch: CycleBranch) -> str:
     changes = np.flatnonzero(stable[1:] != stable[:-1]) + 1
     pieces = np.split(np.arange(len(stable)), changes)
     found = [piece for piece in pieces if stable[piece[0]]]
-    values = branch["value"]
-    return "; ".join(
-        f"{shown(float(values[p].min()), branch.unit)} to {shown(float(values[p].max()), branch.unit)}" for p in found
-    )
+    values, area = branch["value"], branch.rig.area
+    ends = [(float(values[p].min()), float(values[p].max())) for p in found]
+    return "; ".join(f"{shown(a, branch.unit, area=area)} to {shown(b, branch.unit, area=area)}" for a, b in ends)

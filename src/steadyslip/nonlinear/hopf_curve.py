@@ -20,7 +20,7 @@ from steadyslip.linear.stiffness import characteristic
 from steadyslip.nonlinear.continuation import Curve, Failure, Point, turned_round
 from steadyslip.nonlinear.onset import coefficients, kinds, parameter_along
 from steadyslip.pictures import draw
-from steadyslip.quantities import shown
+from steadyslip.quantities import shown, shown_range
 from steadyslip.slider import Slider
 from steadyslip.values import Values, checked_array, model_values
 
@@ -91,13 +91,13 @@ class HopfCurve:
         return draw(self, ax=ax)
 
     def __str__(self) -> str:
-        a, b = self.names
+        (a, b), area = self.names, self.rig.area
         lines = [f"oscillatory edge in {a} and {b}: {len(self.first)} points"]
         for name, unit, column in zip(self.names, self.units, (self.first, self.second), strict=True):
-            lines.append(f"  {name}  {shown(float(column.min()), unit)} to {shown(float(column.max()), unit)}")
+            lines.append(f"  {name}  {shown_range(float(column.min()), float(column.max()), unit, area)}")
         for point in self.special:
             where = ", ".join(
-                f"{n} = {shown(point.values[n], u, 7)}" for n, u in zip(self.names, self.units, strict=True)
+                f"{n} = {shown(point.values[n], u, 7, area)}" for n, u in zip(self.names, self.units, strict=True)
             )
             lines.append(f"  {point.kind} at {where}")
         lines.append(f"  ends: {self.ends[0]}; {self.ends[1]}")

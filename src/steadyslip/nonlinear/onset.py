@@ -99,7 +99,7 @@ class Onset:
         return MEANINGS[self.kind]
 
     def __str__(self) -> str:
-        lines = [f"{self.kind} onset at {self.along} = {shown(self.value, self.unit, 6)}"]
+        lines = [f"{self.kind} onset at {self.along} = {shown(self.value, self.unit, 6, self.rig.area)}"]
         lines.append(f"  {self.meaning}")
         size = f"{self.normalised:.4g} of the frequency per squared amplitude of ln v"
         lines.append(f"  cubic coefficient {size}, period {shown(2 * np.pi / self.angular_frequency, 's')}")

@@ -65,7 +65,7 @@ class Threshold:
         if np.isinf(self.size):
             return f"{what}: none is large enough, up to {self.searched:.4g} (size without unit)"
         return (
-            f"{what}: survives up to {shown(self.amount, self.unit, 7)} (size {self.size:.7g}, bracket "
+            f"{what}: survives up to {shown(self.amount, self.unit, 7, self.rig.area)} (size {self.size:.7g}, bracket "
             f"{self.bracket[0]:.9g} to {self.bracket[1]:.9g}); beyond: {self.outcome}"
         )
 

@@ -114,6 +114,14 @@ class MapResult:
             raise ParameterError([Problem("name", unknown_name("array", name, (*self.results, *self.parameters)))])
         return str(self._store.layout.arrays[name].attributes["units"])
 
+    @property
+    def area(self) -> float | None:
+        """Contact area of the rig, m^2; None where it has none, or is not known any more."""
+        try:
+            return self.rig.area
+        except (NotAvailable, ParameterError):
+            return None
+
     def statistics(self) -> dict[str, dict[str, float]]:
         """What the finished chunks hold: shares of kinds; of numbers the least, the greatest and how many exist."""
         store = self._store
@@ -164,7 +172,7 @@ class MapResult:
         return self._store.read(name, region)
 
     def __str__(self) -> str:
-        done, count = self.finished
+        (done, count), area = self.finished, self.area
         lines = [self._store.layout.title]
         state = "complete" if done == count else f"{done} of {count} chunks; run it again for the rest"
         lines.append(f"  {'in ' + str(self.path):<24}{state}")
@@ -173,7 +181,7 @@ class MapResult:
                 text = ", ".join(f"{word} {_percent(share)}" for word, share in found.items())
             elif "low" in found:
                 low, high, unit = found["low"], found["high"], self.unit(name)
-                text = shown_range(low, high, unit) if low < high else shown(low, unit)
+                text = shown_range(low, high, unit, area) if low < high else shown(low, unit, area=area)
                 text += "" if found["share"] == 1 else f", for {_percent(found['share'])} of the points"
             else:
                 text = "nowhere"

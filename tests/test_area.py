@@ -1,0 +1,109 @@
+"""A rig with a contact area is read, told, drawn and written in forces throughout."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+
+import steadyslip as ss
+from steadyslip.nonlinear.threshold import Threshold
+from steadyslip.quantities import outside, shown, shown_range
+from steadyslip.sweep import Map, run_map
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
+AREA = 0.01
+PER_AREA = re.compile(r"\b[kMG]?Pa\b|kg/m\^?2|kg/m²")
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return replace(ss.read_rig(EXAMPLE, ["stiffness=32 GPa/m"]), area=AREA)
+
+
+def words_of(axes):
+    figure = np.ravel(axes)[0].figure
+    found = [t.get_text() for t in figure.findobj(lambda a: hasattr(a, "get_text"))]
+    plt.close(figure)
+    return " ".join(found)
+
+
+def test_one_place_knows_what_a_contact_has():
+    for unit in ("Pa", "Pa/m", "kg/m^2", "Pa s/m", "Pa/m/s"):
+        factor, total = outside(unit, AREA)
+        assert factor == AREA
+        assert shown(2.0 / AREA, unit, area=AREA) == shown(2.0, total)
+        assert shown_range(1.0 / AREA, 2.0 / AREA, unit, AREA) == shown_range(1.0, 2.0, total)
+    for unit in ("m/s", "s", "1", "rad", "1/m"):
+        assert outside(unit, AREA) == (1.0, unit)
+
+
+def test_analysis(rig):
+    found = ss.analyze(rig)
+    data = json.loads(found.to_json())
+    pressures = [row for row in data["boundaries"] if PER_AREA.search(row["unit"])]
+    assert pressures
+    for row in data["boundaries"]:
+        if row in pressures:
+            assert row["total"] == pytest.approx(row["value"] * AREA)
+            assert row["total_unit"][0] in "Nk"
+        else:
+            assert "total" not in row
+    assert not PER_AREA.search(str(ss.steady_state(rig)))
+    assert not PER_AREA.search(str(ss.hopf(rig)))
+    assert not PER_AREA.search(words_of(ss.analyze(rig).plot()))
+    assert PER_AREA.search(str(ss.hopf(replace(rig, area=None))))
+
+
+def test_absence_of_steady_sliding(rig):
+    lifted = replace(rig, contact=ss.Lift(preload=1e6, lift=2e6, v_ref=1e-6))
+    reason = ss.analyze(lifted).reason
+    assert "lift-off" in reason
+    assert not PER_AREA.search(reason)
+
+
+def test_a_run(rig, tmp_path):
+    run = ss.simulate(rig, ss.VelocityStep(at=1.0, to=2e-6), until=5.0)
+    plain = replace(run, rig=replace(rig, area=None))
+    assert "normal force" in run.summary()
+    assert not PER_AREA.search(run.summary())
+    assert PER_AREA.search(plain.summary())
+    run.to_csv(tmp_path / "run.csv")
+    header = (tmp_path / "run.csv").read_text().splitlines()[0]
+    assert not PER_AREA.search(header)
+    table = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
+    column = header.split(",").index("normal_stress (N)")
+    assert table[:, column] == pytest.approx(run["normal_stress"] * AREA, rel=1e-14)
+    data = run.to_dict()
+    assert data["forces"]["final"]["normal_stress"] == pytest.approx(data["final"]["normal_stress"] * AREA)
+    assert data["forces"]["units"]["normal_stress"] == "N"
+    assert "forces" not in plain.to_dict()
+    for kind in ("history", "phase"):
+        axes = run.plot(kind)
+        drawn = np.ravel(axes)[-1]
+        last = drawn.lines[0].get_ydata()
+        name = "normal_stress" if kind == "history" else "spring_stress"
+        ratio = np.nanmedian(run[name]) * AREA / np.nanmedian(last)
+        assert ratio == pytest.approx(10.0 ** round(float(np.log10(ratio))))  # a prefix of N
+        words = words_of(axes)
+        assert "force (" in words
+        assert not PER_AREA.search(words)
+
+
+def test_thresholds(rig):
+    kick = Threshold(rig, "normal-stress", 1, 0.5, (0.4, 0.6), 2e6, "Pa", "oscillation", 1.0)
+    assert "20 kN" in str(kick)
+
+
+def test_maps(rig, tmp_path):
+    plan = Map(rig, over={"slider.stiffness": [1e10, 2e10, 4e10], "contact.preload": [1e6, 5e6]},
+               compute=["critical_stiffness"])  # fmt: skip
+    found = run_map(plan, tmp_path / "map.zarr", progress=False)
+    assert found.area == AREA
+    assert not PER_AREA.search(str(found).split("\n", 2)[2])
+    words = words_of(found.plot())
+    assert "N/m" in words
+    assert not PER_AREA.search(words)

@@ -35,6 +35,12 @@ PART = 10 if QUICK else 1
 RIG = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 
 
+try:
+    import psutil
+except ImportError:  # it is no dependency of ours
+    psutil = None
+
+
 class PeakMemory:
     """Largest resident memory of this process and its children together, sampled."""
 
@@ -43,9 +49,12 @@ class PeakMemory:
         threading.Thread(target=self._watch, daemon=True).start()
         return self
 
-    def _watch(self) -> None:
-        import psutil
+    def __str__(self) -> str:
+        return f"peak {self.bytes / 1e6:.0f} MB in all processes" if psutil else "peak memory not measured: no psutil"
 
+    def _watch(self) -> None:
+        if psutil is None:
+            return
         me = psutil.Process()
         while not self.stopped.wait(0.1):
             total = 0
@@ -147,7 +156,7 @@ def main() -> None:
     with PeakMemory() as peak:
         seconds, _ = run(plan)
     print(f"{plan.size:.3g} points of status, critical stiffness and growth rate: {seconds:.1f} s, "
-          f"{plan.size / seconds:.3g} points/s, peak {peak.bytes / 1e6:.0f} MB in all processes")  # fmt: skip
+          f"{plan.size / seconds:.3g} points/s, {peak}")  # fmt: skip
 
     plan = stick_slip(10**6 // PART)
     rate = simulated_rate(plan, 60_000 // PART)
@@ -155,7 +164,7 @@ def main() -> None:
         seconds, _ = run(plan)
     share = plan.size / seconds / rate
     print(f"{plan.size:.3g} damped stick-slip runs: {seconds:.1f} s, {plan.size / seconds:.3g} runs/s = {share:.2f} of "
-          f"simulate_many ({rate:.3g} runs/s), peak {peak.bytes / 1e6:.0f} MB")  # fmt: skip
+          f"simulate_many ({rate:.3g} runs/s), {peak}")  # fmt: skip
 
     for name, plan in (("stability", stability(3 * 10**7 // PART)), ("stick-slip", stick_slip(2 * 10**5 // PART))):
         one, _ = run(plan, workers=1)

@@ -4,6 +4,7 @@ import contextlib
 import math
 import os
 import time
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -296,3 +297,56 @@ def test_damaged_records_are_one_message(tmp_path, ending):
         path.write_bytes(bytes(raw))
         with contextlib.suppress(SteadyslipError):
             read_record(path)
+
+
+# -- formulas
+
+
+def test_a_formula_that_takes_too_long_stays_as_it_stands(monkeypatch):
+    module = import_module("steadyslip.linear.formula")
+    from steadyslip.model import build_model
+
+    model = build_model(rig_from_text(RIG))
+    short = module._formula.__wrapped__(model)
+    monkeypatch.setattr(module, "LONGEST", 0.0)
+    whole = module._formula.__wrapped__(model)
+    values = {symbol: 0.3 + 0.1 * i for i, symbol in enumerate(sorted(whole.rhs.free_symbols, key=str))}
+    friction = (model.steady[model.symbols["tau"]] / model.sigma_ss).subs(values)
+    numbers = values | {module.MU_SS: friction}
+    assert float(short.rhs.subs(numbers)) == pytest.approx(float(whole.rhs.subs(numbers)), rel=1e-12)
+
+
+def test_simplifying_ends(monkeypatch):
+    import itertools
+    import threading
+
+    module = import_module("steadyslip.linear.formula")
+
+    def for_ever():
+        for _ in itertools.count():
+            pass
+
+    monkeypatch.setattr(module, "LONGEST", 0.1)
+    before = threading.active_count()
+    assert module._in_time(for_ever, 7) == 7
+    assert threading.active_count() == before
+    with pytest.raises(ZeroDivisionError):
+        module._in_time(lambda: 1 / 0, 7)
+
+
+# -- copies
+
+
+def test_a_used_fit_can_be_copied_and_sent():
+    import copy
+    import pickle
+
+    from steadyslip.lab.result import Fit, Search
+
+    numbers = np.array([1.0, 2.0])
+    fit = Fit("plan", numbers, 1.0, Search(1, 1, (), 3, True), (), np.eye(2), (), (numbers, numbers), "1")
+    fit.__dict__["comparison"] = lambda: "a kernel, which nobody can copy"
+    for twin in (copy.deepcopy(fit), pickle.loads(pickle.dumps(fit))):
+        assert "comparison" not in vars(twin)
+        assert np.array_equal(twin.coordinates, numbers)
+        assert twin.search == fit.search

@@ -45,7 +45,7 @@ def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
     time = (data.time - origin) / factor
     panels[0].plot(time, data.friction, color=BLUE, linewidth=0.6)
     panels[0].set_ylabel("friction τ/σ (1)")
-    panels[0].set_title(_name(data), fontsize="medium")
+    panels[0].set_title(_name(data), fontsize="medium", parse_math=False)
     if data.rate is not None:
         _rate_panel(data, panels[1], time)
     else:
@@ -104,7 +104,7 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
     panels[0].plot(time, result.part(result.model, record), color=BLACK, linewidth=1, label="model")
     panels[0].set_ylabel("friction τ/σ (1)")
     panels[0].legend(loc="best", fontsize="small", markerscale=3)
-    panels[0].set_title(_name(data), fontsize="medium")
+    panels[0].set_title(_name(data), fontsize="medium", parse_math=False)
     residuals = result.part(result.residuals, record)
     panels[1].plot(time, 1e3 * residuals, ".", color=SKY, markersize=2, rasterized=True)
     panels[1].plot(time, 1e3 * _running(residuals), color=VERMILION, linewidth=1, label="running mean")

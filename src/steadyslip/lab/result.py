@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -125,6 +125,10 @@ class Fit:
     unidentified: tuple[Combination, ...]
     bounds: tuple[Array, Array] = field(repr=False)
     version: str = field(repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What makes the fit, without what was derived from it: kernels cannot be copied, nor need they be."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
     def space(self) -> Space:

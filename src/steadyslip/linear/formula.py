@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable
 from functools import lru_cache
+from threading import Thread
 
 import sympy as sp
 
@@ -11,6 +14,8 @@ from steadyslip.linear.response import response
 from steadyslip.model import Model, build_model
 from steadyslip.slider import Slider
 
+LONGEST = 4.0
+"""Seconds for each of two simplifications; what takes longer is left as it stands."""
 MU_SS = sp.Symbol("mu_ss", real=True)
 
 
@@ -34,6 +39,10 @@ def formula(rig: Slider) -> sp.Eq:
     NotAvailable
         If the model has several memory variables or none, or integral control: then the boundary is a
         root of a polynomial, which `stable_stiffness` solves.
+
+    Notes
+    -----
+    It is written as short as SymPy manages in `LONGEST` seconds for each of two steps, else unsimplified.
     """
     return _formula(build_model(rig))
 
@@ -42,9 +51,39 @@ def formula(rig: Slider) -> sp.Eq:
 def _formula(model: Model) -> sp.Eq:
     known = response(model).as_dict()
     gain = sp.expand(known.pop("k") - model.parameters["slider.stiffness"])
-    mu = sp.simplify(model.steady[model.symbols["tau"]] / model.sigma_ss)
-    numerator, denominator = (_with_mu(part, mu) for part in cubic.hopf_line(**known))
-    return sp.Eq(sp.Symbol("k_cr") + gain, _shortest(numerator, denominator), evaluate=False)
+    friction = model.steady[model.symbols["tau"]] / model.sigma_ss
+    mu = _in_time(lambda: sp.simplify(friction), friction)
+    numerator, denominator = cubic.hopf_line(**known)
+    short = _in_time(lambda: _shortest(_with_mu(numerator, mu), _with_mu(denominator, mu)), numerator / denominator)
+    return sp.Eq(sp.Symbol("k_cr") + gain, short, evaluate=False)
+
+
+class _TooLong(Exception):
+    """The time for a simplification is over."""
+
+
+def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
+    """What `work` gives, or `otherwise` where it takes longer than `LONGEST`: nobody knows how long SymPy will take."""
+    found: list[sp.Expr] = []
+    faults: list[Exception] = []
+
+    def run() -> None:
+        try:
+            found.append(work())
+        except _TooLong:
+            pass
+        except Exception as error:  # raised again below, in the thread that asked
+            faults.append(error)
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(LONGEST)
+    if thread.is_alive() and thread.ident is not None:  # SymPy is Python throughout and can be interrupted so
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_TooLong))
+        thread.join(1.0)
+    if faults:
+        raise faults[0]
+    return found[0] if found else otherwise
 
 
 def _with_mu(expression: sp.Expr, mu: sp.Expr) -> sp.Expr:

@@ -17,7 +17,10 @@ from steadyslip.nonlinear import flow as flow_module
 from steadyslip.nonlinear.continuation import Curve, Failure
 from steadyslip.nonlinear.flow import Flow, Runs
 from steadyslip.nonlinear.kicks import constant_inputs
-from steadyslip.nonlinear.shooting import multipliers
+from steadyslip.nonlinear.measure import measured
+from steadyslip.nonlinear.segments import _cuts
+from steadyslip.nonlinear.shooting import Shooting, multipliers
+from steadyslip.nonlinear.tracer import Tracer
 from steadyslip.nonlinear.verify import verified
 from test_motion_oracle import LAWS
 
@@ -86,6 +89,23 @@ def test_continuation_says_when_it_cannot_go_on():
         list(curve.follow(start, 0.1, 1e-4, 0.2))
 
 
+def test_continuation_does_not_jump_to_another_curve():
+    """Two lines side by side: Newton's method, sent too far, lands on the other one; the step is refused."""
+
+    def two_lines(u):
+        y = u[0] - 0.3 * np.tanh(20 * (u[1] - 0.5))  # a bend, and the same curve one further up
+        bend = 6 / np.cosh(20 * (u[1] - 0.5)) ** 2
+        slope = np.pi * np.cos(np.pi * y)
+        return np.array([np.sin(np.pi * y)]), np.array([[slope, -slope * bend]])
+
+    curve = Curve(two_lines)
+    start = curve.start(np.array([-0.3, 0.0]), np.array([0.0, 1.0]))
+    for point in curve.follow(start, 0.4, 1e-6, 0.4):
+        assert point.u[0] == pytest.approx(0.3 * np.tanh(20 * (point.u[1] - 0.5)), abs=1e-9)
+        if point.u[1] > 1.5:
+            break
+
+
 # -- the flow and its derivatives
 
 
@@ -151,6 +171,23 @@ def test_multipliers_do_not_depend_on_the_number_of_segments():
     assert (trivial, single) == pytest.approx((1, 1), rel=1e-6)
     assert many[0] == pytest.approx(one[0], rel=1e-6)
     assert np.prod(many) == pytest.approx(np.linalg.det(together[0]), rel=1e-6)
+
+
+def test_small_mass_does_not_hide_the_direction_of_motion():
+    """Rounding in the state, blown up by 1/mass, is most of the rates; carried round once they are true."""
+    rng = np.random.default_rng(3)
+    along, fast, slow = np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+    whole = np.outer(along, along) + 0.3 * np.outer(slow, slow) + 1e-12 * np.outer(fast, fast)
+    for noise in (0.0, 5.0):
+        trivial, others = multipliers(whole[None], (along + noise * fast)[None])
+        assert trivial == pytest.approx(1, abs=1e-9)
+        assert others[0] == pytest.approx(0.3, rel=1e-9)
+
+
+def test_cuts_are_made_where_deviations_across_the_motion_grow():
+    grow, still = np.diag([0.0, 100.0, 1.0]), np.diag([0.0, 1.0, 0.5])
+    assert _cuts(np.array([still, grow, still, grow, still, grow, still])) == [0, 3, 5]
+    assert _cuts(np.array([still] * 9)) == [0]
 
 
 # -- branches
@@ -248,9 +285,84 @@ def test_motion_is_on_a_cycle_only_if_there_is_one(mass, damped):
     (cycle,) = (damped if not mass else ss.cycles(rigs[0], doublings=0)).at(0.4 * A)
     assert found.period == pytest.approx(cycle.period, rel=1e-8)
     assert found.multipliers == pytest.approx(cycle.multipliers, rel=1e-5, abs=1e-8)
-    assert verified(jobs, 0, np.array(found._orbit[0][0])).period == pytest.approx(found.period, rel=1e-9)
+    assert verified(jobs, 0, found._orbit.states[0]).period == pytest.approx(found.period, rel=1e-9)
     jobs, state = started(rigs[1], x=0.3)
     assert verified(jobs, 0, state, patience=20) is None
+
+
+def test_cycle_is_counted_once_round(damped):
+    """Run through twice or three times it closes too, and is told from a true one; Newton's method alone is not."""
+    (cycle,) = damped.at(0.8 * damped.onset.value)
+    flow = Flow(damped.rig.with_values({"stiffness": damped.onset.value}), "slider.stiffness")
+    orbit = cycle._orbit
+    for turns in (1, 2, 3, 6):
+        shooting = Shooting(flow, np.ones(1), True, damped.onset.value)
+        u = shooting.packed(replace(orbit, period=turns * orbit.period))
+        residual, _ = shooting.equations(u)
+        assert np.abs(residual).max() < 1e-7
+        assert measured(shooting, u).turns == {1: 1, 2: 2, 3: 3, 6: 2}[turns]
+    tracer = Tracer(flow, damped.onset, (0.0, 1.0), 10)
+    with pytest.raises(Failure, match="run through 2 times"):
+        tracer.resumed(replace(orbit, period=2 * orbit.period), 1.0)
+
+
+@pytest.mark.parametrize(("lam", "damping"), [(0.25, 1e-8), (1.0, 1e-8), (2.0, 1e-4)])
+def test_aging_cycles_have_the_period_that_simulation_shows(lam, damping):
+    """Of the issue's scan: the smaller the damping, the more the branch stands on end at the edge."""
+    a_rig = unit_rig("aging", lam, 0.5 * lam, damping=damping)
+    branch = ss.cycles(a_rig, between=(0.49 * lam * A, 1.2 * lam * A))
+    assert np.abs(np.diff(np.log(branch["period"]))).max() < np.log(1.9)
+    (cycle,) = branch.at(0.5 * lam * A)
+    run = ss.simulate(a_rig, until=8 * cycle.period, initial={"x": -2.0}, rtol=1e-9)
+    peaks = [e.time for e in run.events if e.kind == "velocity peak"]
+    assert np.diff(peaks)[-1] == pytest.approx(cycle.period, rel=1e-7)
+
+
+@pytest.mark.parametrize("mass", [1e-6, 1e-9])
+def test_smallest_masses_lead_to_the_stable_cycles(mass):
+    """The branch is not lost where rounding over mass is all that is left of the acceleration."""
+    branch = ss.cycles(unit_rig("aging", 0.5, 0.5, mass=mass), between=(0.5 * 0.5 * A, 1.2 * 0.5 * A))
+    assert "end of the range" in branch.end
+    assert branch.gaps == ()
+    cycle = branch.cycles[-1]
+    assert cycle.stable
+    a_rig = branch.rig.with_values({"stiffness": cycle.value})
+    run = ss.simulate(a_rig, until=16 * cycle.period, initial={"x": -2.0}, rtol=1e-9)
+    peaks = [e for e in run.events if e.kind == "velocity peak" and e.velocity > 10]
+    assert peaks[-1].time - peaks[-2].time == pytest.approx(cycle.period, rel=1e-6)
+
+
+def test_sheet_that_breaks_off_is_found_again_by_simulation(damped, monkeypatch):
+    """What lies beyond is the same as without the break; the gap is said, and not bridged by `at`."""
+    onset, broken = damped.onset, 0.8 * damped.onset.value
+    real = Tracer.known
+
+    def known(self, shooting, point):
+        found = real(self, shooting, point)
+        if 0.7 * onset.value < found.cycle.value < broken:
+            raise Failure("a hole")
+        return found
+
+    monkeypatch.setattr(Tracer, "known", known)
+    branch = ss.cycles(damped.rig, between=(0.3 * onset.value, 1.1 * onset.value))
+    monkeypatch.undo()
+    assert len(branch.gaps) == 1
+    assert "a hole" in branch.broken[0]
+    assert "another sheet, found by simulation" in str(branch)
+    assert branch.at(0.75 * onset.value) == ()
+    for share in (0.95, 0.5):
+        (cycle,), (same,) = branch.at(share * onset.value), damped.at(share * onset.value)
+        assert cycle.period == pytest.approx(same.period, rel=1e-9)
+    assert branch.to_dict()["gaps"][0]["before"] == branch.gaps[0]
+
+
+def test_branch_remembers_its_steady_state_and_tolerance(damped):
+    assert (damped.steady, damped.rtol) == (0, None)
+    coarse = ss.cycles(damped.rig, most_points=30, rtol=1e-7)
+    assert coarse.rtol == 1e-7
+    value = 0.5 * (coarse["value"][-1] + coarse["value"][-2])
+    errors = [abs(branch.at(value)[0].period / damped.at(value)[0].period - 1) for branch in (coarse, damped)]
+    assert errors[0] > 10 * errors[1]
 
 
 def test_massless_branch_ends_in_blow_up():

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from steadyslip.nonlinear.onset import Onset
+from steadyslip.nonlinear.shooting import Orbit
 from steadyslip.pictures import draw
 from steadyslip.quantities import outside, shown, stress_name
 from steadyslip.slider import Slider
@@ -59,7 +61,7 @@ class Cycle:
     trivial: float
     stable: bool
     start: dict[str, float]
-    _orbit: tuple[Array, Array] = field(default=(np.empty((0, 0)), np.empty(0)), repr=False)
+    _orbit: Orbit | None = field(default=None, repr=False)
 
     @property
     def growth(self) -> float:
@@ -85,12 +87,15 @@ class SpecialCycle:
         Values of the parameter on both sides (at a fold: of neighbouring cycles).
     precision : float
         Estimated error of the parameter's value there, relative.
+    index : int
+        Place in the branch: it lies before the cycle of this number.
     """
 
     kind: str
     cycle: Cycle
     bracket: tuple[float, float]
     precision: float
+    index: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +115,15 @@ class CycleBranch:
         Why the branch stops.
     doubled : CycleBranch or None
         The branch of twice the period that begins at the first period doubling.
+    gaps : tuple of int
+        Numbers of the cycles before which the branch is not continuous: a sheet broke off, and simulation found
+        another beyond it.
+    broken : tuple of str
+        For each gap, why the sheet before it was not followed any further.
+    steady : int
+        Which steady sliding, where there are several.
+    rtol : float or None
+        Error allowed per step, as asked for.
     """
 
     rig: Slider = field(repr=False)
@@ -120,6 +134,10 @@ class CycleBranch:
     special: tuple[SpecialCycle, ...] = field(repr=False)
     end: str
     doubled: CycleBranch | None = field(default=None, repr=False)
+    gaps: tuple[int, ...] = ()
+    broken: tuple[str, ...] = ()
+    steady: int = 0
+    rtol: float | None = None
 
     def __len__(self) -> int:
         return len(self.cycles)
@@ -134,6 +152,19 @@ class CycleBranch:
 
         return cycles_at(self, value)
 
+    def _stretches(self) -> list[list[Cycle]]:
+        """Cycles from gap to gap, folds among them."""
+        starts = (0, *self.gaps, len(self.cycles))
+        folds = {point.index: point.cycle for point in self.special if point.kind == "fold"}
+        found = []
+        for start, stop in pairwise(starts):
+            stretch = []
+            for i in range(start, stop):
+                stretch += [folds[i]] if i in folds and i > start else []
+                stretch.append(self.cycles[i])
+            found.append(stretch)
+        return found
+
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``point``."""
         import xarray as xr
@@ -141,7 +172,7 @@ class CycleBranch:
         names = {"value": self.unit} | UNITS
         data = {name: ("point", self[name].astype(float), {"units": unit}) for name, unit in names.items()}
         data["stable"] = ("point", self["stable"], {})
-        attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind}
+        attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind, "gaps": list(self.gaps)}
         return xr.Dataset(data, attrs=attributes)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
@@ -160,6 +191,7 @@ class CycleBranch:
 
         def plain(cycle: Cycle) -> dict[str, Any]:
             found = {name: getattr(cycle, name) for name in ("value", *UNITS)}
+            found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
             found |= {"stable": cycle.stable, "start": cycle.start}
             return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
 
@@ -168,6 +200,7 @@ class CycleBranch:
             "unit": self.unit,
             "onset": {"kind": self.onset.kind, "value": self.onset.value},
             "end": self.end,
+            "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
             "cycles": [plain(cycle) for cycle in self.cycles],
             "special": [
                 {"kind": s.kind, "bracket": list(s.bracket), "precision": s.precision} | plain(s.cycle)
@@ -198,6 +231,10 @@ class CycleBranch:
                 f"  {point.kind} at {shown(point.cycle.value, self.unit, 7, area)} "
                 f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
             )
+        for i, why in zip(self.gaps, self.broken, strict=True):
+            before = shown(self.cycles[i - 1].value, self.unit)
+            after = shown(self.cycles[i].value, self.unit)
+            lines += [f"  gap: at {before} {why};", f"    another sheet, found by simulation, from {after} on"]
         lines.append(f"  ends: {self.end}")
         if self.doubled is not None:
             lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]

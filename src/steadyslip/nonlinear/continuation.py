@@ -15,7 +15,7 @@ Array = np.ndarray
 Equations = Callable[[Array], tuple[Array, Array]]
 """u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
 MOST_ITERATIONS = 10
-GROW, SHRINK = 1.4, 0.4
+GROW, FASTER, SHRINK = 1.4, 2.0, 0.4
 
 
 class Failure(ArithmeticError):
@@ -134,7 +134,8 @@ class Curve:
                 continue
             yield ahead
             if ahead.iterations <= 4 and turned > 1 - 0.3 * (1 - self.most_turn):
-                step = min(step * GROW, max(most, 0.2 * float(np.max(np.abs(ahead.u)))))
+                straight = turned > 1 - 0.02 * (1 - self.most_turn)
+                step = min(step * (FASTER if straight else GROW), max(most, 0.2 * float(np.max(np.abs(ahead.u)))))
             elif ahead.iterations > 6:
                 step *= 0.7
             here = ahead

@@ -33,6 +33,7 @@ from steadyslip.values import Values, model_values
 Array = np.ndarray
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
+NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
 
 
@@ -132,6 +133,7 @@ class Runs:
         self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
         self.sensitive = _with_sensitivities(self.reduction, method)
         arguments, sigma = jobs.part(which, which + 1)
+        self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
         own = replace(jobs.values, arguments=tuple(np.atleast_1d(a) for a in arguments), shape=(1,))
         inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
         self.own = self._set(own, np.atleast_1d(sigma), inputs)
@@ -149,14 +151,23 @@ class Runs:
         rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
     ) -> Setting:  # fmt: skip
         """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
-        jobs = replace(self.base, values=values, sigma=sigma)
-        constants, _, settings, _ = jobs.tables(self.machine, self.which, self.which + 1, True, True)
+        constants = self.machine.constants(values.arguments, sigma)
+        settings = self._settings_at(values, sigma, value)
         scales = settings[0, -self.size :]
         ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
         varied = np.concatenate([settings[0], ratio, scales])[None]
         found = self.sensitive.constants(values.arguments, sigma)
         varying = self.sensitive.text.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
         return Setting(value, unit, values, sigma, inputs, (constants, settings), (varying, varied))
+
+    def _settings_at(self, values: Values, sigma: Array, value: float) -> Array:
+        """What kernels are told beside constants: sizes mostly, which hold in the neighbourhood of a parameter."""
+        at, settings = self._near
+        if not len(settings) or abs(value - at) > NEIGHBOURHOOD * abs(at):
+            jobs = replace(self.base, values=values, sigma=sigma)
+            settings = jobs.tables(self.machine, self.which, self.which + 1, True, True)[2]
+            self._near = value, settings
+        return settings
 
     # -- runs
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from steadyslip.nonlinear.branch import Cycle
@@ -20,11 +22,27 @@ def amplitude(velocity: Array) -> float:
     return 0.5 * (high - low) / float(velocity.mean()) if high / low - 1 < 1e-3 else 0.5 * float(np.log(high / low))
 
 
-def measured(shooting: Shooting, u: Array) -> tuple[Cycle, int]:
-    """The cycle of some unknowns, run through once, and how often that goes round a shorter cycle: 1 for a true one.
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A cycle run through once.
 
-    Of the latter a prime factor up to 31: the state is back after so small a part of the period.
+    Attributes
+    ----------
+    cycle : Cycle
+    turns : int
+        How often the motion goes round a shorter cycle in the period, or a prime factor of it, up to 31: the state
+        is back after so small a part of the period. 1 for a true cycle.
+    half : ndarray (n,)
+        How far the state is from the start after half the period, in natural sizes.
     """
+
+    cycle: Cycle
+    turns: int
+    half: Array
+
+
+def measured(shooting: Shooting, u: Array) -> Measured:
+    """The cycle of some unknowns."""
     flow, orbit = shooting.flow, shooting.orbit(u)
     setting = flow.setting(orbit.value)
     trivial, others = shooting.multipliers(u)
@@ -44,8 +62,8 @@ def measured(shooting: Shooting, u: Array) -> tuple[Cycle, int]:
         if len(velocity) == 1:
             start = {name: float(seen[name][0]) for name in [v.name for v in flow.reduction.model.variables] + ["v"]}
     v, t, sigma = (np.concatenate(part) for part in (velocity, spring, normal))
-    away = np.abs(np.vstack(back)[::-1] - orbit.states[0]) / np.hypot(flow.scales, orbit.states[0])
-    same = np.flatnonzero(away.max(axis=1, initial=0.0) < SAME * shooting.amplitude)
+    away = (np.vstack(back)[::-1] - orbit.states[0]) / np.hypot(flow.scales, orbit.states[0])
+    same = np.flatnonzero(np.abs(away).max(axis=1) < SAME * shooting.amplitude)
     cycle = Cycle(
         value=orbit.value,
         period=orbit.period,
@@ -59,6 +77,6 @@ def measured(shooting: Shooting, u: Array) -> tuple[Cycle, int]:
         trivial=trivial,
         stable=bool(np.max(np.abs(others), initial=0.0) < 1),
         start=start,
-        _orbit=(orbit.states, shooting.fractions),
+        _orbit=orbit,
     )
-    return cycle, int(PRIMES[same[0]]) if len(same) else 1
+    return Measured(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0])

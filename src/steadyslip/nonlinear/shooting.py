@@ -8,7 +8,7 @@ passes there, whatever its size. Several segments are used where one would be to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,15 +16,17 @@ from steadyslip.nonlinear.continuation import Curve, Failure
 from steadyslip.nonlinear.flow import Runs
 
 Array = np.ndarray
+ONE = np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A cycle as it stands in the unknowns: segments (K, n), period, parameter."""
+    """A cycle: states at the starts of its segments (K, n), period, parameter, shares of the period (K,)."""
 
     states: Array
     period: float
     value: float
+    fractions: Array = field(default_factory=lambda: np.ones(1))
 
 
 class Shooting:
@@ -71,7 +73,7 @@ class Shooting:
         """The orbit of some unknowns."""
         states = np.sinh(u[:-2].reshape(self.segments, self.flow.size)) * self.flow.scales
         value = self.size * (np.exp(u[-1]) if self.logarithmic else u[-1])
-        return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value))
+        return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value), self.fractions)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian; see `continuation.Equations`."""

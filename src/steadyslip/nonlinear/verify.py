@@ -151,8 +151,9 @@ def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None
     still = np.eye(len(guess))[-1]  # the parameter stays
     try:
         point = shooting.curve().corrected(guess, still, 0.0, NEAR * shooting.amplitude)
-        cycle, turns = measured(shooting, point.u)
+        seen_once = measured(shooting, point.u)
     except Failure:
         return None
+    cycle = seen_once.cycle
     shrunk = cycle.amplitude < 0.5 * seen.amplitude
-    return None if turns > 1 or shrunk or abs(cycle.trivial - 1) > IMPRECISE else cycle
+    return None if seen_once.turns > 1 or shrunk or abs(cycle.trivial - 1) > IMPRECISE else cycle

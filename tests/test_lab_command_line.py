@@ -182,3 +182,15 @@ def test_figures_show_what_was_measured_and_found():
     assert drawn.get_xlabel() == "stiffness (GPa/m)"
     with pytest.raises(ss.ParameterError, match="sequence of 3"):
         ss.figures.record(record, Figure().subplots(2, 1))
+
+
+def test_options_are_used_or_refused(fitted):
+    folder, _ = fitted
+    done = run("fit", BASALT, "examples/fits/basalt.toml", "--bootstrap", "1")
+    assert done.returncode == 2
+    assert "2 or more" in done.stderr
+    done = run("analyze", "examples/double-direct-shear.toml", "--fit", folder / "fit.nc", "--branch", "1")
+    assert done.returncode == 2
+    assert "--branch" in done.stderr
+    done = run("analyze", "examples/double-direct-shear.toml", "--fit", folder / "fit.nc", "--formula")
+    assert "Critical stiffness\n  k_cr = " in done.stdout

@@ -181,3 +181,14 @@ def test_bad_words(text, words):
         piece_from_text(text)
     assert words in str(caught.value)
     assert "\n\n" not in str(caught.value)
+
+
+def test_changes_may_come_from_a_generator(tmp_path):
+    """They reach the rig and the protocol."""
+    from steadyslip.motion.commands import run_file
+
+    path = tmp_path / "rig.toml"
+    example = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
+    path.write_text(example.read_text(encoding="utf-8") + "\n[protocol]\nuntil = 5\n", encoding="utf-8")
+    with pytest.raises(ss.ParameterError, match=r"protocol\.until"):
+        run_file(path, (text for text in ["stiffness=30 GPa/m", "protocol.until=-2"]))

@@ -308,3 +308,38 @@ def test_a_record_written_is_read_again(tmp_path):
     for name in ("time", "friction", "normal", "displacement"):
         np.testing.assert_allclose(getattr(again, name), getattr(record, name), rtol=1e-11)
     assert not record.time.flags.writeable
+
+
+def test_two_columns_of_one_name_are_told_apart_by_number(tmp_path, clean):
+    """The first was read whichever number was given."""
+    table = [clean["time"], clean["friction"] + 1, clean["displacement"], clean["normal"], clean["friction"]]
+    path = write(tmp_path / "twice.csv", table, "t (s),mu,load displacement (m),normal (Pa),mu")
+    same(ss.read_record(path, friction=5), clean)
+
+
+def test_a_trend_needs_room_between_steps(clean):
+    slow = np.where(np.arange(400) // 15 % 2 == 0, 1e-6, 5e-6)
+    time = np.arange(400.0)
+    moved = np.concatenate([[0], np.cumsum(slow[1:])])
+    record = ss.record_from_arrays(time=time, friction=0.6 + 1e-5 * time, displacement=moved, normal=clean["normal"])
+    with pytest.raises(ss.NotAvailable, match="no trend can be told"):
+        record.detrended()
+
+
+def test_standing_values_may_be_numbers_of_numpy():
+    rig = ss.lab_rig("aging", v_ref=np.float64(2e-6), states=np.int64(2), stiffness=np.float64(1e10))
+    assert rig.friction.v_ref == 2e-6
+    assert rig.stiffness == 1e10
+    assert len(rig.friction.states) == 2
+    with pytest.raises(ss.ParameterError, match=r"v_ref: .* wrong dimension"):
+        ss.lab_rig(v_ref="1 MPa")
+
+
+def test_a_value_that_is_set_is_not_fitted():
+    from steadyslip.lab.spec import spec_from_text
+
+    for name in ("stiffness", "slider.stiffness"):
+        spec = spec_from_text("[friction]\nevolution = 'slip'\n", "spec", [f"{name}=2 GPa/m"])
+        assert spec.rig.stiffness == 2e9
+        assert "slider.stiffness" not in spec.options["free"]
+        assert "friction.a" in spec.options["free"]

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
+from steadyslip.config import protocol_from_text
 from steadyslip.config.layout import own_fields, sections
 from steadyslip.config.lines import key_lines, line_of
 from steadyslip.protocol import Piece
@@ -306,3 +307,26 @@ def test_a_law_of_an_installed_package_is_found_by_its_entry_point(tmp_path):
     assert broken.returncode == 2
     assert "cannot be loaded" in broken.stderr
     assert "Traceback" not in broken.stderr
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    area=st.floats(1e-9, 1e3),
+    numbers=st.tuples(*[st.floats(1e-6, 1e300)] * 4),
+    change=st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=2),
+)
+def test_rigs_with_an_area_come_back_to_the_last_bit(area, numbers, change):
+    """Totals are written; where a total would not divide to the same number, the number per unit area is."""
+    preload, stiffness, mass, damping = numbers
+    friction = ss.RateState(a=0.01, b=0.02, d_c=1e-6, mu_ref=0.6, v_ref=1e-6)
+    rig = ss.Slider(
+        friction=friction, contact=ss.Constant(preload=preload), stiffness=stiffness, mass=mass,
+        radiation_damping=damping, area=area, drive=ss.Steady(1e-6),
+    )  # fmt: skip
+    protocol = ss.Protocol(
+        pieces=(ss.NormalStressStep(at=1.0, by=change[0]), ss.NormalStressTable(time=(0.0, 1.0), change=tuple(change))),
+        until=2.0,
+    )
+    text = ss.rig_to_text(rig, protocol)
+    assert ss.rig_from_text(text) == rig
+    assert protocol_from_text(text) == protocol

@@ -70,19 +70,15 @@ def analyze(
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.analysis import analyze as run
     from steadyslip.config import read_rig
-    from steadyslip.errors import NotAvailable
 
     if fitted is not None:
-        _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable)
+        _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, branch)
         return
     result = run(read_rig(rig, changes or ()), branch=branch, kick=kick or ())
     if as_json:
         data = result.to_dict()
         if formula:
-            try:
-                data["formula"] = str(result.formula().rhs)
-            except NotAvailable:
-                data["formula"] = None
+            data |= _formula(result)
         import json
 
         say(json.dumps(data, indent=2, allow_nan=False))
@@ -92,31 +88,60 @@ def analyze(
         say(typer.style(head, bold=True, fg=colour))
         say(rest)
         if formula:
-            try:
-                equation = result.formula()
-                say(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
-            except NotAvailable as reason:
-                say(f"\nNo formula: {reason}")
+            _echo_formula(result)
     if require_stable and not result.stable:
         raise typer.Exit(1)
 
 
+def _formula(result: Any) -> dict[str, str | None]:
+    from steadyslip.errors import NotAvailable
+
+    try:
+        return {"formula": str(result.formula().rhs)}
+    except NotAvailable:
+        return {"formula": None}
+
+
+def _echo_formula(result: Any) -> None:
+    from steadyslip.errors import NotAvailable
+
+    try:
+        equation = result.formula()
+        say(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
+    except NotAvailable as reason:
+        say(f"\nNo formula: {reason}")
+
+
 def _predicted(
-    rig: Path, changes: Sequence[str], fitted: Path, kick: Sequence[str], as_json: bool, require_stable: bool
+    rig: Path,
+    changes: Sequence[str],
+    fitted: Path,
+    kick: Sequence[str],
+    as_json: bool,
+    require_stable: bool,
+    formula: bool,
+    branch: int,
 ) -> None:
     """The verdict with the friction of a fit: that of the best values, and its probability."""
     from steadyslip.analysis import analyze as run
     from steadyslip.config import read_rig
+    from steadyslip.errors import ParameterError, Problem
     from steadyslip.lab import load_fit, predict
 
+    if branch:
+        message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
+        raise ParameterError([Problem("--branch", message)])
     found = predict(read_rig(rig, changes), load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
         import json
 
-        say(json.dumps(best.to_dict() | {"prediction": found.to_dict()}, indent=2, allow_nan=False))
+        data = best.to_dict() | {"prediction": found.to_dict()} | (_formula(best) if formula else {})
+        say(json.dumps(data, indent=2, allow_nan=False))
     else:
         say(f"{found}\n\nWith the best values\n{best}")
+        if formula:
+            _echo_formula(best)
     if require_stable and not found.probability_stable >= 0.95:
         raise typer.Exit(1)
 
@@ -141,12 +166,15 @@ def fit(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """Which friction do these records show, and how sure is that?"""
+    from steadyslip.errors import ParameterError, Problem
     from steadyslip.lab import bootstrap as resample, fit_files
     from steadyslip.lab.commands import ENDINGS, as_json as plain, split_files, write_fit
     from steadyslip.output import check_output
     from steadyslip.report import fit_report
 
     check_output(output or (), ENDINGS)
+    if bootstrap == 1:
+        raise ParameterError([Problem("--bootstrap", "got 1; allowed: 0 for none, or 2 or more resampled records")])
     records, spec = split_files(files)
     found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
     for path in output or ():

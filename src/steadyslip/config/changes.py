@@ -16,7 +16,7 @@ def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
     name, equals, raw = (part.strip() for part in text.partition("="))
     if not equals or not name or not raw:
         return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
-    full, problems = _full_name(name, tables)
+    full, problems = full_name(name, tables)
     *path, last = full.split(".")
     table: Any = tables
     for step in path:
@@ -56,7 +56,7 @@ def value_of(raw: str, name: str) -> Any:
     return tables["value"]
 
 
-def _full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
+def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
     """A shortened name stands for the one key of that name that the chosen laws have."""
     known = dict.fromkeys(_known_names(tables))
     try:

@@ -288,15 +288,16 @@ class Reader:
 
         def read(text: str, total: str) -> float:
             try:
-                return parse(text, total)
+                return parse(text, total) / area
             except QuantityError as error:
                 try:
-                    return parse(text, role.unit) * area
+                    return parse(text, role.unit)
                 except QuantityError:
                     raise QuantityError(f"{error} (the rig has an area)") from error
 
         try:
-            return tuple(value / area for value in numbers(raw, total_unit(role.unit), read))
+            found = numbers(raw, total_unit(role.unit), read)
+            return tuple(v if isinstance(given, str) else v / area for given, v in zip(raw, found, strict=True))
         except QuantityError as error:
             raise ParameterError([Problem("", str(error))]) from error
 

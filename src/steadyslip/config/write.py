@@ -88,13 +88,22 @@ def _member(family: type[Record], member: Record, name: str, path: str, area: fl
 def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
     if isinstance(role, Option):
         return str(value).lower() if isinstance(value, bool) else f'"{value}"'
+    if role.domain.whole:
+        return f"{value:.0f}"
     factor, unit = outside(role.unit, area)
-    number = f"{value:.0f}" if role.domain.whole else repr(float(value) * factor)
-    return number + (f"  # {unit}" if unit != "1" else "")
+    if not _reads_back(value, factor):
+        return f'"{float(value)!r} {role.unit}"'
+    return repr(float(value) * factor) + (f"  # {unit}" if unit != "1" else "")
 
 
 def _column(role: Samples, values: tuple[float, ...], area: float | None) -> str:
     """A list of numbers, on as many lines as it needs."""
     factor, unit = outside(role.unit, area)
-    text = wrap(", ".join(repr(value * factor) for value in values), 100, break_on_hyphens=False)
+    each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {role.unit}"' for v in values]
+    text = wrap(", ".join(each), 100, break_on_hyphens=False)
     return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
+
+
+def _reads_back(value: float, factor: float) -> bool:
+    """Whether a total gives the same number per unit area again; otherwise that number is written, with its unit."""
+    return float(value) * factor / factor == float(value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from steadyslip.errors import Problem, QuantityError, unknown_name
@@ -48,6 +48,8 @@ class Column:
     factor : float
         To SI; of forces, still to be divided by an area.
     force : bool
+    place : int
+        Which column, from 0; names may occur twice.
     """
 
     role: str
@@ -55,6 +57,7 @@ class Column:
     unit: str
     factor: float
     force: bool = False
+    place: int = 0
 
 
 def split_name(name: str) -> tuple[str, str | None]:
@@ -172,7 +175,7 @@ def assigned(
         if fault:
             problems.append(Problem(role, fault))
         elif column is not None:
-            columns[role] = column
+            columns[role] = replace(column, place=place)
         notes += note
     return columns, problems, notes
 

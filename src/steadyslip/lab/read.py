@@ -83,7 +83,7 @@ def read_record(
     size = 1.0 if area is None else _checked("area", "m^2", area)
     si: dict[str, Array] = {}
     for role, column in found.items():
-        si[role] = raw.values[raw.names.index(column.name)] * (column.factor / (size if column.force else 1.0))
+        si[role] = raw.values[column.place] * (column.factor / (size if column.force else 1.0))
         notes.append(f"{role}: column {column.name!r}" + _said_unit(column, size, area is None))
     if normal_stress is not None:
         level = _checked("normal_stress", "Pa", normal_stress)

@@ -133,6 +133,11 @@ class Record:
             if last - first >= FEWEST_ROWS:
                 part = np.arange(first + (last - first) * (0 if first == 0 else 2) // 3, last)
                 rows.append(part)
+        if not rows:
+            raise NotAvailable(
+                f"no part between steps has {FEWEST_ROWS} samples or more, so that no trend can be told from the "
+                "steps; fit with trend= instead"
+            )
         level = np.zeros((sum(map(len, rows)), len(rows)))
         place = 0
         for i, part in enumerate(rows):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -144,11 +145,11 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
     v_ref_given = isinstance(tables.get("friction"), dict) and "v_ref" in tables["friction"]
     contact_given = "contact" in tables
     missing = _completed(tables, options.pop("states", None), problems)
-    from steadyslip.config.changes import apply
+    from steadyslip.config.changes import apply, full_name
 
     for change in others:
         problems += apply(change, tables, lines)
-        missing.discard(change.partition("=")[0].strip())
+        missing.discard(full_name(change.partition("=")[0].strip(), tables)[0])
     try:
         rig, protocol = from_tables(tables, lines, source, [])
     except RigFileError as error:
@@ -193,14 +194,21 @@ def lab_rig(
     v_ref : float or str
         Rate at which mu_ref holds.
     """
-    text = (
-        f"[friction]\nevolution = {evolution!r}\nv_ref = {v_ref!r}\n[friction.normal_memory]\nlaw = {normal_memory!r}\n"
-    )
-    spec = spec_from_text(f"{text}[fit]\nstates = {states}\n", "lab_rig")
+    rate = _checked("v_ref", "m/s", v_ref)
+    words = f"evolution = {json.dumps(str(evolution))}\nv_ref = {rate!r}\n"
+    memory = f"[friction.normal_memory]\nlaw = {json.dumps(str(normal_memory))}\n"
+    count = json.dumps(states, default=int) if not isinstance(states, str) else json.dumps(states)
+    spec = spec_from_text(f"[friction]\n{words}{memory}[fit]\nstates = {count}\n", "lab_rig")
     if stiffness is None:
         return spec.rig
-    value = checked_number(Parameter("Pa/m", positive, "stiffness"), stiffness)
-    return replace(spec.rig, stiffness=value)
+    return replace(spec.rig, stiffness=_checked("stiffness", "Pa/m", stiffness))
+
+
+def _checked(name: str, unit: str, value: Any) -> float:
+    try:
+        return checked_number(Parameter(unit, positive, name), value)
+    except ParameterError as error:
+        raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
 
 def _sorted_changes(changes: Iterable[str]) -> tuple[list[tuple[str, str, Any]], list[str]]:

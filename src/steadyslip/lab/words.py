@@ -9,6 +9,7 @@ import numpy as np
 
 from steadyslip.lab.steps import displacement_noise
 from steadyslip.quantities import shown
+from steadyslip.values import model_values
 
 if TYPE_CHECKING:
     from steadyslip.lab.result import Fit
@@ -91,8 +92,8 @@ def _noisy_drive(fit: Fit, part: Any) -> str | None:
         return None
     noise = displacement_noise(record.time, record.displacement)
     rig = fit.rig(0)
-    stiffness = rig.stiffness if rig.stiffness is not None else rig.axial_stiffness
-    if stiffness is None or record.normal is None:
+    stiffness = float(model_values(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
+    if record.normal is None:
         return None
     moved = noise * stiffness / float(record.normal[0])
     if moved < 0.3 * fit.rms:

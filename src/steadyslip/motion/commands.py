@@ -52,6 +52,7 @@ def run_file(
     ParameterError
         If anything is wrong; everything is listed.
     """
+    changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
     rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
     added = [piece_from_text(text, rig.area) for text in pieces]

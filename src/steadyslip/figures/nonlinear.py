@@ -64,7 +64,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         seen.add(point.kind)
         ax.plot([point.cycle.value / factor], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
     ax.set_yscale("log")
-    if np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
+    if len(branch) and np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
         ax.set_xscale("log")
     ax.set_xlabel(labelled(branch.along.rpartition(".")[2].replace("_", " "), unit))
     ax.set_ylabel(labelled("highest and lowest velocity", speed_unit))
@@ -74,18 +74,23 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
 
 
 def _velocities(branch: CycleBranch, ax: Axes, factor: float, speed: float, width: float, named: bool) -> None:
-    """Stretches of equal stability, one line each; neighbours share their point so that no gap shows."""
+    """Stretches of equal stability, one line each; neighbours share their point, but across a gap of the branch.
+
+    Where the block stops or turns round there is no lowest velocity to draw.
+    """
     stable = branch["stable"]
-    cuts = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1), len(stable)]
+    breaks = {0, len(stable), *branch.gaps}
+    cuts = sorted({*breaks, *(int(i) for i in np.flatnonzero(stable[1:] != stable[:-1]) + 1)})
     used: set[bool] = set()
     for start, stop in pairwise(cuts):
-        part = slice(max(start - 1, 0), stop)
+        part = slice(start if start in breaks else start - 1, stop)
         good = bool(stable[start])
         style = {"color": BLUE if good else VERMILION, "linestyle": "-" if good else "--", "linewidth": width}
         name = ("stable cycle" if good else "unstable cycle") if named and good not in used else ""
         used.add(good)
         for quantity in ("peak_velocity", "lowest_velocity"):
-            ax.plot(branch["value"][part] / factor, branch[quantity][part] / speed, label=name, **style)  # type: ignore[arg-type]
+            shown = np.where(branch[quantity][part] > 0, branch[quantity][part], np.nan)
+            ax.plot(branch["value"][part] / factor, shown / speed, label=name, **style)  # type: ignore[arg-type]
             name = ""
 
 

@@ -19,6 +19,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,14 @@ def analysed(text: str) -> None:
 def _no_nan(text: str) -> None:
     if re.search(r"\b(nan|inf)\b", text):
         raise AssertionError(f"no number in {text!r}")
+
+
+def _counted(count: int) -> Iterator[int]:
+    """Whole numbers below `count`, told on a terminal or in a log now and then."""
+    for i in range(count):
+        if i and i % 500 == 0:
+            print(f"{i} of {count}", file=sys.stderr, flush=True)
+        yield i
 
 
 # -- mutated files
@@ -213,7 +222,7 @@ def seeds() -> list[str]:
 def files(count: int, seed: object, analyse: int = 20) -> Iterator[tuple[str, str]]:
     """Findings, with the text that shows each. One file in `analyse` that can be read is analysed too."""
     originals = seeds()
-    for i in range(count):
+    for i in _counted(count):
         chance = random.Random(f"{seed}-{i}")
         text = mutated(chance.choice(originals), chance)
         fault = judged(lambda text=text: read(text))
@@ -297,7 +306,7 @@ def combinations(count: int, seed: object) -> Iterator[tuple[str, str]]:
     plain = program.compiled
     program.compiled = interpreted
     try:
-        for i in range(count):
+        for i in _counted(count):
             chance = random.Random(f"{seed}-{i}")
             friction, contact, drive = chance.choice(FRICTION), chance.choice(CONTACTS), chance.choice(DRIVES)
             mass = chance.choice((0.0, 1e6, 1e9))
@@ -330,11 +339,12 @@ def main() -> None:
     parser.add_argument("what", choices=("files", "combinations"))
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--analyse", type=int, default=20, help="one file in so many is analysed as well")
     parser.add_argument("--keep", type=Path, default=None)
     given = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY + 2 * 2**30, MEMORY + 2 * 2**30))  # libraries map much, use little
     start, seen = time.perf_counter(), set()
-    source = files if given.what == "files" else combinations
+    source = partial(files, analyse=given.analyse) if given.what == "files" else combinations
     number = 0
     for number, (fault, text) in enumerate(source(given.count, given.seed), start=1):
         place = fault.strip().splitlines()

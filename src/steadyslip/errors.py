@@ -117,6 +117,13 @@ class NotAvailable(SteadyslipError, ValueError):
     """The question has no answer for this rig; the message says why and what to ask instead."""
 
 
+class InternalError(SteadyslipError, RuntimeError):
+    """Something that holds by the program's own design does not: a fault of ours, not of the input."""
+
+    def __init__(self, expected: str) -> None:
+        super().__init__(f"a fault in steadyslip: expected {expected}; please report how you came here")
+
+
 def unknown_name(what: str, name: object, allowed: Iterable[str]) -> str:
     """Say that `name` is unknown, with the nearest valid name or all of them."""
     allowed = list(allowed)

@@ -6,7 +6,7 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
-from steadyslip.errors import NotAvailable
+from steadyslip.errors import InternalError, NotAvailable
 from steadyslip.linear import small_signal
 from steadyslip.linear.cubic import hopf_line
 from steadyslip.quantities import shown
@@ -234,7 +234,8 @@ def _margin_table(analysis: Analysis) -> list[str]:
 
 def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str]:
     edge = margin.edge
-    assert edge is not None
+    if edge is None:
+        raise InternalError("edge is not None")
     if margin.unit == "rad":
         change = f"{math.degrees(margin.absolute):+.4g} deg"
     elif not margin.value:

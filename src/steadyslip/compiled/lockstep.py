@@ -15,6 +15,7 @@ import sympy as sp
 from steadyslip.compiled.kernel import CHANNELS, Choice, KernelText
 from steadyslip.compiled.reduction import V_LP, P, Q, Reduction
 from steadyslip.compiled.source import Lines, indented, statements
+from steadyslip.errors import InternalError
 
 
 class LockstepText(KernelText):
@@ -97,5 +98,6 @@ class LockstepText(KernelText):
         """Where the rates of change of the inputs lie among the constants, direction by direction; -1 if nowhere."""
         order = {pair: len(self.constants.symbols) + i for i, pair in enumerate(self.constants.rates)}
         directions = range(len(self.reduction.directions))
-        assert len(CHANNELS) == len(self.varied_inputs)
+        if len(CHANNELS) != len(self.varied_inputs):
+            raise InternalError("len(CHANNELS) == len(self.varied_inputs)")
         return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs) or (-1,)

@@ -19,6 +19,7 @@ from functools import lru_cache
 
 import sympy as sp
 
+from steadyslip.errors import InternalError
 from steadyslip.expressions import asinh_exp
 from steadyslip.model import Model
 
@@ -287,7 +288,8 @@ def _inertial(model: Model, eq: _Equations) -> Reduction:
 
 
 def _outputs(eq: _Equations, written: object, acceleration: sp.Expr) -> dict[str, sp.Expr]:
-    assert callable(written)
+    if not callable(written):
+        raise InternalError("callable(written)")
     return {
         "v": written(eq.of_w),
         "acceleration": acceleration,

@@ -10,7 +10,7 @@ from steadyslip.config.changes import value_of
 from steadyslip.config.layout import selector
 from steadyslip.config.read import Reader, read_text, text_of
 from steadyslip.config.toml import Table
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.errors import InternalError, ParameterError, Problem
 from steadyslip.protocol import Piece, Protocol
 
 
@@ -81,7 +81,8 @@ def piece_from_text(text: str, area: float | None = None) -> Piece:
     piece = reader.record(Piece, table, "")
     if reader.problems:
         raise ParameterError(reader.problems, title=repr(text))
-    assert isinstance(piece, Piece)
+    if not isinstance(piece, Piece):
+        raise InternalError("isinstance(piece, Piece)")
     return piece
 
 

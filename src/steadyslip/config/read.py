@@ -21,7 +21,7 @@ from steadyslip.config.layout import (
 )
 from steadyslip.config.lines import key_lines, line_of
 from steadyslip.config.toml import NotToml, Table, tables_of
-from steadyslip.errors import ParameterError, Problem, QuantityError, RigFileError, came, unknown_name
+from steadyslip.errors import InternalError, ParameterError, Problem, QuantityError, RigFileError, came, unknown_name
 from steadyslip.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.protocol import Protocol
 from steadyslip.quantities import is_per_area, numbers, parse, total_unit
@@ -77,7 +77,8 @@ def text_of(path: str | PathLike[str]) -> str:
 def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
     """Read a rig from TOML text; see `read_rig`."""
     rig, _ = read_text(text, source, changes)
-    assert rig is not None
+    if rig is None:
+        raise InternalError("rig is not None")
     return rig
 
 
@@ -176,7 +177,8 @@ class Reader:
                 self.area = None  # reported when the slider's own keys are read
 
     def _section(self, section: Section) -> Record | None:
-        assert section.family is not None
+        if section.family is None:
+            raise InternalError("section.family is not None")
         key, default = selector(section.family)
         if section.name not in self.tables:
             example = f"{key} = {next(iter(section.family.registry))!r}" if default is None else "velocity = '1 um/s'"

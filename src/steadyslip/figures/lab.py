@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -66,7 +66,8 @@ def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
 
 def _rate_panel(data: Record, ax: Axes, time: np.ndarray) -> None:
     """Measured rates as dots, those between the steps found as a line; logarithmic where they span a decade."""
-    assert data.rate is not None
+    if data.rate is None:
+        raise InternalError("data.rate is not None")
     rates = [s.after for s in data.steps if s.unit == "m/s"] + [data.initial_rate or 0.0]
     size, name = display_unit("m/s", max(rates) or float(np.max(np.abs(data.rate))))
     moving = np.where(data.rate > 0, data.rate, np.nan)
@@ -134,7 +135,8 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
 
     draws = result if isinstance(result, Draws) else None
     source = draws.fit if draws is not None else result
-    assert not isinstance(source, Draws)
+    if isinstance(source, Draws):
+        raise InternalError("not isinstance(source, Draws)")
     names = [e.name for e in source.estimates if e.determined]
     if not names:
         raise NotAvailable("no parameter is determined; there is nothing to draw")

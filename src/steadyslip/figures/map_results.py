@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.errors import InternalError, ParameterError, Problem
 from steadyslip.figures.map_axes import KINDS, legend, place_axes, short
 from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new
 from steadyslip.sweep.refine import Refined
@@ -52,7 +52,8 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
     if words:
         groups = [(values == code, words[code], KINDS[code % len(KINDS)]) for code in np.unique(values)]
     else:
-        assert found.level is not None
+        if found.level is None:
+            raise InternalError("found.level is not None")
         above = values > found.level
         groups = [(above, f"above {found.level:.4g}", BLUE), (~above, f"below {found.level:.4g}", ORANGE)]
     for chosen, label, colour in groups:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.errors import InternalError
 from steadyslip.lab.forward import Table
 from steadyslip.lab.record import Record
 from steadyslip.lab.steps import LEAST_RATE, LEAST_STRESS, smoothed
@@ -191,7 +192,8 @@ class MeasuredInputs:
         """Two rows in place of one interval: levels where something jumps, two slopes where the displacement bends."""
         if not jumps:
             early, late = rows[row - 1, 1] - rows[row - 1, 0], rows[row, 1] - rows[row, 0]
-            assert record.displacement is not None
+            if record.displacement is None:
+                raise InternalError("record.displacement is not None")
             rate = (record.displacement[i] - record.displacement[i - 2]) / (record.time[i] - record.time[i - 2])
             gone = record.displacement[i + 1] - record.displacement[i]
             rows[row - 1, 3], rows[row, 3] = rate, (gone - rate * early) / late

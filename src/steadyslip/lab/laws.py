@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.errors import InternalError, ParameterError, Problem
 from steadyslip.friction import PRZ, Aging, RateState, Slip, State
 from steadyslip.lab.fit import fit
 from steadyslip.lab.result import Fit
@@ -121,8 +121,10 @@ def with_law(rig: Slider, label: str) -> Slider:
     if not isinstance(friction, RateState):
         raise ParameterError([Problem("rig", f"has {type(friction).__name__} friction; allowed: RateState")])
     b, d_c = (friction.b, friction.d_c) if not friction.states else (friction.states[0].b, friction.states[0].d_c)
-    assert d_c is not None
-    assert b is not None
+    if d_c is None:
+        raise InternalError("d_c is not None")
+    if b is None:
+        raise InternalError("b is not None")
     evolution = EVOLUTIONS[word]()
     if states:
         pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))

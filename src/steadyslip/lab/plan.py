@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.contact import Constant
 from steadyslip.contact.basic import Prescribed
-from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.lab.comparison import LOSSES, Comparison, Part, jump_unknowns, trend_rows, trend_unknowns
 from steadyslip.lab.forward import Forward
 from steadyslip.lab.inputs import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
@@ -89,7 +89,8 @@ class Plan:
 
     def _unknown(self, name: str, record: int | None) -> Unknown:
         if name.startswith("protocol."):
-            assert self.protocol is not None
+            if self.protocol is None:
+                raise InternalError("self.protocol is not None")
             address = parameters(self.protocol, "protocol.")[name]
             return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)
@@ -130,7 +131,8 @@ class Plan:
         rig = self.rig
         if self.protocol is None:
             rate = record.initial_rate
-            assert rate is not None
+            if rate is None:
+                raise InternalError("rate is not None")
             rig = rig.with_values({"drive.velocity": rate})
         imposed = isinstance(rig.contact, (Constant, Prescribed))
         if not imposed or record.normal is None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.lab.identify import Combination, combinations
 from steadyslip.lab.plan import make_plan
 from steadyslip.lab.read import record_from_arrays
@@ -109,7 +109,8 @@ def precision(
         problems.append(Problem("until", f"got {end!r}; give the end of the experiment in s, such as until=200"))
     if problems:
         raise ParameterError(problems)
-    assert end is not None
+    if end is None:
+        raise InternalError("end is not None")
     time = np.linspace(0.0, float(end), samples)
     level = steady_state(rig).normal_stress
     record = record_from_arrays(time, friction=np.full(samples, 0.5), normal=level, source="planned")

@@ -11,6 +11,7 @@ from typing import Any
 from steadyslip.config.lines import line_of
 from steadyslip.config.read import from_tables, parsed, text_of
 from steadyslip.errors import (
+    InternalError,
     NotAvailable,
     ParameterError,
     Problem,
@@ -154,7 +155,8 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
         rig, protocol = from_tables(tables, lines, source, [])
     except RigFileError as error:
         raise RigFileError([*_placed(problems, lines), *error.problems], title=source) from None
-    assert rig is not None
+    if rig is None:
+        raise InternalError("rig is not None")
     problems = problems or _left_open(missing, options, rig)
     if problems:
         raise RigFileError(_placed(problems, lines), title=source)

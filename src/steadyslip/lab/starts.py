@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.errors import InternalError
 from steadyslip.lab.comparison import Part
 from steadyslip.lab.inputs import ProtocolInputs
 from steadyslip.lab.record import Record
@@ -229,5 +230,6 @@ def _stress(part: Part) -> float:
 
 def _time_of(name: str, part: Part) -> float:
     """A free time of the protocol: as the protocol has it."""
-    assert isinstance(part.inputs, ProtocolInputs)
+    if not isinstance(part.inputs, ProtocolInputs):
+        raise InternalError("isinstance(part.inputs, ProtocolInputs)")
     return float(part.inputs._plain[name] or 0.0)

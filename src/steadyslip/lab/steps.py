@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.errors import InternalError
 from steadyslip.quantities import shown
 
 Array = np.ndarray
@@ -215,7 +216,8 @@ def _levels_differ(a: float, b: float) -> bool:
 
 def _transitions(ends: list[tuple[int, int]], values: Array, time: Array, differ: object) -> list[tuple[int, int]]:
     """Pairs of ranges between which something changed; short ranges in between are part of the change."""
-    assert callable(differ)
+    if not callable(differ):
+        raise InternalError("callable(differ)")
     lengths = np.array([time[j - 1] - time[i] for i, j in ends])
     found, first = [], 0
     while first < len(ends) - 1:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.compiled.program import STATUSES, TALLY
-from steadyslip.errors import ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.motion.engine import (
     ILL_POSED,
     INTERRUPTED,
@@ -180,7 +180,8 @@ def simulate_many(
             count = size if index is None else len(index)
             if not _run(jobs, store, index, count, requested, threads, advanced):
                 break
-    assert store is not None
+    if store is None:
+        raise InternalError("store is not None")
     return store.result(shape, dims, coords)
 
 

@@ -13,7 +13,7 @@ import sympy as sp
 from steadyslip.compiled.kernel import Choice
 from steadyslip.compiled.program import Program, program
 from steadyslip.compiled.reduction import TIME, V_LP, P, Q, Reduction, W, reduce_model
-from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.expressions import array_function
 from steadyslip.model import Model
 from steadyslip.protocol import Protocol, Segments, pack
@@ -352,7 +352,8 @@ def _balance(reduction: Reduction, index: int) -> Callable[..., list[Any]]:
     """The balance of a massless model before the protocol begins, and its slope in one memory variable."""
     model = reduction.model
     memory = [m.symbol for m in model.variables if m.name not in ("x", "v", "integral")]
-    assert reduction.restart is not None
+    if reduction.restart is None:
+        raise InternalError("reduction.restart is not None")
     at_rest = {V_LP: model.parameters["drive.velocity"], Q: sp.Integer(0), P: sp.Integer(0), TIME: sp.Integer(0)}
     expression = reduction.restart.xreplace({W: reduction.w_of_v}).xreplace(at_rest)
     arguments = [*model.parameters.values(), model.sigma_ss, model.symbols["x"], model.symbols["v"], *memory]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.errors import InternalError, ParameterError, Problem
 from steadyslip.nonlinear.branch import Cycle, CycleBranch
 from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.flow import Flow
@@ -272,8 +272,10 @@ def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | 
 
 def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
     """Follow the cycles from one known to another until the value is passed; the cycle there."""
-    assert start._orbit is not None
-    assert end._orbit is not None
+    if start._orbit is None:
+        raise InternalError("start._orbit is not None")
+    if end._orbit is None:
+        raise InternalError("end._orbit is not None")
     first = tracer.shooting()
     ends = [first.packed(replace(c._orbit, states=c._orbit.states[:1])) for c in (start, end) if c._orbit is not None]
     here = tracer.resumed(start._orbit, min(1.0, start.amplitude), ends[1] - ends[0])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from steadyslip.errors import InternalError
 from steadyslip.nonlinear.branch import Cycle, SpecialCycle
 from steadyslip.nonlinear.continuation import Curve, Failure, Point
 from steadyslip.nonlinear.flow import Flow, FlowFailure
@@ -122,7 +123,8 @@ class Tracer:
     def doubled(self, cycle: Cycle) -> tuple[Shooting, Point, float]:
         """The first cycle of twice the period, along the eigenvector of the multiplier −1, and its distance."""
         flow, orbit = self.flow, cycle._orbit
-        assert orbit is not None
+        if orbit is None:
+            raise InternalError("orbit is not None")
         setting, state = flow.setting(cycle.value), orbit.states[0]
         _, pieces, _ = flow.run(setting, orbit.states, orbit.fractions * orbit.period)
         whole = np.linalg.multi_dot([*pieces[::-1], np.eye(flow.size)])

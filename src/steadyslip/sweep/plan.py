@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.config import rig_to_text
 from steadyslip.config.layout import find_law
-from steadyslip.errors import ParameterError, Problem, SteadyslipError, UnknownNameError
+from steadyslip.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
 from steadyslip.protocol import Protocol
 from steadyslip.records import Address, Parameter, Record, parameters, resolve
 from steadyslip.slider import Slider
@@ -124,7 +124,8 @@ class Map:
         """Some values of a sampled parameter, its ends among them."""
         if isinstance(self.sampling, Generated):
             return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
-        assert self.sampling is not None
+        if self.sampling is None:
+            raise InternalError("self.sampling is not None")
         column = self.sampling.part(0, self.sampling.points)[name]
         return [{name: column.min()}, {name: column.max()}]
 
@@ -316,7 +317,8 @@ def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
                 found.append(measure(one))
             else:
                 law = find_law(Measure, one)
-                assert issubclass(law, Measure)
+                if not issubclass(law, Measure):
+                    raise InternalError("issubclass(law, Measure)")
                 found.append(law())
         except ParameterError as error:
             problems += [p.under("map.compute") for p in error.problems]

@@ -12,6 +12,7 @@ from steadyslip.config.layout import MAP
 from steadyslip.config.lines import line_of
 from steadyslip.config.read import Reader, from_tables, number, parsed, text_of
 from steadyslip.errors import (
+    InternalError,
     ParameterError,
     Problem,
     RigFileError,
@@ -61,7 +62,8 @@ def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), f
     found = None
     try:
         rig, protocol = from_tables(tables, lines, source, problems)
-        assert rig is not None
+        if rig is None:
+            raise InternalError("rig is not None")
         known = rig.parameters() | parameters(protocol or Protocol(), "protocol.")
         reader.check_names(known)
         reader.read_totals(known, rig.area)

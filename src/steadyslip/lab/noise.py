@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
 
+from steadyslip.results import ReadOnly
+
 Array = np.ndarray
 DETECTED = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise
 MOST_LAGS = 40
@@ -18,7 +20,7 @@ TAIL = 1e-4  # of the variance: autocovariance is followed until it has fallen b
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class Noise(ReadOnly):
     """Autoregressive description of residuals.
 
     Attributes

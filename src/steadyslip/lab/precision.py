@@ -22,6 +22,7 @@ from steadyslip.protocol import (
 )
 from steadyslip.quantities import shown
 from steadyslip.records import resolve
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_state
 
@@ -30,7 +31,7 @@ SAMPLES = 4000
 
 
 @dataclass(frozen=True, eq=False)
-class Precision:
+class Precision(ReadOnly):
     """Errors that a fit to such an experiment would have, to first order (Fisher information).
 
     Attributes

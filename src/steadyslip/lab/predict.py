@@ -18,6 +18,7 @@ from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_
 from steadyslip.nonlinear.threshold import threshold_map
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 from steadyslip.values import model_values
 
@@ -29,7 +30,7 @@ CLEAR = 0.95  # probability from which on a verdict is called clear
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class Prediction(ReadOnly):
     """What the records say about a rig.
 
     Attributes

@@ -19,6 +19,7 @@ from steadyslip.lab.unknowns import Space
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_error, shown_range
 from steadyslip.records import resolve
+from steadyslip.results import ReadOnly, read_only
 from steadyslip.slider import Slider
 
 Array = np.ndarray
@@ -93,7 +94,7 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(ReadOnly):
     """A rig fitted to records.
 
     Attributes
@@ -224,8 +225,7 @@ class Fit:
     @cached_property
     def model(self) -> Array:
         """Friction of the fitted model, trend included, at all samples."""
-        found: Array = self.comparison.model(self.coordinates[None])[0][0]
-        return found
+        return np.asarray(read_only(self.comparison.model(self.coordinates[None])[0][0]))
 
     @property
     def residuals(self) -> Array:

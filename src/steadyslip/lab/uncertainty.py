@@ -12,6 +12,7 @@ from steadyslip.lab.least_squares import minimise
 from steadyslip.lab.result import Fit
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_error, shown_range
+from steadyslip.results import ReadOnly
 
 Array = np.ndarray
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
@@ -21,7 +22,7 @@ LONGEST_BLOCK = 0.1  # of a record
 
 
 @dataclass(frozen=True, eq=False)
-class Draws:
+class Draws(ReadOnly):
     """Sets of parameters that a fit allows.
 
     Attributes
@@ -156,7 +157,7 @@ def _resampled(residuals: Array, block: int, many: int, generator: np.random.Gen
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(ReadOnly):
     """Least sum of squares with one parameter held at each of several values.
 
     Attributes

@@ -28,6 +28,7 @@ from steadyslip.motion.status import WORDS
 from steadyslip.progress import progress_bar
 from steadyslip.protocol import Protocol
 from steadyslip.records import resolve
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 
 REACHED_END = tuple(STATUSES.index(word) for word in ("done", "settled", "periodic"))
@@ -37,7 +38,7 @@ EVENT_UNITS = dict(
 
 
 @dataclass(frozen=True, eq=False)
-class Ensemble:
+class Ensemble(ReadOnly):
     """Results of many runs; every array has the broadcast shape of what was varied.
 
     Attributes

@@ -16,11 +16,12 @@ from steadyslip.motion.status import remedy
 from steadyslip.pictures import draw
 from steadyslip.protocol import Protocol
 from steadyslip.quantities import outside, shown, stress_name
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 
 
 @dataclass(frozen=True, eq=False)
-class History(Mapping[str, np.ndarray]):
+class History(ReadOnly, Mapping[str, np.ndarray]):
     """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
 
     Attributes

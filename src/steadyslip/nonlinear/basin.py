@@ -25,6 +25,7 @@ from steadyslip.nonlinear.kicks import (
 )
 from steadyslip.pictures import draw
 from steadyslip.progress import progress_bar
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_states
 from steadyslip.values import model_values
@@ -34,7 +35,7 @@ POINTS = 81
 
 
 @dataclass(frozen=True, eq=False)
-class Basin:
+class Basin(ReadOnly):
     """What comes of every starting point on a grid.
 
     Attributes

@@ -21,6 +21,7 @@ from steadyslip.nonlinear.continuation import Curve, Failure, Point, turned_roun
 from steadyslip.nonlinear.onset import coefficients, kinds, parameter_along
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_range
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 from steadyslip.values import Values, checked_array, model_values
 
@@ -50,7 +51,7 @@ class SpecialPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class HopfCurve:
+class HopfCurve(ReadOnly):
     """The oscillatory edge of stability in two parameters.
 
     Attributes

@@ -13,6 +13,7 @@ from typing import Any
 from zarr.storage import LocalStore
 
 from steadyslip.inputs import UnreadableFile, check_kind, inside
+from steadyslip.sweep.axes import COMPLETE
 
 METADATA = 2**26
 """Bytes of a file of metadata, at most."""
@@ -46,7 +47,7 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         check_kind(str(path), found)
         most = METADATA
         if "/c/" in key:
-            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD
+            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # a mark, a chunk, or nothing of ours
         if found.st_size > most:
             raise UnreadableFile(str(path), f"it has {found.st_size} bytes, more than the {most} that it may have")
 
@@ -56,6 +57,10 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         if found is None or "/c/" not in key or not self.sizes.get(name):
             return found
         content = found.to_bytes()
+        if name == COMPLETE:  # marks are as they are
+            if len(content) != self.sizes[name]:
+                raise UnreadableFile(str(self.root / key), "it is damaged, a mark has another size")
+            return found
         unpacked, packed = (int.from_bytes(content[at : at + 4], "little") for at in (4, 12))
         if len(content) < _HEAD or unpacked != self.sizes[name] or packed + 4 != len(content):
             raise UnreadableFile(str(self.root / key), "it is damaged, its sizes are not those of its array")

@@ -23,6 +23,7 @@ from steadyslip.config.layout import find_law
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown
+from steadyslip.results import ReadOnly
 from steadyslip.sweep.axes import SAMPLE
 from steadyslip.sweep.measures import Measure
 from steadyslip.sweep.plan import AnyMeasure, Map
@@ -35,7 +36,7 @@ MOST_AXES = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
+class Refined(ReadOnly):
     """An edge of a map, and the points computed to find it.
 
     Attributes

@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.pictures import draw
+from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 from steadyslip.sweep.axes import Samples
 from steadyslip.sweep.plan import Map, evaluate
@@ -23,7 +24,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(ReadOnly):
     """Shares of a result's variance that parameters are responsible for.
 
     Attributes

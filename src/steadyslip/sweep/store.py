@@ -56,7 +56,7 @@ class Store:
         self.sampled, self.generated = layout.sampled, layout.generated
         writable = os.access(path, os.W_OK)
         self.folder: Any = MapFolder(path, read_only=not writable)
-        self.folder.sizes = {name: one.unpacked for name, one in layout.arrays.items() if name != COMPLETE}
+        self.folder.sizes = {name: one.unpacked for name, one in layout.arrays.items()}
         try:
             self.group: Any = zarr.open_group(
                 self.folder, mode="r+" if writable else "r", zarr_format=3, use_consolidated=True

@@ -12,6 +12,7 @@ import numpy as np
 from steadyslip.errors import NotAvailable, ParameterError, Problem, SteadyslipError, UnknownNameError, unknown_name
 from steadyslip.quantities import parse
 from steadyslip.records import resolve
+from steadyslip.results import ReadOnly
 from steadyslip.sweep.axes import SAMPLE
 from steadyslip.sweep.result import MapResult
 
@@ -23,7 +24,7 @@ BAND = (0.025, 0.5, 0.975)
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class View(ReadOnly):
     """Numbers of a picture, in SI units.
 
     Attributes

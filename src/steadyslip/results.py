@@ -1,0 +1,29 @@
+"""What results have in common: nobody writes to their arrays."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+
+class ReadOnly:
+    """Base of frozen dataclasses that hold arrays, which become read-only, in tuples and dictionaries too."""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
+            object.__setattr__(self, item.name, read_only(getattr(self, item.name)))
+
+
+def read_only(value: Any) -> Any:
+    """A view of an array that cannot be written to; of tuples and dictionaries with such arrays in them."""
+    if type(value) is np.ndarray:
+        view = value.view()
+        view.setflags(write=False)
+        return view
+    if type(value) is tuple and any(type(one) is np.ndarray for one in value):
+        return tuple(read_only(one) for one in value)
+    if type(value) is dict:
+        return {name: read_only(one) for name, one in value.items()}
+    return value

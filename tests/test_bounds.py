@@ -1,16 +1,18 @@
 """Nothing that a person can type or hand over keeps the program busy for ever, is half read, or ends in a traceback."""
 
 import contextlib
+import json
 import math
 import os
 import time
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from steadyslip import Slider, read_record, read_rig
+from steadyslip import Slider, load_history, read_protocol, read_record, read_rig, simulate
 from steadyslip.config import rig_from_text
 from steadyslip.config.lines import key_lines
 from steadyslip.config.toml import MOST_PARTS, NotToml, tables_of
@@ -350,3 +352,66 @@ def test_a_used_fit_can_be_copied_and_sent():
         assert "comparison" not in vars(twin)
         assert np.array_equal(twin.coordinates, numbers)
         assert twin.search == fit.search
+
+
+# -- interruptions
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [None, [0.0, 1.0, 2e8]])
+def test_an_interrupted_run_is_what_there_is(times, tmp_path):
+    path = Path(__file__).parents[1] / "examples" / "stick-slip.toml"
+    told = []
+
+    def progress(time):
+        told.append(time)
+        if len(told) == 2:
+            raise KeyboardInterrupt  # as Ctrl-C between two calls of the kernel
+
+    run = simulate(read_rig(path), read_protocol(path), until=3e8, times=times, progress=progress)
+    assert run.status == "interrupted"
+    assert run.interrupted
+    assert run.end == told[-1] > told[0] > 0
+    assert run.steps > 0
+    assert len(run["t"]) == (2 if times else run.steps + 1)
+    assert run["t"][-1] <= run.end
+    assert all(np.all(np.isfinite(values)) for values in run.data.values())
+    assert all(event.time <= run.end for event in run.events)
+    json.dumps(run.to_dict(), allow_nan=False)
+    run.save(tmp_path / "run.nc")
+    assert load_history(tmp_path / "run.nc").status == "interrupted"
+
+
+def test_interrupted_thresholds_keep_those_found(monkeypatch, tmp_path):
+    from steadyslip.nonlinear import commands
+
+    def threshold(rig, kick, **options):
+        if kick == "displacement":
+            raise KeyboardInterrupt
+        return f"threshold of {kick}"
+
+    monkeypatch.setattr(commands, "threshold", threshold)
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG)
+    found = commands.thresholds_of_file(path, (), ("velocity", "displacement", "impulse"), False, "before")
+    assert found.found == ("threshold of velocity",)
+    assert found.interrupted
+    with pytest.raises(KeyboardInterrupt):  # nothing to keep
+        commands.thresholds_of_file(path, (), ("displacement",), False, "before")
+
+
+def test_an_interrupted_answer_is_printed_with_its_status(capsys):
+    import typer
+
+    from steadyslip import cli
+
+    class Answer:
+        interrupted = True
+
+        def __str__(self):
+            return "what there is"
+
+    with pytest.raises(typer.Exit) as left:
+        cli._given(Answer(), [], False, print)
+    assert left.value.exit_code == 130
+    assert capsys.readouterr().out == "what there is\n"

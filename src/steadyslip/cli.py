@@ -179,7 +179,17 @@ def fit(
     found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
     for path in output or ():
         write_fit(found, comparison, path, fit_report)
-    draws = resample(found, bootstrap) if bootstrap >= 2 else None
+    if not as_json:
+        for record in found.plan.records:
+            say(f"{record}\n")
+        if comparison is not None:
+            say(f"{comparison}\n")
+        say(str(found))
+    draws, interrupted = None, False
+    try:
+        draws = resample(found, bootstrap) if bootstrap else None
+    except KeyboardInterrupt:
+        interrupted = True
     if as_json:
         import json
 
@@ -187,16 +197,12 @@ def fit(
         if draws is not None:
             data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
         say(json.dumps(data, indent=2, allow_nan=False))
-        return
-    for record in found.plan.records:
-        say(f"{record}\n")
-    if comparison is not None:
-        say(f"{comparison}\n")
-    say(str(found))
-    if draws is not None:
+    elif draws is not None:
         say(f"\n{draws}")
-    for path in output or ():
+    for path in () if as_json else output or ():
         say(f"wrote {path}")
+    if interrupted:
+        raise typer.Exit(130)
 
 
 @app.command()
@@ -230,16 +236,12 @@ def simulate(
 
     check_output(output or (), ENDINGS)
     history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol)
-    for path in output or ():
-        write_history(history, path, "phase" if phase else "history")
-    if as_json:
-        import json
-
-        say(json.dumps(history.to_dict(), indent=2, allow_nan=False))
-        return
-    say(history.summary())
-    for path in output or ():
-        say(f"wrote {path}")
+    _given(
+        history,
+        output or (),
+        as_json,
+        lambda result, path: write_history(result, path, "phase" if phase else "history"),
+    )
 
 
 @app.command()
@@ -366,17 +368,19 @@ def sensitivity(
 
 
 def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], None]) -> None:
-    """Write the files asked for, then print JSON or words."""
-    for path in output:
-        write(result, path)
+    """Print JSON or words, then write the files asked for: an answer is not lost with a file."""
     if as_json:
         import json
 
         say(json.dumps(result.to_dict(), indent=2, allow_nan=False))
-        return
-    say(str(result))
+    else:
+        say(str(result))
     for path in output:
-        say(f"wrote {path}")
+        write(result, path)
+        if not as_json:
+            say(f"wrote {path}")
+    if getattr(result, "interrupted", False):
+        raise typer.Exit(130)
 
 
 @app.command()

@@ -8,6 +8,19 @@ from contextlib import contextmanager
 
 
 @contextmanager
+def progress_text(text: str) -> Iterator[Callable[[str], None]]:
+    """A turning mark and a text on a terminal while something of unknown length goes on; what it yields changes it."""
+    if not sys.stderr.isatty():
+        yield lambda changed: None
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    with Console(stderr=True).status(Text(text)) as status:
+        yield lambda changed: status.update(Text(changed))
+
+
+@contextmanager
 def progress_bar(
     size: int, wanted: bool | None = None, noun: str = "runs", done: int = 0
 ) -> Iterator[Callable[[int], None] | None]:

@@ -13,7 +13,9 @@ from steadyslip.errors import ParameterError, Problem
 from steadyslip.motion.result import History
 from steadyslip.motion.single import simulate
 from steadyslip.output import FIGURES, write_by_ending
+from steadyslip.progress import progress_text
 from steadyslip.protocol import Protocol
+from steadyslip.quantities import shown
 from steadyslip.records import Parameter, checked_number, positive
 
 ENDINGS = (".nc", ".csv", *FIGURES)
@@ -64,7 +66,15 @@ def run_file(
             [Problem("until", "missing; give the end as --until '200 s', or write [protocol] with until in the file")]
         )
     times = None if samples is None else np.linspace(0.0, end, samples)
-    return simulate(rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol)
+    with progress_text("simulating") as said:
+
+        def progress(time: float) -> None:
+            said(f"simulating, at {shown(time, 's')} of {shown(end, 's')}; Ctrl-C keeps what there is")
+
+        return simulate(
+            rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol,
+            progress=progress,
+        )  # fmt: skip
 
 
 def _seconds(text: str) -> float:

@@ -41,7 +41,7 @@ class Call:
     def __init__(self, machine: Program, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
         text = machine.text
         lanes = text.choice.lanes
-        self.advance = machine.module.advance
+        self.advance, self.rows = machine.module.advance, text.rows
         self.tables, self.times = tables, times
         self.work = np.zeros(text.row_count * lanes)
         self.ids = np.zeros(lanes, dtype=np.int64)
@@ -61,6 +61,17 @@ class Call:
         )  # fmt: skip
         return found
 
+    def time(self) -> float:
+        """Time that the job of the only lane has reached, s."""
+        tau, start, end, stop = (float(self.work[self.rows[name]]) for name in ("TAU", "START", "END", "STOP"))
+        return min(start + tau, stop) if tau < end else stop
+
+    def cut_off(self) -> None:
+        """Where the job of the only lane is, as its end: it will not go on."""
+        first = self.rows["Y"]
+        reached = [self.work[self.rows[name]] for name in ("SEGMENT", "ACCEPTED", "REJECTED")]
+        self.final[0] = [self.time(), *reached, *self.work[first : first + self.final.shape[1] - 4]]
+
     def outcome(self) -> Outcome:
         self.status[self.status == 0] = INTERRUPTED
         return Outcome(
@@ -69,13 +80,22 @@ class Call:
         )  # fmt: skip
 
 
-def run_single(jobs: Jobs, machine: Program, times: np.ndarray, watch: bool, record: bool) -> Outcome:
+def run_single(
+    jobs: Jobs, machine: Program, times: np.ndarray, watch: bool, record: bool,
+    progress: Callable[[float], None] | None = None,
+) -> Outcome:  # fmt: skip
     """One trajectory, with its events and, if asked, its own steps. Ctrl-C ends it early, with what there is."""
-    return run_tables(machine, jobs.tables(machine, 0, 1, watch, record), times)
+    return run_tables(machine, jobs.tables(machine, 0, 1, watch, record), times, progress)
 
 
-def run_tables(machine: Program, tables: tuple[np.ndarray, ...], times: np.ndarray) -> Outcome:
-    """`run_single` from the kernel's own arrays; what to watch and record stands in the settings."""
+def run_tables(
+    machine: Program, tables: tuple[np.ndarray, ...], times: np.ndarray,
+    progress: Callable[[float], None] | None = None,
+) -> Outcome:  # fmt: skip
+    """`run_single` from the kernel's own arrays; what to watch and record stands in the settings.
+
+    `progress` is told the time reached, in s, now and then.
+    """
     settings = tables[2][0]
     call = Call(machine, tables, 1, times)
     if settings[SETTINGS.index("watch")]:
@@ -87,8 +107,11 @@ def run_tables(machine: Program, tables: tuple[np.ndarray, ...], times: np.ndarr
             if reason == 1:
                 call.log = np.concatenate([call.log, np.zeros_like(call.log)])
                 call.recorded = np.concatenate([call.recorded, np.zeros_like(call.recorded)])
+            if progress is not None:
+                progress(call.time())
     except KeyboardInterrupt:
-        pass
+        if call.status[0] == 0:
+            call.cut_off()
     return call.outcome()
 
 

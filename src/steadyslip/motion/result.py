@@ -71,6 +71,11 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
         return len(self.data)
 
     @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the run early."""
+        return self.status == "interrupted"
+
+    @property
     def message(self) -> str:
         """The status in a sentence, with what to do where the run ended early."""
         head = f"{self.status} at {shown(self.end, 's')}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -34,6 +34,7 @@ def simulate(
     most_steps: int = 10_000_000,
     arrest: float = 1e-3,
     branch: int = 0,
+    progress: Callable[[float], None] | None = None,
 ) -> History:
     """Integrate a rig's motion in time.
 
@@ -63,11 +64,14 @@ def simulate(
         Share of the drive velocity below which the block counts as arrested.
     branch : int, optional
         Which steady sliding to start from where there are several.
+    progress : callable, optional
+        Called with the time reached, s, while the run goes on.
 
     Returns
     -------
     History
-        Its `status` says how the run ended. A run that cannot be continued returns what there is.
+        Its `status` says how the run ended. A run that cannot be continued returns what there is, and so does one
+        that is stopped by Ctrl-C: ``interrupted``.
 
     Raises
     ------
@@ -87,7 +91,7 @@ def simulate(
     final = float(jobs.segments.end.max())
     requested = checked_times(times, final)
     machine = jobs.program(lanes=1, dense=True)
-    outcome = run_single(jobs, machine, requested, watch=events, record=times is None)
+    outcome = run_single(jobs, machine, requested, watch=events, record=times is None, progress=progress)
     plan = replace(Protocol.of(protocol), until=final)
     return _history(rig, plan, jobs, machine, outcome, requested, times is None)
 

@@ -213,6 +213,11 @@ class CycleBranch:
         """Draw the branch; see `steadyslip.figures.cycle_branch`."""
         return draw(self, kind, ax=ax)
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the branch early."""
+        return self.end.startswith("interrupted")
+
     def __str__(self) -> str:
         area = self.rig.area
         edge = shown(self.onset.value, self.unit, 6, area)

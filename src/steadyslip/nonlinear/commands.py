@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +14,7 @@ from steadyslip.nonlinear.branch import Cycle, CycleBranch
 from steadyslip.nonlinear.cycles import cycles
 from steadyslip.nonlinear.threshold import Threshold, threshold
 from steadyslip.output import FIGURES, write_by_ending, write_dataset
+from steadyslip.progress import progress_text
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
 
@@ -27,14 +26,10 @@ def cycles_of_file(
 ) -> CycleBranch:
     """`steadyslip.cycles` for the rig of a file; shows progress on a terminal."""
     rig = read_rig(path, changes)
-    if not sys.stderr.isatty():
-        return cycles(rig, along, between=between, doublings=doublings)
-    from rich.console import Console
-
-    with Console(stderr=True).status("following cycles; Ctrl-C keeps what there is") as status:
+    with progress_text("following cycles; Ctrl-C keeps what there is") as said:
 
         def progress(count: int, cycle: Cycle) -> None:
-            status.update(f"{count} cycles, period {shown(cycle.period, 's')}; Ctrl-C keeps what there is")
+            said(f"{count} cycles, period {shown(cycle.period, 's')}; Ctrl-C keeps what there is")
 
         return cycles(rig, along, between=between, doublings=doublings, progress=progress)
 
@@ -57,6 +52,7 @@ class Thresholds:
 
     rig: Slider
     found: tuple[Threshold, ...]
+    interrupted: bool = False
 
     def __str__(self) -> str:
         return "\n".join(map(str, self.found))
@@ -69,16 +65,18 @@ class Thresholds:
 def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str
 ) -> Thresholds:
-    """`steadyslip.threshold` for several kinds of kick and the rig of a file."""
+    """`steadyslip.threshold` for several kinds of kick and the rig of a file; shows progress on a terminal."""
     rig = read_rig(path, changes)
-    waiting: Any = nullcontext()
-    if sys.stderr.isatty():
-        from rich.console import Console
-
-        waiting = Console(stderr=True).status("kicking")
-    with waiting:
-        direction = -1 if reverse else 1
-        return Thresholds(rig, tuple(threshold(rig, k, direction=direction, reference=reference) for k in kicks))
+    found: list[Threshold] = []
+    names = tuple(kicks)
+    try:
+        for kick in names:
+            with progress_text(f"{kick} kicks ({len(found) + 1} of {len(names)}); Ctrl-C keeps what there is"):
+                found.append(threshold(rig, kick, direction=-1 if reverse else 1, reference=reference))
+    except KeyboardInterrupt:
+        if not found:
+            raise
+    return Thresholds(rig, tuple(found), len(found) < len(names))
 
 
 def write_basin(thresholds: Thresholds, path: Path) -> None:

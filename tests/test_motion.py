@@ -12,6 +12,7 @@ from scipy.special import lambertw
 import steadyslip as ss
 from dimensionless import MU, A, phi_of, unit_rig, y_of
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
+from steadyslip.compiled.kernel import SLIP_EVENT
 from steadyslip.compiled.program import Program
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.setup import Options, prepare
@@ -73,10 +74,16 @@ def test_energy_is_accounted_for(law):
 def test_orbits(row):
     lam, phi = float(row["lam"]), float(row["start"].split("=")[-1])
     run = ss.simulate(unit_rig(row["law"], lam, lam), until=80.0, initial={"v": np.exp(phi)}, rtol=1e-10)
-    slips = run.slip_events
-    assert slips[-1].recurrence == pytest.approx(float(row["period_DOP853"]), rel=1e-9)
-    assert np.log(slips[-1].peak_velocity) == pytest.approx(float(row["phi_max"]), rel=1e-9)
-    assert slips[-1].stress_drop / A == pytest.approx(float(row["f_max"]) - float(row["f_min"]), rel=1e-8)
+    peaks = [event for event in run.events if event.kind == "velocity peak"]
+    assert np.log(peaks[-1].velocity) == pytest.approx(float(row["phi_max"]), rel=1e-9)
+    assert peaks[-1].time - peaks[-2].time == pytest.approx(float(row["period_DOP853"]), rel=1e-7)
+    if float(row["phi_max"]) < np.log(SLIP_EVENT):
+        assert run.slip_events == ()
+        return
+    last = run.slip_events[-1]
+    assert last.recurrence == pytest.approx(float(row["period_DOP853"]), rel=1e-9)
+    assert np.log(last.peak_velocity) == pytest.approx(float(row["phi_max"]), rel=1e-9)
+    assert last.stress_drop / A == pytest.approx(float(row["f_max"]) - float(row["f_min"]), rel=1e-8)
 
 
 @pytest.mark.parametrize("row", table("aging_periods.csv"), ids=lambda row: f"{row['lam']} {row['ln_Omega0']}")
@@ -93,6 +100,83 @@ def test_stick_slip_cycles(row):
     assert last.recurrence == pytest.approx(float(row["period_DOP853"]), rel=3e-11)
     assert last.stress_drop / A == pytest.approx(float(row["dtau_DOP853"]), rel=1e-10)
     assert np.log(last.peak_velocity) == pytest.approx(float(row["phimax_DOP853"]), rel=1e-9)
+
+
+# -- slip events
+
+
+def excursions(run):
+    """Slip events by their definition, from dense samples: (begin, end, peak) of each time ahead of the load point."""
+    t, v, load = run["t"], run["v"], run["load_velocity"]
+    drive = run.rig.drive.velocity
+    ahead = v > np.maximum(load, 1e-3 * drive)
+    edges = np.flatnonzero(np.diff(ahead.astype(int)))
+    found = []
+    for first in edges[~ahead[edges]] + 1:
+        later = edges[edges >= first]
+        if not len(later):
+            break
+        part = slice(first, later[0] + 1)
+        asked = np.where(load[part] > 1e-3 * drive, load[part], drive)
+        if np.any(v[part] >= SLIP_EVENT * np.maximum(asked, v[first - 1])):
+            found.append((t[first], t[later[0]], v[part].max()))
+    return found
+
+
+SLOW_LUGRE = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
+
+
+@pytest.mark.parametrize(
+    ("a_rig", "protocol", "count"),
+    [
+        (unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=1.03), 0),  # ringing, an overshoot of 2 %
+        (unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=3.0), 20),  # ringing from an overshoot of 13 times
+        (unit_rig("aging", 0.5, 1.5), ss.VelocityStep(at=5, to=0.1), 0),  # slowing down to a tenth
+        (unit_rig("aging", 0.5, 20.0), ss.Hold(at=5, duration=30.0), 0),
+        (unit_rig("aging", 0.5, 20.0), ss.SlideHoldSlide(at=5, hold=1, factor=10, slide=10, repeats=3), 0),
+        (unit_rig("aging", 0.5, 0.3, 1e-3), ss.VelocityStep(at=5, to=1.1) + ss.Hold(at=100, duration=50), None),
+    ],
+    ids=["overshoot", "ringing", "slower", "hold", "slide-hold-slide", "stick-slip"],
+)
+def test_slip_events_are_what_their_definition_says(a_rig, protocol, count):
+    """Against dense samples; an overshoot, a hold and slide-hold-slide on a stiff rig are not slip events."""
+    run = ss.simulate(a_rig, protocol, until=200.0, times=np.linspace(0, 200, 40001))
+    expected = excursions(run)
+    assert len(run.slip_events) == len(expected)
+    assert count is None or len(expected) == count
+    for slip, (begin, end, peak) in zip(run.slip_events, expected, strict=True):
+        assert (slip.begin, slip.end) == pytest.approx((begin, end), abs=0.006)
+        assert slip.peak_velocity >= peak * (1 - 1e-6)
+        assert slip.stress_drop > 0
+    assert sum(event.kind == "slip begins" for event in run.events) in (len(expected), len(expected) + 1)
+    if count is None:
+        assert len(expected) > 5
+        assert not any(100 < slip.begin < 150 for slip in run.slip_events)
+    many = ss.simulate_many(a_rig, {}, protocol, until=200.0)
+    assert many.events["events"] == len(expected)
+    if not expected:
+        assert np.isnan(many.events["event_begin"])
+        assert np.isnan(many.events["event_peak_velocity"])
+        assert many.events["event_stress_drop"] == 0
+
+
+def test_a_held_block_that_vibrates_makes_no_slip_events():
+    """With mass a held block swings about rest, through both signs of velocity."""
+    a_rig = rig(friction=SLOW_LUGRE, mass=1e8, stiffness=4e11)
+    protocol = ss.SlideHoldSlide(at=2.0, hold=1.0, factor=3.0, slide=3.0, repeats=3)
+    run = ss.simulate(a_rig, protocol, until=25.0, times=np.linspace(0, 25, 20001))
+    held = run["load_velocity"] == 0
+    assert np.sum(np.diff(np.sign(run["v"][held])) != 0) > 10
+    assert run.slip_events == ()
+
+
+def test_a_kick_during_a_hold_begins_where_it_is_given():
+    """The block had not come to rest: the slip event begins at the kick, not with the hold."""
+    protocol = ss.Hold(at=5.0, duration=40.0) + ss.NormalStressStep(at=6.0, by=-0.08)
+    run = ss.simulate(unit_rig("aging", 0.5, 1.5, 1e-3), protocol, until=60.0)
+    (slip, *_) = run.slip_events
+    assert slip.begin == pytest.approx(6.0)
+    assert slip.peak_velocity > 2.0
 
 
 def test_error_of_default_settings():

@@ -13,7 +13,7 @@ SETTLED, PERIODIC = 7, 8
 NEXT_JOB, LAST_JOB, BUSY, PAUSED, LOGGED, RECORDED, FIRST_JOB = 0, 1, 2, 3, 4, 5, 6
 # columns of `settings`
 S_RTOL, S_MOST, S_V_HIGH, S_V_LOW, S_SIGMA_LOW, S_WATCH, S_RECORD = 0, 1, 2, 3, 4, 5, 6
-S_GUESS, S_Z_SCALE, S_H, S_SETTLED, S_SAME, S_ATOL = 7, 8, 9, 10, 11, 12
+S_GUESS, S_Z_SCALE, S_H, S_SETTLED, S_SAME, S_V_DRIVE, S_ATOL = 7, 8, 9, 10, 11, 12, 13
 # kinds in the log
 EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN, TROUGH = 1, 2, 3, 4, 5, 6, 7, 8
 # columns of `tally`: what is known about a trajectory's slip events
@@ -32,6 +32,7 @@ NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, DECIDED, A
     21,
     22,
 )
+NOW_FROM, NOW_EVENT, NOW_V, NOW_SIGMA, NOW_TAU, NOW_SEGMENT = 23, 24, 25, 26, 27, 28
 LOG_COLUMNS = 8
 
 
@@ -156,7 +157,7 @@ def start_job(R, j, cursor, log, arrays, y, out):
     for i in range(NK):
         R[ROW_CONTINUOUS + i] = initial[j if initial.shape[0] > 1 else 0, i]
     own = settings[j if settings.shape[0] > 1 else 0]
-    for i in range(24):
+    for i in range(TALLY_ROWS):
         R[ROW_TALLY + i] = 0.0
     R[ROW_RTOL] = own[S_RTOL]
     R[ROW_MOST] = own[S_MOST]
@@ -169,6 +170,7 @@ def start_job(R, j, cursor, log, arrays, y, out):
     R[ROW_Z_SCALE] = own[S_Z_SCALE]
     R[ROW_SETTLED] = own[S_SETTLED]
     R[ROW_SAME] = own[S_SAME]
+    R[ROW_V_DRIVE] = own[S_V_DRIVE]
     R[ROW_H] = own[S_H]
     for i in range(N):
         R[ROW_ATOL + i] = own[S_ATOL + i]
@@ -186,10 +188,12 @@ def start_job(R, j, cursor, log, arrays, y, out):
     v = R[ROW_OUT]
     R[ROW_TALLY + V_MAX] = v
     R[ROW_TALLY + V_MIN] = v
-    R[ROW_TALLY + RECURRENCE] = math.nan
+    for i in (LAST_BEGIN, LAST_PEAK, RECURRENCE, PEAK_TIME):  # there is none so far
+        R[ROW_TALLY + i] = math.nan
     R[ROW_TALLY + PEAK_PERIOD] = math.nan
     R[ROW_TALLY + PEAK_GROWTH] = math.nan
     R[ROW_TALLY + NOW_BEGIN] = math.nan
+    R[ROW_TALLY + NOW_FROM] = math.inf
     R[ROW_SLIPPING] = 1.0 if R[ROW_GAP] > 0.0 else 0.0
     R[ROW_RESTING] = 1.0 if abs(v) < own[S_V_LOW] else 0.0
     if R[ROW_WATCH] > 0.0 and R[ROW_SLIPPING] > 0.0:
@@ -297,7 +301,46 @@ def follow(R, cursor, log, y, out, order):
     R[ROW_TALLY + V_MAX] = max(R[ROW_TALLY + V_MAX], v)
     R[ROW_TALLY + V_MIN] = min(R[ROW_TALLY + V_MIN], v)
     R[ROW_TALLY + NOW_PEAK] = max(R[ROW_TALLY + NOW_PEAK], v)
+    if R[ROW_TALLY + NOW_EVENT] == 0.0 and v >= SLIP_EVENT * R[ROW_TALLY + NOW_FROM]:
+        for i in range(N):
+            y[i] = R[ROW_Y + i]
+        outputs_at(R, R[ROW_TAU], y, out)
+        quicken(R, out, log, cursor)
     return False
+
+
+@njit(**PLAIN)
+def outrun(R, slowest, tau, y, out):
+    """Keep where a block ahead of the load point was slowest: there its slip begins, if it becomes a slip event."""
+    T = ROW_TALLY
+    R[T + NOW_FROM] = slowest
+    R[T + NOW_EVENT] = 0.0
+    R[T + NOW_BEGIN] = R[ROW_START] + tau
+    R[T + NOW_PEAK] = R[T + NOW_V] = out[0]
+    R[T + NOW_SIGMA] = out[2]
+    R[T + NOW_TAU] = out[3]
+    R[T + NOW_STRESS] = out[4]
+    R[T + NOW_X] = y[0] + R[T + LOAD_MOVED] + load_advance(R, tau)
+    R[T + NOW_SEGMENT] = R[ROW_SEGMENT]
+
+
+@njit(**PLAIN)
+def quicken(R, out, log, cursor):
+    """Slip becomes a slip event when the block is SLIP_EVENT times as fast as asked and as at its slowest.
+
+    Asked is the velocity of the load point, or of the drive while the load point rests.
+    """
+    T = ROW_TALLY
+    asked = out[5] if out[5] > R[ROW_V_LOW] else R[ROW_V_DRIVE]
+    if R[T + NOW_EVENT] > 0.0 or not out[0] >= SLIP_EVENT * max(asked, R[T + NOW_FROM]):
+        return
+    R[T + NOW_EVENT] = 1.0
+    if log.shape[0] > 0:
+        i = cursor[LOGGED]
+        log[i, 0], log[i, 1], log[i, 2], log[i, 3] = EVENT_BEGINS, R[T + NOW_BEGIN], R[T + NOW_V], R[T + NOW_SIGMA]
+        log[i, 4], log[i, 5], log[i, 6] = R[T + NOW_TAU], R[T + NOW_STRESS], R[T + NOW_X]
+        log[i, 7] = R[T + NOW_SEGMENT]
+        cursor[LOGGED] = i + 1
 
 
 @njit(**PLAIN)
@@ -305,17 +348,21 @@ def note(R, kind, tau, y, out, log, cursor):
     """Keep the tally of events, and the log where there is one."""
     time = clock(R, tau)
     place = y[0] + R[ROW_TALLY + LOAD_MOVED] + load_advance(R, tau)
+    if kind == EVENT_BEGINS:  # logged once it is fast, if ever: see quicken
+        outrun(R, out[0], tau, y, out)
+        return
+    is_event = R[ROW_TALLY + NOW_EVENT] > 0.0
+    if kind == EVENT_ENDS:
+        R[ROW_TALLY + NOW_FROM] = math.inf
+        R[ROW_TALLY + NOW_EVENT] = 0.0
+        if not is_event:
+            return
     if log.shape[0] > 0:
         i = cursor[LOGGED]
         log[i, 0], log[i, 1], log[i, 2], log[i, 3] = kind, time, out[0], out[2]
         log[i, 4], log[i, 5], log[i, 6], log[i, 7] = out[3], out[4], place, R[ROW_SEGMENT]
         cursor[LOGGED] = i + 1
-    if kind == EVENT_BEGINS:
-        R[ROW_TALLY + NOW_BEGIN] = time
-        R[ROW_TALLY + NOW_STRESS] = out[4]
-        R[ROW_TALLY + NOW_X] = place
-        R[ROW_TALLY + NOW_PEAK] = out[0]
-    elif kind == EVENT_ENDS:
+    if kind == EVENT_ENDS:
         begin = R[ROW_TALLY + NOW_BEGIN]
         if R[ROW_TALLY + ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
             R[ROW_TALLY + RECURRENCE] = begin - R[ROW_TALLY + LAST_BEGIN]
@@ -337,8 +384,11 @@ def note(R, kind, tau, y, out, log, cursor):
         R[ROW_TALLY + PEAK_TIME] = time
         R[ROW_TALLY + V_MAX] = max(R[ROW_TALLY + V_MAX], out[0])
         R[ROW_TALLY + NOW_PEAK] = max(R[ROW_TALLY + NOW_PEAK], out[0])
+        quicken(R, out, log, cursor)
     elif kind == TROUGH:
         R[ROW_TALLY + V_MIN] = min(R[ROW_TALLY + V_MIN], out[0])
+        if not is_event and out[0] < R[ROW_TALLY + NOW_FROM] < math.inf:  # what came before was no event
+            outrun(R, out[0], tau, y, out)
 
 
 @njit(**PLAIN)
@@ -445,7 +495,7 @@ def go_on(R, j, cursor, arrays, results, y, out, order):
         s = j if segments.shape[0] > 1 else 0
         if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
             return DONE
-        h = R[ROW_H]
+        h, before = R[ROW_H], R[ROW_OUT]
         if not enter_segment(R, j, k, segments, y, out):
             return NO_VELOCITY
         await_sample(R, times)
@@ -453,21 +503,23 @@ def go_on(R, j, cursor, arrays, results, y, out, order):
         if R[ROW_RECORD] > 0.0:
             record(R, cursor, recorded)
         if R[ROW_WATCH] > 0.0:
-            crossed(R, cursor, log, y, out)
+            crossed(R, before, cursor, log, y, out)
     return RUNNING
 
 
 @njit(**PLAIN)
-def crossed(R, cursor, log, y, out):
-    """A jump can begin or end a slip event at once."""
+def crossed(R, before, cursor, log, y, out):
+    """A jump from the velocity `before` can begin or end a slip event at once."""
     for i in range(N):
         y[i] = R[ROW_Y + i]
     outputs_at(R, 0.0, y, out)
     slipping = 1.0 if R[ROW_GAP] > 0.0 else 0.0
     if slipping != R[ROW_SLIPPING]:
-        kind = EVENT_BEGINS if slipping > 0.0 else EVENT_ENDS
-        note(R, kind, 0.0, y, out, log, cursor)
+        note(R, EVENT_BEGINS if slipping > 0.0 else EVENT_ENDS, 0.0, y, out, log, cursor)
         R[ROW_SLIPPING] = slipping
+    if slipping > 0.0 and R[ROW_TALLY + NOW_EVENT] == 0.0 and before < min(out[0], R[ROW_TALLY + NOW_FROM]):
+        outrun(R, before, 0.0, y, out)
+        quicken(R, out, log, cursor)
     R[ROW_RESTING] = 1.0 if abs(out[0]) < R[ROW_V_LOW] else 0.0
     R[ROW_TALLY + V_MAX] = max(R[ROW_TALLY + V_MAX], out[0])
     R[ROW_TALLY + V_MIN] = min(R[ROW_TALLY + V_MIN], out[0])
@@ -527,7 +579,7 @@ def advance(S, ids, cursor, constants, initial, settings, segments, times, statu
         for l in range(W):
             attention += 1 if S[ROW_FLAG * W + l] != 0.0 else 0
         if attention > 0:
-            if (log.shape[0] > 0 and cursor[LOGGED] + 8 * W > log.shape[0]) or (
+            if (log.shape[0] > 0 and cursor[LOGGED] + 16 * W > log.shape[0]) or (
                 recorded.shape[0] > 0 and cursor[RECORDED] + 4 * W > recorded.shape[0]
             ):
                 cursor[PAUSED] = 1

@@ -28,6 +28,9 @@ NEWTON_STEPS = 6
 ABREAST = 3  # chains of operations that are interleaved, each a vector of lanes
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
 # hardly any rejections, and an end error near rtol after tens of cycles
+SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
+# slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)
+TALLY_ROWS = 32
 Where = Callable[[str, int], str]
 
 
@@ -183,7 +186,8 @@ class KernelText:
             "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
             "FAILURES": 1, "ERROR": 1,
             "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
-            "SETTLED": 1, "SAME": 1, "SLIPPING": 1, "RESTING": 1, "TALLY": 24, **self._further_rows(),
+            "SETTLED": 1, "SAME": 1, "SLIPPING": 1, "RESTING": 1, "V_DRIVE": 1, "TALLY": TALLY_ROWS,
+            **self._further_rows(),
             "CONSTANT": len(self.constants.all),
         }  # fmt: skip
         if choice.dense:
@@ -454,10 +458,11 @@ class KernelText:
 
     def text(self) -> str:
         """The whole kernel, to be compiled behind the primitives and a preamble."""
-        header = {f"ROW_{name}": row for name, row in self.rows.items()}
+        header: dict[str, float] = {f"ROW_{name}": row for name, row in self.rows.items()}
         for name in ("OLD", "STAGE", "DONE", "TAU_OLD", "OUT_OLD"):
             header.setdefault(f"ROW_{name}", 0)  # named by the driver, not used without dense output
         header |= {"W": self.choice.lanes, "N": self.size, "ROWS": self.row_count, "DENSE": self.choice.dense}
+        header |= {"TALLY_ROWS": TALLY_ROWS, "SLIP_EVENT": SLIP_EVENT}
         header |= {"NC": len(self.constants.all), "NK": len(self.reduction.continuous)}
         header |= {"HARMONICS": self.choice.harmonics, "MASSLESS": self.reduction.restart is not None}
         header["STATE_W"] = self.reduction.names.index("w") if "w" in self.reduction.names else -1

@@ -38,7 +38,7 @@ TALLY = (
     "peak_growth",
 )
 SETTINGS = ("rtol", "most_steps", "v_high", "v_low", "sigma_low", "watch", "record", "guess", "z_scale", "first_step",
-            "settled", "same")  # fmt: skip
+            "settled", "same", "v_drive")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

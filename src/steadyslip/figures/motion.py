@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from steadyslip.compiled.kernel import SLIP_EVENT
 from steadyslip.errors import NoSteadySliding, ParameterError, Problem
 from steadyslip.figures.style import (
     BLACK,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from steadyslip.motion import History
 
 _SPANS = 40  # slip events are shaded only if they are fewer than this
+_LEAST_SPAN = 2e-3  # of the size of the values: less is drawn as no change
 _DECADES = 12.0  # a blow-up is drawn to this many decades above the drive
 
 
@@ -63,7 +66,10 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     panels[2].plot(time, run["normal_stress"] / stress_factor, color=BLUE)
     panels[2].set_ylabel(labelled(stress_name("normal stress", run.rig.area), stress_unit))
     panels[2].set_xlabel(labelled("time", unit))
+    _keep_span(panels[1], run["friction"])
+    _keep_span(panels[2], run["normal_stress"] / stress_factor)
     slips = run.slip_events if len(run.slip_events) < _SPANS else ()
+    _name_slip_events(panels[0], len(run.slip_events))
     for panel in panels:
         panel.grid(color=GREY, linewidth=0.3)
         for slip in slips:
@@ -71,8 +77,33 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
         if run.status != "done":
             panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
     if run.status != "done":
-        panels[0].set_title(f"{run.status} at {shown(run.end, 's')}", color=VERMILION, fontsize="medium")
+        panels[0].set_title(f"{run.status} at {shown(run.end, 's')}", color=VERMILION, fontsize="medium", pad=22)
     return panels
+
+
+def _keep_span(ax: Axes, *shown: np.ndarray) -> None:
+    """Do not blow up what hardly changes, such as round-off of a settled run; and write ticks out in full."""
+    values = np.concatenate([values[np.isfinite(values)] for values in shown])
+    if ax.get_yscale() == "linear":
+        ax.ticklabel_format(axis="y", useOffset=False)
+    if not len(values):
+        return
+    low, high = float(values.min()), float(values.max())
+    least = _LEAST_SPAN * max(abs(low), abs(high))
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        ax.set_ylim(middle - (0.5 * least or 1.0), middle + (0.5 * least or 1.0))
+
+
+def _name_slip_events(ax: Axes, count: int) -> None:
+    """What the shading means, in the legend."""
+    meaning = f"at least {SLIP_EVENT:g} × the load point"
+    if count >= _SPANS:
+        ax.plot([], [], " ", label=f"{count} slip events ({meaning}), too many to shade")
+    elif count:
+        ax.fill_between([], [], color=ORANGE, alpha=0.3, linewidth=0, label=f"slip event ({meaning})")
+    # above the panel, where it hides no slip event
+    ax.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=3, frameon=False, fontsize="small", borderaxespad=0.2)
 
 
 def _three(ax: Sequence[Axes] | None) -> np.ndarray:
@@ -93,9 +124,11 @@ def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
     drive = run.rig.drive.velocity
     top = drive * 10.0**_DECADES
     factor, unit = display_unit("m/s", drive)
-    if np.all(v > 0):
+    load_shown = np.where(load > 0, load, np.nan) if np.all(v > 0) else load
+    together = np.concatenate([v, load_shown[np.isfinite(load_shown)]])
+    if np.all(v > 0) and _ticks_between(together.min() / factor, together.max() / factor) > 1:
         ax.set_yscale("log")
-        load = np.where(load > 0, load, np.nan)
+        load = load_shown
         if v.max() > top:  # both ends: one alone would keep the other where it was without data
             ax.set_ylim(0.5 * min(v.min(), np.nanmin(load, initial=drive)) / factor, top / factor)
         if v.max() < 100 * v.min():  # less than two decades: plain numbers read better than powers of ten
@@ -105,7 +138,14 @@ def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
     ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label="load point")
     ax.plot(time, np.minimum(v, 10 * top) / factor, color=BLUE, label="block")
     ax.set_ylabel(labelled("velocity", unit))
-    ax.legend(loc="best", fontsize="small")
+    if ax.get_yscale() == "linear":
+        _keep_span(ax, v / factor, load / factor)
+
+
+def _ticks_between(low: float, high: float) -> int:
+    """How many of ..., 1, 2, 5, 10, ... lie in a range: the ticks of a logarithmic axis."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return sum(low <= digit * 10.0**decade <= high for decade in decades for digit in (1, 2, 5))
 
 
 def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: str = BLUE) -> Axes:

@@ -16,9 +16,8 @@ class Event:
     Attributes
     ----------
     kind : str
-        ``slip begins`` (the block becomes faster than the load point, and than the limit of arrest),
-        ``slip ends``, ``velocity peak``, ``velocity trough``, ``arrest``, ``restart``, ``contact lost`` or
-        ``blow-up``.
+        ``slip begins`` and ``slip ends`` (of a `SlipEvent`), ``velocity peak``, ``velocity trough``, ``arrest``,
+        ``restart``, ``contact lost`` or ``blow-up``.
     time : float
         s, located on the dense output.
     velocity : float
@@ -40,7 +39,11 @@ class Event:
 
 @dataclass(frozen=True)
 class SlipEvent:
-    """A time in which the block is faster than the load point: the spring unloads.
+    """Slip ahead of the load point, so that the spring unloads, at twice its velocity or more.
+
+    The block is faster than the load point (and not arrested) throughout, and at the peak at least twice as fast
+    as the load point is then, or as the rig's drive while the load point rests, and as itself at the beginning.
+    It begins where the block passes the load point, or, where it had not slowed down to it, where it was slowest.
 
     Attributes
     ----------
@@ -67,7 +70,8 @@ class SlipEvent:
 
 
 def events_of(log: np.ndarray) -> tuple[Event, ...]:
-    """The kernel's log as records, in the order of time."""
+    """The kernel's log as records, in the order of time: it logs a beginning only when slip has become fast."""
+    log = log[np.argsort(log[:, 1], kind="stable")]
     return tuple(Event(LOG_KINDS[int(row[0])], *(float(x) for x in row[1:7])) for row in log)
 
 

@@ -50,10 +50,10 @@ class Ensemble(ReadOnly):
     final : dict of str to ndarray
         Observables at the end, SI units.
     events : dict of str to ndarray
-        Per run: number of complete slip events, highest and lowest velocity, and of the last complete event
-        begin, duration, slip, stress drop, peak velocity and recurrence; number of arrests and velocity peaks,
-        time of the last peak, the period between the last two, and the growth of |ln(peak velocity/drive)|.
-        NaN where there is none; empty unless asked for.
+        Per run: number of complete slip events (see `SlipEvent`), highest and lowest velocity, and of the last
+        complete event begin, duration, slip, stress drop, peak velocity and recurrence; number of arrests and velocity
+        peaks, time of the last peak, the period between the last two, and the growth of |ln(peak velocity/drive)|.
+        Where there is none, duration, slip and stress drop are 0, times and velocities NaN; empty unless asked for.
     samples : dict of str to ndarray
         Observables at `times`, which is the last axis; NaN after the end of a run.
     times : ndarray

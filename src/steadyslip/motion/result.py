@@ -84,7 +84,7 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
 
     @cached_property
     def slip_events(self) -> tuple[SlipEvent, ...]:
-        """Complete slip events: from when the block outruns the load point until it no longer does."""
+        """Complete slip events; see `SlipEvent`."""
         return slip_events(self.events)
 
     def summary(self) -> str:
@@ -108,7 +108,7 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
                 f"{stress_name('stress drop', area)} {shown(last.stress_drop, 'Pa', area=area)}, "
                 f"slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
             )
-            if len(slips) > 1:
+            if np.isfinite(last.recurrence):
                 lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
         arrests = sum(event.kind == "arrest" for event in self.events)
         if arrests:

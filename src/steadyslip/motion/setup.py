@@ -137,6 +137,7 @@ class Jobs:
                 "first_step": scales["x"] / drive,
                 "settled": self.options.settled,
                 "same": self.options.same,
+                "v_drive": drive,
             },
             rtol * np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[n]) for n in self.reduction.names))),
         )

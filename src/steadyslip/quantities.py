@@ -385,3 +385,13 @@ def shown_range(low: float, high: float, si_unit: str, area: float | None = None
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
         return f"{shown(low, si_unit)} to {shown(high, si_unit)}"
     return f"{low * float(number) / high:.4g} to {number} {name}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A share in percent with three digits, or as many as it takes to tell it from 0 and 100.
+
+    >>> percent(0.123456), percent(0.99981), percent(1.0)
+    ('12.3 %', '99.981 %', '100 %')
+    """
+    text = f"{100 * share:.3g}"
+    return f"{100 * share:.8g} %" if 0 < share < 1 and float(text) in (0, 100) else f"{text} %"

@@ -16,6 +16,7 @@ from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.search import Boundary
+from steadyslip.linear.status import on_edge
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.nonlinear.onset import Onset, onset_at, parameter_along
 from steadyslip.pictures import draw
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from steadyslip.nonlinear.threshold import Threshold
-
-_ON_THE_EDGE = 1e-9  # growth per radian below which a verdict is within rounding of the boundary
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,12 +67,16 @@ class Analysis:
         Of that oscillation; negative if it grows.
     time_to_halve, time_to_double : float or None
         Of the slowest decay, or of the fastest growth (s).
+    on_edge : bool
+        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
     onset : Onset or None
         Kind of onset at the oscillatory edge in stiffness nearest to the rig, None where there is none.
     kicks : tuple of Threshold
         Smallest kicks that are not survived, where asked for.
     margins : tuple of Margin
         Distance of each parameter to its nearest edge, the most critical first.
+    branch : int
+        Which steady sliding is judged.
     warnings : tuple of str
     """
 
@@ -96,6 +99,8 @@ class Analysis:
     damping_ratio: float | None = None
     time_to_halve: float | None = None
     time_to_double: float | None = None
+    on_edge: bool = False
+    branch: int = 0
     onset: Onset | None = None
     kicks: tuple[Threshold, ...] = ()
     version: str = field(default="", repr=False)
@@ -175,6 +180,7 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
         values = model_values(rig, None, present_zeros(rig), branch)
         numbers = _linear_numbers(rig, values)
+        on_the_edge = bool(on_edge(values))
         distances = margins(rig, branch=branch)
         found = Analysis(
             rig=rig,
@@ -183,7 +189,9 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
             margins=distances,
             onset=_onset(rig, distances, branch),
             kicks=_kicks(rig, (kick,) if isinstance(kick, str) else tuple(kick), branch),
-            warnings=_warnings(rig, values, states, numbers),
+            on_edge=on_the_edge,
+            branch=branch,
+            warnings=_warnings(rig, values, states, on_the_edge),
             version=__version__,
             **numbers,
         )
@@ -259,11 +267,11 @@ def _stiffness_numbers(rig: Slider, values: Values) -> dict[str, Any]:
     return numbers
 
 
-def _warnings(
-    rig: Slider, values: Values, states: tuple[SteadySliding, ...], numbers: dict[str, Any]
-) -> tuple[str, ...]:
+def _warnings(rig: Slider, values: Values, states: tuple[SteadySliding, ...], on_the_edge: bool) -> tuple[str, ...]:
     """What a reader must know beside the verdict."""
     found = []
+    if on_the_edge:
+        found.append("the rig is on the edge of stability to within rounding; neither verdict should be relied on")
     if len(states) > 1:
         stresses = ", ".join(shown(s.normal_stress, "Pa", area=rig.area) for s in states)
         found.append(
@@ -278,7 +286,4 @@ def _warnings(
         )
     if states[values.branch].friction <= 0:
         found.append("the friction coefficient in steady sliding is not positive; check mu_ref and the velocity")
-    leading = numbers["eigenvalues"][0]
-    if numbers["growth_rate"] != math.inf and abs(leading.real) <= _ON_THE_EDGE * abs(leading):
-        found.append("the rig is on the edge of stability to within rounding; neither verdict should be relied on")
     return tuple(found)

@@ -19,6 +19,7 @@ def as_dict(analysis: Analysis) -> dict[str, Any]:
     data: dict[str, Any] = {
         "version": analysis.version,
         "stable": analysis.stable,
+        "on_edge": analysis.on_edge,
         "reason": analysis.reason,
         "steady": None
         if steady is None

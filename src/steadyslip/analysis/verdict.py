@@ -6,26 +6,30 @@ import math
 import textwrap
 from typing import TYPE_CHECKING
 
-from steadyslip.errors import InternalError, NotAvailable
-from steadyslip.linear import small_signal
-from steadyslip.linear.cubic import hopf_line
+from steadyslip.analysis.causes import why_all, why_ill_posed, why_none
+from steadyslip.errors import InternalError
+from steadyslip.friction import RateState
+from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.quantities import shown
 from steadyslip.records import resolve
+from steadyslip.values import model_values
 
 if TYPE_CHECKING:
     from steadyslip.analysis.analyze import Analysis
     from steadyslip.linear.boundary import Margin
+    from steadyslip.nonlinear.onset import Onset
     from steadyslip.nonlinear.threshold import Threshold
+    from steadyslip.slider import Slider
 
 _ONSETS = {
-    "supercritical": "beyond the edge in stiffness, oscillation begins small and grows with distance",
-    "subcritical": "on the stable side of the edge in stiffness, small kicks already start oscillation",
-    "degenerate": "at the edge in stiffness, oscillations of many sizes neither grow nor decay",
+    "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
+    "subcritical": "just on the stable side of the edge in stiffness, small kicks already start oscillation",
+    "degenerate": "at the edge in stiffness, small oscillations neither grow nor decay to lowest order",
 }
 
 _BEYOND = {
-    "oscillatory": "stick-slip oscillation sets in",
-    "divergence": "sliding runs away without oscillating",
+    "oscillatory": "an oscillation grows",
+    "divergence": "a disturbance grows without oscillating",
     "ill-posed": "the equations become ill-posed",
     "lock-up": "it locks up",
     "lift-off": "it lifts off",
@@ -38,20 +42,43 @@ def verdict(analysis: Analysis) -> str:
     lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
     lines += _facts(analysis)
     lines += _margin_table(analysis)
-    if analysis.stable:
-        lines += ["", "Stable means: small disturbances die out. A large enough kick may still start stick-slip."]
-        if analysis.onset is not None and not analysis.kicks:
-            lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
+    lines += _meaning(analysis)
     for text in analysis.warnings:
         lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
 
 
+def _meaning(analysis: Analysis) -> list[str]:
+    """What the verdict does not say."""
+    if analysis.stable is None or analysis.on_edge:
+        return []
+    if analysis.stable:
+        kicked = "A large enough kick may still start an oscillation or a run-away."
+        lines = ["", f"Stable means: small disturbances die out. {kicked}"]
+        if not analysis.kicks:
+            lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
+        return lines if analysis.onset is not None or analysis.kicks else lines[:2]
+    if analysis.growth_rate != math.inf and isinstance(analysis.rig.friction, RateState) and not _limited(analysis.rig):
+        return [
+            "",
+            "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
+            "steadyslip simulate shows which.",
+        ]
+    return []
+
+
+def _limited(rig: Slider) -> bool:
+    """Whether mass or damping keeps velocity finite."""
+    return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
+
+
 def headline(analysis: Analysis) -> str:
-    """The first line: stable, unstable, or no steady sliding."""
+    """The first line: stable, unstable, on the edge, or no steady sliding."""
     speed = shown(analysis.rig.drive.velocity, "m/s")
     if analysis.stable is None:
         return f"NO STEADY SLIDING at {speed}"
+    if analysis.on_edge:
+        return f"ON THE EDGE of stability to within rounding: steady sliding at {speed}"
     return f"{'STABLE' if analysis.stable else 'UNSTABLE'}: steady sliding at {speed}"
 
 
@@ -60,74 +87,30 @@ def reason(analysis: Analysis) -> str:
     own = analysis.rig.parameters()["slider.stiffness"].value
     critical, side = analysis.critical_stiffness, analysis.critical_side
     if analysis.growth_rate == math.inf:
-        return _why_ill_posed(analysis)
+        return why_ill_posed(analysis)
     if critical is None:
         if analysis.stable_stiffness:
             if analysis.rig.drive.proportional():
                 return "with this controller sliding is stable whatever the stiffness beside it"
-            return "sliding is stable at every stiffness" + _why_all(analysis)
-        if analysis.rig.friction.memory():
-            return "no stiffness makes sliding stable" + _why_none(analysis)
-        return "friction falls with velocity and has no memory: no stiffness makes sliding stable"
+            return "sliding is stable at every stiffness" + why_all(analysis)
+        return "no stiffness makes sliding stable" + why_none(analysis)
     if own is None:
-        own = _own_stiffness(analysis)
-    position = "above" if own > critical else "below"
+        own = float(model_values(analysis.rig).named()["slider.stiffness"])
     gain = float(analysis.rig.drive.proportional())
     which = "stiffness and gain kp together, " if gain and own else "gain kp, " if gain else "stiffness "
+    ratio = (own + gain) / (critical + gain)
     text = (
         f"the {which}{_stiffness(analysis, own + gain)}{',' if gain else ''} is "
-        f"{(own + gain) / (critical + gain):.3g} times the critical "
-        f"{'' if gain else 'stiffness '}{_stiffness(analysis, critical + gain)}, {side} which sliding is stable"
+        f"{'' if analysis.on_edge else f'{ratio:.3g} times '}the critical "
+        f"{'' if gain else 'stiffness '}{_stiffness(analysis, critical + gain)}"
     )
-    if analysis.stable is (position == side):
-        return text
-    return text + " only in the intervals given below"
-
-
-def _own_stiffness(analysis: Analysis) -> float:
-    from steadyslip.values import model_values
-
-    return float(model_values(analysis.rig).named()["slider.stiffness"])
-
-
-def _why_none(analysis: Analysis) -> str:
-    """Which condition of stability rules out every stiffness, where that can be told."""
-    if analysis.characteristic_polynomial[0] <= 0:
-        return ": a disturbance runs away without oscillating (static stability, a0 > 0, fails)"
-    try:
-        known = small_signal(analysis.rig).as_dict()
-    except NotAvailable:
-        return ""
-    known.pop("k")
-    if hopf_line(**known)[1] < 0 and known["f"] > 0:
-        return ": with this mass the memory of normal stress drives the oscillation (eq. 31)"
-    return ""
-
-
-def _why_ill_posed(analysis: Analysis) -> str:
-    """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
-    try:
-        falling = small_signal(analysis.rig).f < 0
-    except NotAvailable:
-        falling = not analysis.rig.friction.memory()
-    if falling:
-        return (
-            "the equations are ill-posed: friction falls at once when velocity rises (its direct effect is negative), "
-            "and there is no mass to slow that down"
-        )
-    return (
-        "the equations are ill-posed: normal stress takes away more than the mass (or the direct effect of "
-        "friction) provides, so any small lag grows at once"
-    )
-
-
-def _why_all(analysis: Analysis) -> str:
-    """The plain cause of stability at every stiffness, where there is one."""
-    try:
-        known = small_signal(analysis.rig)
-    except NotAvailable:
-        return ""
-    return ": friction in steady sliding rises with velocity, dampings included" if known.S >= 0 else ""
+    if analysis.on_edge and abs(ratio - 1) > 1e-6:  # on another edge than that of the stiffness
+        return "neither verdict should be relied on: the least change of a number decides"
+    if analysis.on_edge:
+        text += " to within rounding, and neither verdict should be relied on"
+    if analysis.stable_stiffness == ((critical, math.inf) if side == "above" else (0.0, critical),):
+        return f"{text}, {side} which sliding is stable"
+    return f"{text}, the nearest edge of the stable set given below"
 
 
 def _quantity(analysis: Analysis, value: float, unit: str) -> str:
@@ -164,12 +147,27 @@ def _facts(analysis: Analysis) -> list[str]:
     if analysis.critical_axial_stiffness is not None:
         rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
     if analysis.onset is not None:
-        rows.append(("onset", f"{analysis.onset.kind}: {_ONSETS[analysis.onset.kind]}"))
+        rows.append(("onset", _onset(analysis.onset)))
     rows += [("a kick", _survived(kick)) for kick in analysis.kicks]
     lines: list[str] = []
     for name, text in rows:
         lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
     return lines
+
+
+def _onset(onset: Onset) -> str:
+    """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
+    text = f"{onset.kind}: {_ONSETS[onset.kind]}"
+    own = onset.rig.parameters()[onset.along].value
+    if onset.kind != "subcritical" or own is None:
+        return text
+    amplitude = float(onset.velocity_amplitude(own))
+    if onset.is_near:
+        return (
+            f"{text}; this rig is near: an unstable oscillation that changes velocity by a factor of about "
+            f"{math.exp(amplitude):.3g} surrounds steady sliding"
+        )
+    return f"{text}; this rig is too far from it to say" if math.isfinite(amplitude) else text
 
 
 def _survived(kick: Threshold) -> str:
@@ -186,7 +184,9 @@ def _survived(kick: Threshold) -> str:
 def _disturbance(analysis: Analysis) -> str:
     if analysis.growth_rate == math.inf:
         return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
-    if analysis.time_to_double is not None:
+    if analysis.on_edge:
+        text = "neither grows nor dies, to within rounding"
+    elif analysis.time_to_double is not None:
         text = f"doubles in {shown(analysis.time_to_double, 's')}"
     elif analysis.time_to_halve is not None:
         text = f"halves in {shown(analysis.time_to_halve, 's')}"
@@ -195,7 +195,7 @@ def _disturbance(analysis: Analysis) -> str:
     leading = analysis.eigenvalues[0]
     if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
         text += f", oscillating with period {shown(analysis.period, 's')}"
-        return f"{text} (damping ratio {analysis.damping_ratio:.3g})"
+        return text if analysis.on_edge else f"{text} (damping ratio {analysis.damping_ratio:.3g})"
     return f"{text} without oscillating"
 
 
@@ -244,8 +244,10 @@ def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str,
         change = f"x {ratio:.4g}"
     else:
         change = f"{100 * margin.relative:+.4g} %"
-    towards = "above" if margin.absolute > 0 else "below"
-    if edge.stable == towards:
+    towards = "above" if margin.absolute > 0 or (margin.absolute == 0 and edge.stable == "below") else "below"
+    if analysis.on_edge and abs(margin.absolute) <= ON_THE_EDGE * abs(margin.value):
+        change, words = "0", f"on the edge, stable {edge.stable} it" if edge.stable != "neither" else "on the edge"
+    elif edge.stable == towards:
         words = "becomes stable"
     elif analysis.stable is None:
         words = "slides steadily, but unstable"

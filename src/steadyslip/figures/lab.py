@@ -21,6 +21,8 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
+from steadyslip.lab.predict import probability_text
+from steadyslip.quantities import percent
 
 if TYPE_CHECKING:
     from steadyslip.lab import Draws, Fit, Prediction, Record
@@ -197,9 +199,12 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
     middle = result.quantiles(result.critical_stiffness)[2]
     ax.axvline(middle / factor, color=BLACK, linewidth=1, linestyle="--", label="median")
+    if missing := np.mean(~np.isfinite(result.critical_stiffness)):
+        ax.plot([], [], " ", label=f"{percent(missing)} of the draws have none")
     ax.set_xlabel(labelled("stiffness", unit))
     ax.set_ylabel("draws (1)")
-    ax.set_title(f"stable with probability {result.probability_stable:.3g}", fontsize="medium",
+    probability = probability_text(result.probability_stable, len(result.stable))
+    ax.set_title(f"stable with probability {probability}", fontsize="medium",
                  color=GREEN if result.probability_stable > 0.5 else VERMILION)  # fmt: skip
     ax.legend(loc="best", fontsize="small")
     return ax

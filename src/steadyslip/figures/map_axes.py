@@ -21,9 +21,9 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
-from steadyslip.quantities import stress_name
+from steadyslip.quantities import percent, stress_name
 from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.view import View
+from steadyslip.sweep.view import FAILING, View
 
 Array = np.ndarray
 MANY = 100.0  # ratio from which on an axis or colour scale is logarithmic
@@ -44,6 +44,24 @@ def shown_name(found: MapResult, view: View, show: str | None) -> str | None:
     return next((name for name in ("safety_factor", "growth_rate") if name in view.values), None)
 
 
+def spaced_by_ratio(values: Array) -> bool:
+    """Whether three or more positive values, as of a grid, are spaced by equal ratios rather than equal steps."""
+    values = np.sort(values)
+    if values[0] == values[-1]:
+        return False
+    ratios, steps = np.diff(np.log(values)), np.diff(values)
+    return bool(np.ptp(ratios) / ratios.mean() < 0.5 * np.ptp(steps) / steps.mean())
+
+
+def missing_note(view: View, name: str) -> str:
+    """What became of samples that have no value of a result, for its label; empty where all have one."""
+    share = float(np.max(view.missing.get(name, np.zeros(1)), initial=0.0))
+    if share == 0:
+        return ""
+    up_to = "" if np.min(view.missing[name]) == share else "up to "
+    return f"; {up_to}{percent(share)} without one {'count as failures' if name in FAILING else 'left out'}"
+
+
 class Scale:
     """How a column of SI values is put on an axis."""
 
@@ -53,9 +71,8 @@ class Scale:
         self.factor, self.unit = display_unit(unit, typical, area)
         self.label = labelled(stress_name(short(name), area), self.unit)
         good = values[np.isfinite(values)]
-        self.log = bool(len(good)) and bool(good.min() > 0) and bool(good.max() / good.min() >= MANY)
-        if spaced and self.log and len(good) > 2:  # as the grid is spaced
-            self.log = bool(np.ptp(np.diff(np.log(good))) < np.ptp(np.diff(good / good.max())) + 1e-9)
+        positive = bool(len(good)) and bool(good.min() > 0)
+        self.log = positive and (spaced_by_ratio(good) if spaced and len(good) > 2 else good.max() / good.min() >= MANY)
 
     def __call__(self, values: Any) -> Any:
         return np.asarray(values) / self.factor

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.errors import ParameterError, Problem
-from steadyslip.figures.map_axes import KINDS, Scale, place_axes, shown_name
+from steadyslip.figures.map_axes import KINDS, Scale, missing_note, place_axes, shown_name
 from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, labelled
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.sweep.result import MapResult
@@ -56,6 +56,8 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     values = np.asarray(view.values[name])[order]
     unit = found.unit(name)
     finite = values[np.isfinite(values)]
+    if name in view.bands:  # a failure's zero is no size to scale by
+        finite = view.bands[name][np.isfinite(view.bands[name]) & (view.bands[name] != 0)]
     scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area)
     if values.ndim == 3:  # intervals and their ends
         top = finite.max() * 3 if len(finite) else 1.0
@@ -64,9 +66,12 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
             ax.fill_between(x, scale(low), scale(high), color=CURVES[i % len(CURVES)], alpha=0.4,
                             label=f"interval {i + 1} of stable stiffness")  # fmt: skip
     elif name in view.bands:
-        low, middle, high = (scale(band[order]) for band in view.bands[name])
+        top = 1e3 * finite.max(initial=1.0)  # where samples have no upper limit the band leaves the picture
+        low, middle, high = (scale(np.minimum(band[order], top)) for band in view.bands[name])
         ax.fill_between(x, low, high, color=BLUE, alpha=0.25, linewidth=0, label="95 % of samples")
-        ax.plot(x, middle, color=BLUE, label="median of samples")
+        ax.plot(x, middle, color=BLUE, label="median of samples" + missing_note(view, name))
+        if len(finite) and np.nanmax(high, initial=0.0) > scale(finite.max()):
+            ax.set_ylim(top=1.3 * float(scale(finite.max())))
     else:
         ax.plot(x, np.where(np.isfinite(values), scale(values), np.nan), color=BLUE)
     ax.set_yscale("log" if scale.log else "linear")

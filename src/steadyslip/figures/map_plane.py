@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures.chart import absence_reasons
-from steadyslip.figures.map_axes import KINDS, MANY, Scale, entry, place_axes, short, shown_name
+from steadyslip.figures.map_axes import KINDS, MANY, Scale, entry, missing_note, place_axes, short, shown_name
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, display_unit, labelled
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
 from steadyslip.quantities import shown
@@ -37,7 +37,7 @@ def plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) 
     elif regions:
         _regions(ax, found, view, x, y)
     if name is not None and regions:
-        _contours(ax, x, y, view.values[name], name, found)
+        _contours(ax, x, y, view.values[name], name, found, missing_note(view, name))
     elif name is not None:
         _colours(ax, found, view, x, y, name, scale)
     line = _edge(ax, x, y, view)
@@ -87,7 +87,7 @@ def _share_of_stable(ax: Axes, x: Array, y: Array, view: View) -> None:
         ax.clabel(lines, fontsize="small")
 
 
-def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: MapResult) -> None:
+def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: MapResult, note: str) -> None:
     good = values[np.isfinite(values)]
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
         return
@@ -100,7 +100,7 @@ def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: Map
         return
     lines = ax.contour(x, y, values / factor, levels=levels, colors=BLACK, linewidths=0.6, linestyles="--")
     ax.clabel(lines, fontsize="small", fmt=lambda level: f"{level:g}")
-    entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label))
+    entry(ax, Line2D([], [], color=BLACK, linewidth=0.6, linestyle="--", label=label + note))
 
 
 def _levels(values: Array) -> list[float]:
@@ -137,6 +137,8 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
     mesh = ax.pcolormesh(x, y, np.where(np.isfinite(values), values, np.nan) / factor, cmap="cividis", norm=norm,
                          shading="nearest", rasterized=True)  # fmt: skip
     ax.figure.colorbar(mesh, ax=ax, label=labelled(name.replace("_", " "), unit))
+    if note := missing_note(view, name):
+        entry(ax, Patch(facecolor="none", label=f"median of samples{note}"))
 
 
 def colour_scale(fields: Sequence[Array], unit: str, area: float | None) -> tuple[float, str, Any]:

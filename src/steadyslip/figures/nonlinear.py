@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from steadyslip.errors import ParameterError, Problem
+from steadyslip.figures.map_axes import spaced_by_ratio
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -217,6 +218,9 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
         ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="//", label="steady sliding is unstable")
         ax.legend(fontsize="small")
+    for values, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
+        if len(values) > 2 and values.min() > 0 and spaced_by_ratio(values):
+            set_scale("log")
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
     return ax

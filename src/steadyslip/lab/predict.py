@@ -17,7 +17,7 @@ from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.nonlinear.threshold import threshold_map
 from steadyslip.pictures import draw
-from steadyslip.quantities import shown
+from steadyslip.quantities import percent, shown
 from steadyslip.results import ReadOnly
 from steadyslip.slider import Slider
 from steadyslip.values import model_values
@@ -83,16 +83,16 @@ class Prediction(ReadOnly):
     def __str__(self) -> str:
         p = self.probability_stable
         clear = "Stable" if p >= CLEAR else "Unstable" if p <= 1 - CLEAR else "Not decided by the records"
-        lines = [f"{clear}: steady sliding is stable with probability {_percent(p, len(self.stable))}"]
+        lines = [f"{clear}: steady sliding is stable with probability {probability_text(p, len(self.stable))}"]
         absent = 1 - float(np.mean(self.exists))
         if absent:
-            lines.append(f"no steady sliding       in {_percent(absent, len(self.stable))} of the draws")
+            lines.append(f"no steady sliding       in {probability_text(absent, len(self.stable))} of the draws")
         if np.any(np.isfinite(self.critical_stiffness)):
             lines.append("critical stiffness      " + _range(self.quantiles(self.critical_stiffness), "Pa/m"))
             lines.append("stiffness over critical " + _range(self.quantiles(self.safety), "1"))
             without = float(np.mean(~np.isfinite(self.critical_stiffness)))
             if without:
-                lines.append(f"no critical stiffness   in {_percent(without, len(self.stable))} of the draws")
+                lines.append(f"no critical stiffness   in {probability_text(without, len(self.stable))} of the draws")
         for kick, sizes in self.thresholds.items():
             lines.append(f"{kick + ' kick':<24}" + _kick_range(sizes))
         if self.shares:
@@ -249,13 +249,13 @@ def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str,
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
-def _percent(share: float, count: int) -> str:
+def probability_text(share: float, count: int) -> str:
     """A probability, no finer than the number of draws tells."""
     if share >= 1:
         return f"more than {100 * (1 - 3 / count):.4g} %"
     if share <= 0:
         return f"less than {300 / count:.2g} %"
-    return f"{100 * share:.3g} %"
+    return percent(share)
 
 
 def _range(quantiles: tuple[float, ...], unit: str) -> str:

@@ -2,7 +2,9 @@
 
 The parameter is sampled over its range; where the status (stable, unstable, no steady sliding) of two samples
 differs, the change is bracketed and narrowed to rounding. Dips of the damping between samples are followed,
-so that a narrow window is not stepped over. For the stiffness itself the edges are exact (theory 3).
+so that a narrow window is not stepped over. Samples whose status is a matter of rounding are left out: a rig on
+its edge has that edge in every parameter that moves it, and none in the others. For the stiffness itself the
+edges are exact (theory 3).
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from steadyslip.errors import NoSteadySliding
 from steadyslip.linear.linearise import linearise
 from steadyslip.linear.polynomials import damping_measures, roots
 from steadyslip.linear.response import memory_symbols
-from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, status
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.quantities import shown, unit
 from steadyslip.slider import Slider
@@ -139,6 +141,9 @@ class Search:
             if self.name == "slider.stiffness":
                 return self._of_stiffness(grid[0], grid[-1])
             grid = self._with_hidden_windows(grid)
+            grid = grid[~on_edge(self.values(grid))]  # a status that rounding decides is none
+            if len(grid) < 2:
+                return ()
             status = self.status(grid)
             known = (status[1:] != UNKNOWN) & (status[:-1] != UNKNOWN)
             at = np.flatnonzero((status[1:] != status[:-1]) & known)
@@ -191,7 +196,7 @@ class Search:
         below, above = (int(s) for s in self.status(np.array([low, high])))
         kind, frequency = self._kind(low, high, below, above)
         stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
-        middle = low + 0.5 * (high - low)
+        middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         return Boundary(self.name, float(middle), (float(low), float(high)), kind, frequency, stable, self.role.unit)
 
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.linear.polynomials import is_hurwitz
-from steadyslip.linear.stiffness import characteristic
+from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
+from steadyslip.linear.response import has_closed_form, response_numbers
+from steadyslip.linear.stiffness import characteristic, stiffness_polynomials
 from steadyslip.steady import out_of_range, steady_stress
 from steadyslip.values import Values
 
+ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms, that rounding alone can make
 ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
 
 
@@ -23,3 +25,17 @@ def status(values: Values) -> Any:
         known = np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN)
         found = np.where(exists, known, np.where(out_of_range(values), UNKNOWN, ABSENT))
         return np.where(values.valid, found, UNKNOWN)
+
+
+def on_edge(values: Values) -> Any:
+    """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits."""
+    with np.errstate(all="ignore"):
+        ratio = 0.5 * damping_measures(roots(characteristic(values)))[0]
+        if has_closed_form(values.model):
+            part = response_numbers(values)
+            terms = [part.k * np.ones_like(ratio), part.mu * part.k * part.B2, part.mu * part.B3]
+        else:
+            p, q = stiffness_polynomials(values)
+            terms = [p[..., 0], values.named()["slider.stiffness"] * q[..., 0]]
+        static = np.abs(sum(terms)) / sum(np.abs(term) for term in terms)
+        return (np.abs(ratio) <= ON_THE_EDGE) | (static <= ON_THE_EDGE)

@@ -89,6 +89,15 @@ class Onset:
             squared = -self.growth_slope * (np.asarray(value, dtype=float) - self.value) / self.coefficient
             return np.sqrt(np.where(squared >= 0, squared, np.nan))[()]
 
+    @property
+    def is_near(self) -> bool:
+        """Whether the rig itself is so near the edge that the small cycle predicted for it is small.
+
+        Friction knows velocity by ln v, so that small is an amplitude of ln v below one, a factor below e in velocity.
+        """
+        own = self.rig.parameters()[self.along].value
+        return own is not None and bool(self.velocity_amplitude(own) < 1.0)
+
     def stress_amplitude(self, value: Any) -> Any:
         """Amplitude of the spring stress of the small cycle, Pa; as `velocity_amplitude`."""
         return self.stress_ratio * self.velocity_amplitude(value)
@@ -109,10 +118,10 @@ class Onset:
 MEANINGS = {
     "supercritical": "just beyond the edge a small steady oscillation appears and grows with the distance; "
     "this says nothing about large kicks",
-    "subcritical": "already on the stable side a small unstable oscillation surrounds steady sliding: "
-    "near the edge a small kick is enough to throw it out",
-    "degenerate": "the cubic coefficient vanishes to rounding: at the edge oscillations of many sizes neither grow "
-    "nor decay, and only large motions decide",
+    "subcritical": "just on the stable side a small unstable oscillation surrounds steady sliding, "
+    "and a small kick is enough to throw it out; farther from the edge this says nothing",
+    "degenerate": "the cubic coefficient vanishes to rounding: at the edge small oscillations neither grow nor decay "
+    "to lowest order, and larger ones decide",
 }
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem, SteadyslipError, UnknownNameError, unknown_name
+from steadyslip.linear.status import STABLE
 from steadyslip.quantities import parse
 from steadyslip.records import resolve
 from steadyslip.results import ReadOnly
@@ -21,6 +22,8 @@ MOST = 500  # points along an axis: more than a picture shows
 MOST_IN_ALL = 2 * 10**7  # values read, samples included
 MOST_SCATTERED = 5000
 BAND = (0.025, 0.5, 0.975)
+FAILING = ("safety_factor", "margin")
+"""Results that a sample lacks because it is stable at every stiffness, or has failed: at none, or no steady sliding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,10 @@ class View(ReadOnly):
         Results, (nx,), (ny, nx), or (m,) if scattered, with further dimensions of the result behind; medians of
         samples.
     bands : dict of str to ndarray
-        Quantiles of samples at 2.5, 50 and 97.5 %, first axis; empty without samples.
+        Quantiles of samples at 2.5, 50 and 97.5 %, first axis; empty without samples. For the results in `FAILING`
+        samples without a value count as failures, below all others; for other results they are left out.
+    missing : dict of str to ndarray
+        Share of the samples without a value, for the results in `bands`.
     shares : dict of str to ndarray
         For results that are kinds: share of the samples of each kind, first axis; empty without samples.
     held : dict of str to float
@@ -52,6 +58,7 @@ class View(ReadOnly):
     shares: dict[str, Array] = field(repr=False)
     held: dict[str, float]
     scattered: bool
+    missing: dict[str, Array] = field(default_factory=dict, repr=False)
 
 
 def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = None) -> tuple[str, ...]:
@@ -128,9 +135,10 @@ def _taken(found: MapResult, data: Any, names: Sequence[str], results: Sequence[
         others = int(np.prod([len(range(data.sizes[n])[steps[n]]) for n in free], dtype=int))
         most = MOST_SCATTERED if scattered else max(100, MOST_IN_ALL // max(others, 1))
         steps[SAMPLE] = slice(None, None, -(-data.sizes[SAMPLE] // most))
-    part = data[[*results, *(n for n in names if scattered)]].isel(place | steps)
+    with_status = ["status"] if "status" in data and "status" not in results else []
+    part = data[[*results, *with_status, *(n for n in names if scattered)]].isel(place | steps)
     places = tuple(np.asarray(part[name].values) for name in names)
-    values, bands, shares = {}, {}, {}
+    values, bands, shares, missing = {}, {}, {}, {}
     for result in results:
         order = [*(names[::-1] if not scattered else ()), *((SAMPLE,) if SAMPLE in found.dims else ())]
         numbers = np.asarray(part[result].transpose(*order, ...).values)
@@ -146,18 +154,39 @@ def _taken(found: MapResult, data: Any, names: Sequence[str], results: Sequence[
                 shares[result] = counts / known
             values[result] = np.where(known > 0, np.argmax(counts, axis=0), -1)
         else:
+            absent = np.mean(~np.isfinite(numbers), axis=axis)
+            if result in FAILING:
+                numbers, absent = _with_failures(numbers, _always(found, part, order), result)
             bands[result] = _quantiles(numbers, axis)
-            values[result] = bands[result][1]
-    return View(tuple(names), places, values, bands, shares, held, scattered)
+            values[result] = np.where(np.isinf(bands[result][1]), np.nan, bands[result][1])
+            missing[result] = absent
+    return View(tuple(names), places, values, bands, shares, held, scattered, missing)
+
+
+def _always(found: MapResult, part: Any, order: Sequence[str]) -> Array | None:
+    """Where samples are stable; None where the map does not tell."""
+    if "status" not in part:
+        return None
+    stable: Array = np.asarray(part["status"].transpose(*order).values) == STABLE
+    return stable
+
+
+def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[Array, Array]:
+    """Samples without a value made comparable: failures below all others, stable ones without an edge above."""
+    none = ~np.isfinite(numbers)
+    always = np.zeros_like(none) if stable is None else none & stable
+    failed = none & ~always
+    least = -np.inf if result == "margin" else 0.0  # margin is the logarithm of the safety factor
+    return np.where(always, np.inf, np.where(failed, least, numbers)), np.mean(failed, axis=-1)
 
 
 def _quantiles(numbers: Array, axis: int) -> Array:
-    """Of what exists; NaN where nothing does."""
-    finite = np.where(np.isfinite(numbers), numbers, np.nan)
-    empty = np.all(np.isnan(finite), axis=axis, keepdims=True)
-    return np.asarray(
-        np.where(np.squeeze(empty, axis), np.nan, np.nanquantile(np.where(empty, 0.0, finite), BAND, axis=axis))
-    )
+    """Of what exists, infinite values included; NaN where nothing does."""
+    empty = np.all(np.isnan(numbers), axis=axis, keepdims=True)
+    # where some are infinite, one of the samples: there is nothing between a number and infinity
+    method: Any = "closest_observation" if np.isinf(numbers).any() else "linear"
+    found = np.nanquantile(np.where(empty, 0.0, numbers), BAND, axis=axis, method=method)
+    return np.asarray(np.where(np.squeeze(empty, axis), np.nan, found))
 
 
 def _held(

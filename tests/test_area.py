@@ -107,3 +107,13 @@ def test_maps(rig, tmp_path):
     words = words_of(found.plot())
     assert "N/m" in words
     assert not PER_AREA.search(words)
+
+
+def test_a_file_without_a_map_is_told_so(rig, tmp_path):
+    from steadyslip.sweep.commands import map_file, sensitivity_file
+
+    path = tmp_path / "rig.toml"
+    ss.write_rig(rig, path)
+    for ask in (lambda: map_file(path, [tmp_path / "map.zarr"]), lambda: sensitivity_file(path)):
+        with pytest.raises(ss.errors.ParameterError, match=r"missing table; write \[map\]"):
+            ask()

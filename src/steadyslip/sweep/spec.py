@@ -117,7 +117,7 @@ class _MapReader:
 
     def read_totals(self, known: Mapping[str, Address], area: float | None) -> None:
         """Where the rig has an area, take values for the whole of it, as everywhere in its file."""
-        if area is None:
+        if area is None or "over" not in self.arguments:  # without [map], which is told already
             return
         self.arguments["over"] = self._per_area("map.over", self.arguments["over"], known, area)
         samples = self.arguments.get("samples")

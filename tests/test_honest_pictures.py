@@ -1,0 +1,54 @@
+"""Pictures that must not mislead: spacing of axes, samples without a value, runs that hardly change, probabilities."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import steadyslip as ss
+from dimensionless import unit_rig
+from steadyslip.figures.map_axes import Scale, spaced_by_ratio
+from steadyslip.lab.predict import probability_text
+from steadyslip.quantities import percent
+from steadyslip.sweep.view import _quantiles, _with_failures
+
+
+@pytest.mark.parametrize("ratio", [2.0, 9.0, 1e4])
+def test_axes_are_spaced_as_their_grid_is(ratio):
+    """Also over less than two decades."""
+    for spaced, log in ((np.geomspace, True), (np.linspace, False)):
+        values = 3.0 * spaced(1.0, ratio, 7)
+        assert spaced_by_ratio(values) == log
+        assert Scale("slider.stiffness", "Pa/m", values).log == log
+
+
+def test_samples_without_a_safety_factor_count_as_failures():
+    """56 % have none and 41 % are stable: the median is none of the stable ones'."""
+    factors = np.concatenate([np.full(56, np.nan), np.linspace(0.5, 0.9, 3), np.linspace(8, 12, 41)])
+    numbers, failed = _with_failures(factors, None, "safety_factor")
+    assert failed == pytest.approx(0.56)
+    assert _quantiles(numbers, 0)[1] == 0
+    always = np.isnan(factors)  # the same, if they are stable at every stiffness
+    numbers, failed = _with_failures(factors, always, "safety_factor")
+    assert failed == 0
+    assert _quantiles(numbers, 0)[1] == np.inf
+
+
+def test_a_settled_run_is_drawn_flat_with_ticks_that_differ():
+    """Round-off in the velocity is no change."""
+    run = ss.simulate(unit_rig("aging", 0.5, 1.5), ss.VelocityStep(at=5.0, to=1.0), until=60.0)
+    figure = Figure()
+    panels = run.plot(ax=figure.subplots(3, 1))
+    figure.canvas.draw()
+    for panel in panels:
+        low, high = panel.get_ylim()
+        assert high - low >= 1e-3 * abs(high)
+        labels = [tick.get_text() for tick in panel.get_yticklabels() if tick.get_text()]
+        assert len(labels) == len(set(labels)) > 1
+        assert not panel.yaxis.get_offset_text().get_text()
+
+
+def test_no_probability_is_rounded_to_certainty():
+    assert probability_text(1.0, 4000) == "more than 99.92 %"
+    assert probability_text(0.99975, 4000) == "99.975 %"
+    assert percent(0.0001) == "0.01 %"
+    assert percent(1e-9) != "0 %"

@@ -3,6 +3,7 @@
 import csv
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,15 +13,17 @@ import pytest
 import steadyslip as ss
 from dimensionless import MU, A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
+from steadyslip.config import read_rig
 from steadyslip.motion.setup import Options, prepare
 from steadyslip.nonlinear import flow as flow_module
+from steadyslip.nonlinear.branch import SpecialCycle
 from steadyslip.nonlinear.continuation import Curve, Failure
 from steadyslip.nonlinear.flow import Flow, Runs
 from steadyslip.nonlinear.kicks import constant_inputs
 from steadyslip.nonlinear.measure import measured
 from steadyslip.nonlinear.segments import _cuts
 from steadyslip.nonlinear.shooting import Shooting, multipliers
-from steadyslip.nonlinear.tracer import Tracer
+from steadyslip.nonlinear.tracer import ENDS, Tracer, _winds
 from steadyslip.nonlinear.verify import verified
 from test_motion_oracle import LAWS
 
@@ -290,6 +293,20 @@ def test_motion_is_on_a_cycle_only_if_there_is_one(mass, damped):
     assert verified(jobs, 0, state, patience=20) is None
 
 
+def test_windings_that_close_in_on_a_value_are_an_end(damped):
+    def folds(values, periods):
+        return [
+            SpecialCycle("fold", replace(damped.cycles[0], value=v, period=p), (v, v), 0.0)
+            for v, p in zip(values, periods, strict=True)
+        ]
+
+    closing = 1.0 + (-0.5) ** np.arange(8.0)
+    assert _winds(folds(closing, np.arange(1.0, 9.0)))
+    assert not _winds(folds(closing, np.ones(8)))
+    assert not _winds(folds(closing[:4], np.arange(1.0, 5.0)))
+    assert not _winds(folds(1.0 + 0.1 * (-1.0) ** np.arange(8.0), np.arange(1.0, 9.0)))
+
+
 def test_cycle_is_counted_once_round(damped):
     """Run through twice or three times it closes too, and is told from a true one; Newton's method alone is not."""
     (cycle,) = damped.at(0.8 * damped.onset.value)
@@ -354,6 +371,23 @@ def test_sheet_that_breaks_off_is_found_again_by_simulation(damped, monkeypatch)
         (cycle,), (same,) = branch.at(share * onset.value), damped.at(share * onset.value)
         assert cycle.period == pytest.approx(same.period, rel=1e-9)
     assert branch.to_dict()["gaps"][0]["before"] == branch.gaps[0]
+
+
+@pytest.mark.slow
+def test_lead_screw_is_followed_through_its_windings_to_sticking():
+    """LuGre: the branch doubles, winds round one stiffness, and goes on from a simulated cycle as stick-slip."""
+    example = read_rig(Path(__file__).parents[1] / "examples" / "lead-screw.toml", [])
+    branch = ss.cycles(example, doublings=0)
+    assert "end of the range" in branch.end
+    flip = next(point for point in branch.special if point.kind == "period doubling")
+    assert min(m.real for m in flip.cycle.multipliers) == pytest.approx(-1, abs=1e-5)
+    for value in (110e9, 40e9):
+        (cycle,) = (one for one in branch.at(value) if one.stable)
+        a_rig = example.with_values({"stiffness": value})
+        run = ss.simulate(a_rig, until=300 * 2 * np.pi / branch.onset.angular_frequency, initial={"x": 1e-7}, rtol=1e-9)
+        peaks = [e for e in run.events if e.kind == "velocity peak"]
+        high = [e.time for e in peaks if e.velocity > 0.99 * cycle.peak_velocity]
+        assert high[-1] - high[-2] == pytest.approx(cycle.period, rel=1e-6)
 
 
 def test_branch_remembers_its_steady_state_and_tolerance(damped):
@@ -440,6 +474,52 @@ def test_range_and_interruption(damped):
 
     partial = ss.cycles(damped.rig, progress=stop)
     assert (len(partial), partial.end) == (7, "interrupted by the user")
+
+
+def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
+    """While a simulation looks for another sheet, and at the start of the branch of twice the period."""
+    between = (0.9 * damped.onset.value, 1.1 * damped.onset.value)
+
+    def stop(*_arguments):
+        raise KeyboardInterrupt
+
+    def broken(self, before, now, first, twice):
+        return (ENDS["growth"], True) if now.cycle.amplitude > 0.1 else ("", True)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Tracer, "_finished", broken)
+        patched.setattr(sys.modules["steadyslip.nonlinear.cycles"], "cycle_near", stop)
+        partial = ss.cycles(damped.rig, between=between)
+    assert (len(partial) > 3, partial.end, partial.gaps) == (True, "interrupted by the user", ())
+
+    def flips(before, now, made, index):
+        return [SpecialCycle("period doubling", now.cycle, (0.0, 1.0), 0.0, index)] if index == 5 else []
+
+    with monkeypatch.context() as patched:
+        patched.setattr(sys.modules["steadyslip.nonlinear.tracer"], "changes", flips)
+        patched.setattr(Tracer, "doubled", stop)
+        partial = ss.cycles(damped.rig, between=between)
+    assert (partial.doubled, partial.end) == (None, "interrupted by the user")
+    assert partial["value"][-1] == pytest.approx(between[0], rel=1e-7)
+
+
+def test_no_small_cycle_at_the_edge_is_no_traceback(damped, monkeypatch):
+    """Nothing is found at the edge: simulation still leads to the stable cycles."""
+
+    def fails(*_arguments):
+        raise Failure("no convergence")
+
+    monkeypatch.setattr(Tracer, "small", fails)
+    branch = ss.cycles(damped.rig, between=(0.4 * damped.onset.value, 1.1 * damped.onset.value))
+    (cycle,), (same,) = branch.at(0.5 * damped.onset.value), damped.at(0.5 * damped.onset.value)
+    assert cycle.period == pytest.approx(same.period, rel=1e-9)
+    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.cycles"], "cycle_near", lambda *_: None)
+    nothing = ss.cycles(damped.rig)
+    assert (len(nothing), nothing.at(damped.onset.value)) == (0, ())
+    assert "no small cycle was found" in nothing.end
+    assert "no small cycle" in str(nothing)
+    assert nothing.plot().lines
+    assert nothing.to_dict()["cycles"] == []
 
 
 def test_files_and_figure(damped, tmp_path):

@@ -15,7 +15,7 @@ from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.flow import Flow
 from steadyslip.nonlinear.onset import Onset, hopf
 from steadyslip.nonlinear.special import Known
-from steadyslip.nonlinear.tracer import LARGEST_STEP, Sheet, Tracer
+from steadyslip.nonlinear.tracer import INTERRUPTED, LARGEST_STEP, Sheet, Tracer
 from steadyslip.nonlinear.verify import cycle_near
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
@@ -106,8 +106,8 @@ def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: 
     flips = [point for point in whole.special if point.kind == "period doubling"]
     if flips and doublings > 0 and not tracer.interrupted:
         doubled = _twice(tracer, flips[0].cycle, rtol, doublings - 1)
-    if tracer.interrupted and doubled is not None:
-        ends.append(doubled.end)
+    if tracer.interrupted and doubled is None:
+        ends[-1] = INTERRUPTED
     onset, flow = tracer.onset, tracer.flow
     found = tuple(known.cycle for known in whole.known)
     return CycleBranch(
@@ -129,6 +129,9 @@ def _twice(tracer: Tracer, flip: Cycle, rtol: float | None, doublings: int) -> C
     try:
         shooting, first, size = tracer.doubled(flip)
     except (Failure, np.linalg.LinAlgError):
+        return None
+    except KeyboardInterrupt:
+        tracer.interrupted = True
         return None
     return _branch(tracer, [tracer.followed(shooting, first, size, twice=True)], rtol, doublings)
 

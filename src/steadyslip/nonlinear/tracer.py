@@ -22,6 +22,7 @@ from steadyslip.quantities import shown
 Array = np.ndarray
 LARGEST_STEP = 0.5
 SMALLEST_STEP = 1e-9
+WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
 CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
 TOO_UNSTABLE = 1e8
@@ -39,6 +40,8 @@ ENDS = {
     "precision": "precision is lost; a smaller rtol may lead further",
     "steady": "back at steady sliding, at another edge of stability",
     "doubling": "back at a period doubling, where it joins the branch of half the period",
+    "winds": "folds close in on one value of the parameter while the period grows (a connection of a steady state with "
+    "itself, through ever longer spirals)",
     "runs away": "the period runs away while the parameter stands still (a connection to another steady state)",
 }
 
@@ -186,12 +189,15 @@ class Tracer:
                 if keep:
                     sheet.special += changes(before, here, self.known, len(sheet.known))
                     self._add(sheet, here)
+                if not sheet.end and _winds(sheet.special):
+                    sheet.end = ENDS["winds"]
                 if sheet.end:
                     break
                 if len(sheet.known) >= self.most:
                     sheet.end = f"most_points = {self.most} reached"
                     break
-            lost = (ENDS["growth"], ENDS["runs away"], *(() if sheet.known[-1].cycle.stable else (ENDS["precision"],)))
+            lost = {ENDS["growth"], ENDS["runs away"], ENDS["winds"]}
+            lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}
             sheet.whole = sheet.end not in lost
         except KeyboardInterrupt:
             sheet.end, sheet.whole, self.interrupted = INTERRUPTED, True, True
@@ -354,3 +360,12 @@ class Tracer:
         if point.tangent @ (curve.weights * close.tangent) < 0:
             point = replace(point, tangent=-point.tangent)
         return self.known(shooting, point)
+
+
+def _winds(special: list[SpecialCycle]) -> bool:
+    """Whether the last folds close in on one value while the period grows (Shilnikov)."""
+    folds = [point.cycle for point in special if point.kind == "fold"][-WINDINGS:]
+    if len(folds) < WINDINGS:
+        return False
+    apart = np.abs(np.diff([cycle.value for cycle in folds]))
+    return bool(np.all(apart[1:] < 0.8 * apart[:-1]) and np.all(np.diff([cycle.period for cycle in folds]) > 0))

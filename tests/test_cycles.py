@@ -19,8 +19,8 @@ from steadyslip.nonlinear import flow as flow_module
 from steadyslip.nonlinear.branch import SpecialCycle
 from steadyslip.nonlinear.continuation import Curve, Failure
 from steadyslip.nonlinear.flow import Flow, Runs
-from steadyslip.nonlinear.kicks import constant_inputs
 from steadyslip.nonlinear.measure import measured
+from steadyslip.nonlinear.outcomes import constant_inputs
 from steadyslip.nonlinear.segments import _cuts
 from steadyslip.nonlinear.shooting import Shooting, multipliers
 from steadyslip.nonlinear.tracer import ENDS, Tracer, _winds

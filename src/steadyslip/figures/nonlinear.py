@@ -19,6 +19,7 @@ from steadyslip.figures.style import (
     ORANGE,
     SKY,
     VERMILION,
+    YELLOW,
     axes_or_new,
     display_unit,
     labelled,
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
 _MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN)}
 _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY}
-_AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY}
+_AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY,
+          "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
 
 
 def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
@@ -141,7 +143,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
 def basin(found: Basin, ax: Axes | None = None) -> Axes:
     """What comes of every starting point: slip ahead of the load point against velocity.
 
-    White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles.
+    White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles. Yellow is undecided.
 
     Parameters
     ----------
@@ -156,7 +158,7 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     length, length_unit = display_unit("m", float(np.max(np.abs(found.x))) / 3)
     speed, speed_unit = display_unit("m/s", found.rig.drive.velocity)
     names = list(_AREAS)
-    codes = np.vectorize(lambda word: names.index(word) if word in names else len(names) - 1)(found.outcome)
+    codes = np.vectorize(names.index)(found.outcome)
     colours = ListedColormap([*_AREAS.values()])
     norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, colours.N)
     ax.pcolormesh(found.x / length, found.v / speed, codes, cmap=colours, norm=norm, shading="nearest", rasterized=True)
@@ -179,7 +181,8 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
 def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     """Thresholds over two parameters, as `steadyslip.threshold_map` gives them for DataArrays.
 
-    Hatched: steady sliding is unstable. White: no kick in the range is large enough, or no steady sliding.
+    Hatched: steady sliding is unstable. Dotted: there is none, or the threshold is undecided. White: no kick in the
+    range is large enough.
 
     Parameters
     ----------
@@ -217,6 +220,11 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     if np.any(found.values == 0):
         ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="//", label="steady sliding is unstable")
+    if np.any(np.isnan(found.values)):
+        ax.contourf(x, y, np.isnan(found.values), levels=[0.5, 1.5], colors="none", hatches=[".."])
+        label = "no steady sliding, or undecided"
+        ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="..", label=label)
+    if not np.all(found.values > 0):
         ax.legend(fontsize="small")
     for values, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
         if len(values) > 2 and values.min() > 0 and spaced_by_ratio(values):

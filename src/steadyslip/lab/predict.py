@@ -15,7 +15,7 @@ from steadyslip.lab.result import Fit
 from steadyslip.lab.uncertainty import Draws, normal_draws
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
-from steadyslip.nonlinear.threshold import threshold_map
+from steadyslip.nonlinear.brackets import threshold_map
 from steadyslip.pictures import draw
 from steadyslip.quantities import percent, shown
 from steadyslip.results import ReadOnly
@@ -95,11 +95,20 @@ class Prediction(ReadOnly):
                 lines.append(f"no critical stiffness   in {probability_text(without, len(self.stable))} of the draws")
         for kick, sizes in self.thresholds.items():
             lines.append(f"{kick + ' kick':<24}" + _kick_range(sizes))
+            if doubt := self.undecided[kick]:
+                lines.append(f"{'':<24}undecided in {percent(doubt)} of the draws")
         if self.shares:
             found = ", ".join(f"{name} {share:.0%}" for name, share in self.shares.items() if share >= 0.005)
             lines.append(f"spread comes from       {found}")
         lines.append(f"from {len(self.stable)} draws, {self.draws.kind}")
         return "\n".join(lines)
+
+    @property
+    def undecided(self) -> dict[str, float]:
+        """By kind of kick, share of the draws that slide steadily but whose threshold is undecided."""
+        return {
+            kick: float(np.mean(np.isnan(sizes) & self.exists[: len(sizes)])) for kick, sizes in self.thresholds.items()
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units; what does not exist is None."""
@@ -118,6 +127,7 @@ class Prediction(ReadOnly):
                 kick: [None if not np.isfinite(q) else float(q) for q in _kick_quantiles(sizes)]
                 for kick, sizes in self.thresholds.items()
             },
+            "thresholds_undecided": self.undecided,
             "shares": self.shares,
             "dominant": self.dominant,
             "draws": len(self.stable),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from steadyslip.nonlinear.basin import Basin, basin, orbit
+from steadyslip.nonlinear.brackets import threshold_map
 from steadyslip.nonlinear.branch import Cycle, CycleBranch, SpecialCycle
 from steadyslip.nonlinear.cycles import cycles
 from steadyslip.nonlinear.hopf_curve import HopfCurve, SpecialPoint, hopf_curve
 from steadyslip.nonlinear.onset import Onset, hopf
-from steadyslip.nonlinear.threshold import KickMargin, Threshold, margin_to_kick, threshold, threshold_map
+from steadyslip.nonlinear.threshold import KickMargin, Threshold, margin_to_kick, threshold
 
 __all__ = [
     "Basin",

@@ -10,19 +10,13 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
 from steadyslip.motion import History, simulate
-from steadyslip.motion.setup import Options, prepare
+from steadyslip.motion.setup import prepare
 from steadyslip.nonlinear.branch import Cycle
 from steadyslip.nonlinear.cycles import cycles
-from steadyslip.nonlinear.kicks import (
-    NEUTRAL,
-    OUTCOMES,
-    SAME,
-    SETTLED,
-    constant_inputs,
-    horizon_of,
-    leading_eigenvalue,
-    outcomes_of,
-)
+from steadyslip.nonlinear.kicks import options_for
+from steadyslip.nonlinear.neighbourhood import Neighbourhood
+from steadyslip.nonlinear.outcomes import OUTCOMES, Runs, outcomes_of
+from steadyslip.nonlinear.rest import rest_of
 from steadyslip.pictures import draw
 from steadyslip.progress import progress_bar
 from steadyslip.results import ReadOnly
@@ -46,7 +40,7 @@ class Basin(ReadOnly):
     v : ndarray (m,)
         Velocity at the start, m/s.
     outcome : ndarray of str (m, n)
-        ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``.
+        ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``.
     cycles : tuple of History
         One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
         the plane of a rig with two variables.
@@ -101,32 +95,26 @@ def basin(
     """
     steady_states(rig)  # raises, and says why
     drive = rig.drive.velocity
-    values = model_values(rig, branch=branch)
-    options = Options(rtol=rtol, most_steps=2_000_000, settled=SETTLED, same=SAME)
-    across: Array = _default_width(rig, options, branch) if x is None else np.atleast_1d(np.asarray(x, dtype=float))
-    up: Array = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else np.atleast_1d(np.asarray(v, dtype=float))
+    options = options_for(model_values(rig, branch=branch).model.inertial, rtol)
+    own = prepare(rig, None, 1.0, {}, {}, options, branch)
+    rest = rest_of(own, np.full(1, drive), np.zeros(1))
+    length = float(rest.scales[0, own.reduction.names.index("x")])
+    x = length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
+    v = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else v  # type: ignore[assignment]
+    across, up = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, v))
     if across.ndim != 1 or up.ndim != 1 or not (np.all(np.isfinite(across)) and np.all(np.isfinite(up))):
         raise ParameterError([Problem("x, v", "allowed: one-dimensional arrays of finite numbers, m and m/s")])
     width = np.broadcast_to(across, (len(up), len(across)))
     height = np.broadcast_to(up[:, None], width.shape)
     jobs = prepare(rig, None, 1.0, {}, {"x": width.ravel(), "v": height.ravel()}, options, branch)
-    leading = leading_eigenvalue(values)
     count = width.size
-    nothing = np.zeros(count)
-    horizon = np.broadcast_to(horizon_of(leading), (count,))
-    jobs = replace(jobs, segments=constant_inputs(horizon, np.full(count, drive), nothing, nothing), size=count)
-    neutral = np.broadcast_to(np.abs(leading.real) <= NEUTRAL * np.abs(leading), (count,))
+    near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
+    near.computed()
+    runs = Runs(replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every)
     with progress_bar(count, progress) as advanced:
-        found = outcomes_of(jobs, neutral, threads, advanced)
+        found = outcomes_of(runs, threads, advanced)
     outcome = np.array(OUTCOMES)[found].reshape(width.shape)
     return Basin(rig, across, up, outcome, _unstable_cycles(rig, along, branch))
-
-
-def _default_width(rig: Slider, options: Options, branch: int) -> Array:
-    from steadyslip.nonlinear.kicks import Kicked
-
-    kicked = Kicked(rig, "displacement", 1, "before", {}, branch, options.rtol)
-    return np.asarray(float(kicked.length[0]) * np.linspace(-15.0, 15.0, POINTS))
 
 
 def _unstable_cycles(rig: Slider, along: str, branch: int) -> tuple[History, ...]:

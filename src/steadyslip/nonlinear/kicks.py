@@ -6,33 +6,22 @@ the inputs are constant, so that one kernel runs them all.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from steadyslip.compiled.program import STATUSES, TALLY
 from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.linear.polynomials import roots
-from steadyslip.linear.stiffness import characteristic
-from steadyslip.motion.engine import LANES, Outcome, run_chunk, run_many
-from steadyslip.motion.setup import Jobs, Options, prepare
-from steadyslip.protocol import Segments
+from steadyslip.motion.setup import Jobs, Options, initial_values, prepare
+from steadyslip.nonlinear.neighbourhood import Neighbourhood
+from steadyslip.nonlinear.outcomes import Runs, continuous_at, outcomes_of
+from steadyslip.nonlinear.rest import Rest, picked, rest_of
 from steadyslip.slider import Slider
-from steadyslip.values import Values, model_values
+from steadyslip.values import model_values
 
 Array = np.ndarray
-SETTLED = 1e-3  # ln(peak velocity/drive) of two peaks in a row below which a motion has returned
-SAME = 1e-8  # relative change between peaks below which a motion repeats itself
-NEUTRAL = 1e-8  # growth per radian below which small motions neither grow nor decay
-PERIODS = 12.0  # run at least for so many natural periods,
-DECAYS = 40.0  # and for so many decay times,
-MOST_PERIODS = 2000.0  # but no longer than this; on top of it,
-LOADING = 500.0  # while the load point moves so many natural lengths, to take up what a kick has let go
-OUTCOMES = ("returns", "blow-up", "contact lost", "oscillation", "no solution", "interrupted")
-RETURNS, BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION, INTERRUPTED = range(6)
+PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself
 
 
 @dataclass(frozen=True)
@@ -66,13 +55,9 @@ KICKS = {
 }
 
 
-def leading_eigenvalue(values: Values) -> Array:
-    """The eigenvalue with the largest real part (m,), 1/s; NaN without steady sliding."""
-    with np.errstate(all="ignore"):
-        found = np.atleast_2d(roots(characteristic(values)))
-    real = np.where(np.isnan(found), -np.inf, found.real)
-    best = np.take_along_axis(found, np.argmax(real, axis=1)[:, None], axis=1)[:, 0]
-    return np.atleast_1d(best)
+def options_for(inertial: bool, rtol: float | None) -> Options:
+    """How kicked motion is integrated."""
+    return Options(rtol=rtol or (1e-8 if inertial else 1e-10), most_steps=400_000)
 
 
 class Kicked:
@@ -87,7 +72,7 @@ class Kicked:
         1 or -1: faster, forward, pressed harder; or the reverse.
     reference : str
         For ``velocity``: ``before`` if the rig's drive is the velocity before the step, ``after`` if it is
-        the velocity after it.
+        the velocity after it. Everything the rig says of itself, such as a steady normal stress, holds at its drive.
     vary : mapping of str to ndarray
         Parameters of the rig, flat arrays of equal length.
 
@@ -95,8 +80,11 @@ class Kicked:
     ----------
     size : int
         Number of rigs.
-    stable : ndarray of bool (size,)
-        Whether small motions about the rig's own steady sliding decay (or, within rounding, stay).
+    rest : Rest
+        The rigs' own steady sliding.
+    exists, neutral, stable : ndarray of bool (size,)
+        Whether there is steady sliding; whether small motions about it neither grow nor decay; whether they decay
+        or are neutral.
     """
 
     def __init__(
@@ -112,11 +100,9 @@ class Kicked:
             problems.append(Problem("reference", f"got {reference!r}; allowed: 'before' or 'after'"))
         if problems:
             raise ParameterError(problems)
-        self.rig, self.kick, self.sign, self.reference = rig, KICKS[kick], float(direction), reference
-        self.vary, self.branch = dict(vary), branch
-        values = model_values(rig, self.vary, branch=branch)
-        rtol = rtol or (1e-8 if values.model.inertial else 1e-10)
-        self.options = Options(rtol=rtol, most_steps=2_000_000, settled=SETTLED, same=SAME)
+        self.kick, self.sign = KICKS[kick], float(direction)
+        self.from_other = kick == "velocity" and reference == "after"
+        values = model_values(rig, vary, branch=branch)
         if kick == "impulse" and "slider.mass" not in values.named():
             raise NotAvailable(
                 "an impulse needs a mass: without it the block takes any velocity at once; use a displacement or "
@@ -125,28 +111,23 @@ class Kicked:
         if values.model.imposed != 0:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no steady sliding to return to")
         self.size = max(values.size, 1)
-        leading = leading_eigenvalue(values)
-        self.exists = np.isfinite(leading.real)
-        self.neutral = np.abs(leading.real) <= NEUTRAL * np.abs(leading)
-        self.stable = self.exists & ((leading.real < 0) | self.neutral)
+        self.jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model.inertial, rtol), branch)
         named = values.named()
         self.drive = np.broadcast_to(np.asarray(named["drive.velocity"], dtype=float), (self.size,))
         self.mass = np.broadcast_to(np.asarray(named.get("slider.mass", 0.0), dtype=float), (self.size,))
-        one = prepare(rig, None, 1.0, self.vary, {}, self.options, branch)
-        self.sigma = np.broadcast_to(one.sigma, (self.size,))
-        _, _, settings, _ = one.tables(one.program(LANES, dense=True), 0, self.size, True, False)
-        first = one.reduction.names.index("x")
-        self.length = np.broadcast_to(settings[:, len(settings[0]) - len(one.reduction.names) + first] / rtol,
-                                      (self.size,))  # fmt: skip
+        self.sigma = np.broadcast_to(self.jobs.sigma, (self.size,))
+        self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))
+        self.near = Neighbourhood(self.rest)
+        self.exists, self.neutral = self.rest.exists, self.rest.exists & self.rest.neutral
+        self.stable = (self.rest.stable | self.neutral) & np.broadcast_to(self.jobs.posed, (self.size,))
+        self.length = self.rest.scales[:, self.jobs.reduction.names.index("x")]
 
     # -- sizes
 
     @property
     def highest(self) -> float:
         """Largest size that makes sense."""
-        if self.kick.name == "normal-stress" and self.sign < 0:
-            return 0.999
-        if self.kick.name == "impulse" and self.sign < 0:
+        if self.sign < 0 and self.kick.name in ("normal-stress", "impulse"):
             return 0.999
         return self.kick.high
 
@@ -155,7 +136,7 @@ class Kicked:
         size = np.asarray(size, dtype=float)
         with np.errstate(over="ignore"):
             if self.kick.name == "velocity":
-                sign = self.sign if self.reference == "before" else -self.sign
+                sign = -self.sign if self.from_other else self.sign
                 return np.asarray(self.drive[which] * np.exp(sign * size))
             if self.kick.name == "displacement":
                 return np.asarray(self.sign * size * self.length[which])
@@ -166,108 +147,81 @@ class Kicked:
     def size_of(self, amount: float) -> float:
         """The size of a kick given in SI units (of the first rig); negative if against `direction`."""
         if self.kick.name == "velocity":
-            sign = self.sign if self.reference == "before" else -self.sign
+            sign = -self.sign if self.from_other else self.sign
             return float(sign * np.log(amount / self.drive[0]))
         unit = {"displacement": self.length, "normal-stress": self.sigma, "impulse": self.mass * self.drive}
         return float(self.sign * amount / unit[self.kick.name][0])
 
-    # -- outcomes
+    # -- where kicks lead
 
-    def jobs(self, which: Array, sizes: Array) -> tuple[Jobs, Array]:
-        """Runs of rigs `which` (n,) after kicks of `sizes` (n,), and whether small motions there are neutral."""
-        count = len(which)
-        own = {name: np.asarray(a)[which] if np.ndim(a) else a for name, a in self.vary.items()}
-        drive, amount = self.drive[which], self.amount(sizes, which)
-        initial: dict[str, Any] = {}
-        new = drive
-        if self.kick.name == "velocity":
-            if self.reference == "before":
-                new = amount
-            else:
-                own["drive.velocity"] = amount
+    @property
+    def moves_rest(self) -> bool:
+        """Whether the steady sliding after the kick is another than the rig's own."""
+        return self.kick.name == "normal-stress" or (self.kick.name == "velocity" and not self.from_other)
+
+    def inputs(self, which: Array, sizes: Array) -> tuple[Array, Array]:
+        """Load-point velocity and added normal stress after kicks (n,)."""
+        velocity, nothing = self.drive[which], np.zeros(len(which))
+        if not self.moves_rest:
+            return velocity, nothing
+        amount = self.amount(sizes, which)
+        return (amount, nothing) if self.kick.name == "velocity" else (velocity, amount)
+
+    def rest_after(self, which: Array, sizes: Array) -> Rest:
+        """The steady sliding that kicks of `sizes` (n,) of rigs `which` (n,) lead to."""
+        if not self.moves_rest:
+            return self.rest.part(which)
+        return rest_of(self._jobs(which), *self.inputs(which, sizes))
+
+    def may_return(self, which: Array, sizes: Array) -> Array:
+        """Whether there is stable (or neutral) steady sliding to return to after kicks, (n,)."""
+        rest = self.rest_after(which, sizes)
+        return np.asarray(rest.exists & (rest.stable | rest.neutral))
+
+    def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> Runs:
+        """Motions of rigs `which` (n,) after kicks of `sizes` (n,)."""
+        jobs, amount = self._jobs(which), self.amount(sizes, which)
+        if self.moves_rest:
+            rest = self.rest_after(which, sizes)
+            near, group = Neighbourhood(rest), np.arange(len(which))
+        else:
+            self.near.computed(np.unique(which))
+            rest, near = self.rest.part(which), self.near.part(which)
+            _, one, back = np.unique(which, return_index=True, return_inverse=True)
+            group = one[back]
+        if self.from_other:
+            jobs = self._started_at(jobs, amount)
         if self.kick.name == "impulse":
-            initial["v"] = drive + amount / self.mass[which]
-        jobs = prepare(self.rig, None, 1.0, own, initial, self.options, self.branch)
-        after = own | {"drive.velocity": new} if self.kick.name == "velocity" else own
-        leading = np.broadcast_to(leading_eigenvalue(model_values(self.rig, after, branch=self.branch)), (count,))
-        nothing = np.zeros(count)
-        jump = amount if self.kick.name == "displacement" else nothing
-        pressure = amount if self.kick.name == "normal-stress" else nothing
-        with np.errstate(all="ignore"):
-            horizon = horizon_of(leading) + (LOADING * self.length[which] + 2 * np.abs(jump)) / new
-        horizon = np.where(np.isfinite(horizon), horizon, 1.0)
-        segments = constant_inputs(horizon, np.broadcast_to(new, (count,)), jump, pressure)
-        return replace(jobs, segments=segments, size=count), np.abs(leading.real) <= NEUTRAL * np.abs(leading)
+            jobs = self._struck(jobs, amount / self.mass[which], which)
+        jump = amount if self.kick.name == "displacement" else np.zeros(len(which))
+        return Runs(jobs, rest, near, jump, group, effort)
 
     def outcomes(
-        self, which: Array, sizes: Array, threads: int | None = None, advanced: Callable[[int], None] | None = None
-    ) -> Array:
-        """What comes of kicks: indices into `OUTCOMES`, (n,)."""
-        jobs, neutral = self.jobs(which, sizes)
-        return outcomes_of(jobs, neutral, threads, advanced)
+        self, which: Array, sizes: Array, threads: int | None = None,
+        advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
+    ) -> Array:  # fmt: skip
+        """What comes of kicks: indices into `OUTCOMES`, (n,); see `Runs` for `effort`."""
+        return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
 
+    def _jobs(self, which: Array) -> Jobs:
+        """The rigs `which` in steady sliding."""
+        values = self.jobs.values
+        cut = replace(values, arguments=tuple(picked(a, which) for a in values.arguments))
+        return replace(
+            self.jobs, values=cut, sigma=self.sigma[which], initial=picked(self.jobs.initial, which),
+            velocity=picked(self.jobs.velocity, which), size=len(which),
+        )  # fmt: skip
 
-def outcomes_of(
-    jobs: Jobs, neutral: Array, threads: int | None = None, advanced: Callable[[int], None] | None = None
-) -> Array:
-    """Run jobs with constant inputs and say what comes of them: indices into `OUTCOMES`, (n,)."""
-    machine = jobs.program(LANES, dense=True)
-    _ = machine.module  # compile before the threads start
-    found = np.full(jobs.size, INTERRUPTED)
+    def _started_at(self, jobs: Jobs, velocity: Array) -> Jobs:
+        """The same rigs in steady sliding at another velocity of the load point."""
+        nothing = np.zeros(len(velocity))
+        before = rest_of(jobs, velocity, nothing)
+        arguments, sigma = jobs.values.arguments, jobs.sigma
+        initial, speed = continuous_at(jobs.reduction, arguments, sigma, before.state, velocity, nothing)
+        return replace(jobs, initial=initial, velocity=speed)
 
-    def work(start: int, stop: int, stopped: threading.Event) -> None:
-        outcome = run_chunk(jobs, machine, start, stop, np.empty(0), True, stopped)
-        found[start:stop] = _judged(jobs, outcome, start, neutral[start:stop])
-
-    run_many(work, jobs.size, threads, advanced=advanced)
-    return found
-
-
-def horizon_of(leading: Array) -> Array:
-    """How long to run, s: many decay times of the slowest small motion, within limits in natural periods."""
-    with np.errstate(all="ignore"):
-        rate = np.maximum(np.abs(leading.real), 1e-300)
-        period = 2 * np.pi / np.abs(leading)
-        horizon = np.clip(DECAYS / rate, PERIODS * period, MOST_PERIODS * period)
-    return np.where(np.isfinite(horizon), horizon, 1.0)
-
-
-def constant_inputs(horizon: Array, velocity: Array, jump: Array, pressure: Array) -> Segments:
-    """One segment for each run, with the load point moved at its start; arguments (n,)."""
-    count = len(horizon)
-    value = np.zeros((count, 1, 3))
-    value[:, 0, 0], value[:, 0, 2] = velocity, pressure
-    waves = np.zeros((count, 1, 3, 0))
-    return Segments(
-        np.zeros((count, 1)), horizon[:, None], jump[:, None], value, np.zeros_like(value), waves, waves, waves
-    )
-
-
-def _judged(jobs: Jobs, outcome: Outcome, first: int, neutral: Array) -> Array:
-    """Outcomes of a chunk of runs."""
-    status = outcome.status
-    code = {word: i for i, word in enumerate(STATUSES)}
-    found = np.full(len(status), NO_SOLUTION)
-    found[status == code["settled"]] = RETURNS
-    found[status == code["blow-up"]] = BLOW_UP
-    found[status == code["contact lost"]] = CONTACT_LOST
-    found[(status == code["periodic"]) | (status == code["too many steps"])] = OSCILLATION
-    found[status >= len(STATUSES)] = INTERRUPTED
-    done = status == code["done"]
-    if np.any(done):  # overdamped rigs return without a peak; slow ones are on their way, their peaks shrinking
-        peaks = outcome.tally[:, TALLY.index("velocity_peaks")]
-        shrinking = outcome.tally[:, TALLY.index("peak_growth")] < 0
-        drive = jobs.segments.value[first : first + len(status), 0, 0]
-        w = jobs.reduction.names.index("w") if "w" in jobs.reduction.names else None
-        reference = np.asarray(
-            dict(zip(jobs.values.model.parameters, jobs.values.arguments, strict=True))["drive.velocity"]
-        )
-        reference = np.broadcast_to(reference, (jobs.size,))[first : first + len(status)]
-        if w is not None and jobs.reduction.velocity == "logarithm":
-            near = np.abs(outcome.final[:, 4 + w] - np.log(np.abs(drive / reference))) < 0.1
-        else:
-            near = peaks < 2
-        found[done] = np.where(np.where(peaks < 2, near, shrinking)[done], RETURNS, OSCILLATION)
-    bounded = (found == OSCILLATION) & neutral
-    found[bounded] = RETURNS
-    return found
+    def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
+        """The same rigs with another velocity of the block."""
+        given = {"v": self.drive[which] + change}
+        initial, speed = initial_values(jobs.reduction, jobs.values, jobs.sigma, given)
+        return replace(jobs, initial=initial, velocity=speed)

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
-from steadyslip.motion.many import broadcast_arrays, regimes
-from steadyslip.nonlinear.kicks import INTERRUPTED, OUTCOMES, RETURNS, Kicked
-from steadyslip.progress import progress_bar
-from steadyslip.protocol import DisplacementStep, NormalStressStep, Protocol, VelocityStep
+from steadyslip.nonlinear.kicks import PATIENCE, Kicked
+from steadyslip.nonlinear.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
 from steadyslip.quantities import shown
 from steadyslip.slider import Slider
 from steadyslip.steady import steady_states
 
 Array = np.ndarray
-COARSE = 240  # sizes of the first scan of a single rig
-COARSE_MAP = 48  # and of each rig of a map
+COARSE = 240  # sizes of the first scan of a single rig,
+BLOCK = 48  # so many at a time
 FINE = 47  # sizes between the ends of a bracket, at each step of narrowing
+BEYOND = 1.01  # edges over this: where it is looked what happens beyond
 
 
 @dataclass(frozen=True)
@@ -34,18 +33,25 @@ class Threshold:
     direction : int
     size : float
         Smallest kick that does not return, without unit: ln(new/old velocity), natural lengths, share of the steady
-        normal stress, or change of velocity over the drive's. 0 if steady sliding is unstable, inf if no kick
-        in the range searched is large enough.
+        normal stress, or change of velocity over the drive's. 0 if steady sliding is unstable, inf if every
+        kick in the range searched returns, NaN if nothing in it is known to fail and not all is known to return.
     bracket : tuple of float
-        Sizes of the largest kick known to return and of the smallest known not to.
+        Sizes of the largest kick up to which all that were tried return, and of the smallest known not to.
     amount : float
         The same in SI units: velocity after the step (or before it, with ``reference="after"``), displacement,
         change of normal stress, or impulse.
     unit : str
     outcome : str
-        What happens beyond: ``blow-up``, ``oscillation`` (that does not die out), ``contact lost``, ``no solution``.
+        What happens beyond: ``blow-up``, ``oscillation`` (that does not die out), ``contact lost``, ``no solution``,
+        or ``undecided``.
     searched : float
         Largest size tried.
+    edge : bool
+        Whether the limit is the edge of stability of the steady sliding that the kick leads to: beyond, there is none
+        to return to. `size` is that edge then.
+    decided : bool
+        Whether the bracket is as narrow as was asked for. If not, kicks inside it were followed for the longest time
+        allowed without coming to an end.
     """
 
     rig: Slider = field(repr=False)
@@ -57,16 +63,23 @@ class Threshold:
     unit: str
     outcome: str
     searched: float
+    edge: bool = False
+    decided: bool = True
 
     def __str__(self) -> str:
         what = f"{self.kick} kick"
+        low, high = self.bracket
         if self.size == 0:
             return f"{what}: none survived, steady sliding is unstable"
         if np.isinf(self.size):
             return f"{what}: none is large enough, up to {self.searched:.4g} (size without unit)"
+        if np.isnan(self.size):
+            return f"{what}: all that were tried are survived up to size {low:.4g}; undecided beyond"
+        edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
+        doubt = "" if self.decided else f"; undecided between {low:.6g} and {high:.6g}"
         return (
             f"{what}: survives up to {shown(self.amount, self.unit, 7, self.rig.area)} (size {self.size:.7g}, bracket "
-            f"{self.bracket[0]:.9g} to {self.bracket[1]:.9g}); beyond: {self.outcome}"
+            f"{low:.9g} to {high:.9g}){edge}{doubt}; beyond: {self.outcome}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -84,6 +97,8 @@ class Threshold:
             "unit": self.unit,
             "outcome": self.outcome,
             "searched": self.searched,
+            "edge": self.edge,
+            "decided": self.decided,
         }
 
 
@@ -132,136 +147,107 @@ def threshold(
 
     Notes
     -----
-    Kicks of rising size are tried side by side, and the bracket of the first that fails is narrowed. A motion has
-    returned when two velocity peaks in a row differ from the drive by less than a thousandth. At the edge of
-    stability itself small motions persist; there all that stays bounded counts as returning.
+    Kicks of rising size are tried side by side, and the bracket of the first that fails is narrowed. What comes of a
+    motion is decided by `steadyslip.nonlinear.outcomes`: it has returned when it is in a neighbourhood of steady
+    sliding that is never left, it has not when it blows up, loses contact or is on a closed orbit that attracts; it may
+    also be undecided. Where the steady sliding that a kick leads to is not stable nothing returns, and the search ends
+    there. At the edge of stability itself small motions persist; there all that stays bounded counts as returning.
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
     steady_states(rig)  # raises, and says why
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol)
     if not kicked.stable[0]:
-        return _result(rig, kicked, 0.0, 0.0, "unstable")
+        return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), float(kicked.amount(0.0)[0]), kicked.kick.unit,
+                         "unstable", kicked.highest)  # fmt: skip
     sizes = np.geomspace(kicked.kick.low, kicked.highest, COARSE)
-    low, high, outcome = _first_failure(kicked, sizes, 0.0)
-    if outcome == RETURNS:
-        return _result(rig, kicked, float(sizes[-1]), np.inf, "")
-    while high - low > precision * high:
+    edge = float(edges(kicked, np.zeros(1, dtype=int), sizes)[0])
+    bracket = _scanned(kicked, sizes[sizes < edge], edge)
+    while bracket[1] - bracket[0] > precision * bracket[1] and np.isfinite(bracket[1]):
+        low, high, _ = bracket
         inside = low + (high - low) * np.arange(1, FINE + 1) / (FINE + 1)
-        before = low, high
-        low, high, found = _first_failure(kicked, np.append(inside, high), low)
-        outcome = found if found != RETURNS else outcome
-        if (low, high) == before:
+        bracket = _narrowed(kicked, inside, bracket, PATIENCE)
+        if bracket[1] - bracket[0] > 0.5 * (high - low):
             break
-    return _result(rig, kicked, low, high, OUTCOMES[outcome])
+    return _result(rig, kicked, bracket, edge, precision)
 
 
-def _first_failure(kicked: Kicked, sizes: Array, low: float) -> tuple[float, float, int]:
-    """The first of rising sizes that does not return, the size before it, and what happens."""
-    found = kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes)
+Bracket = tuple[float, float, int]
+"""Largest size up to which all return, smallest known not to (inf: none), and what comes of that."""
+
+
+def _scanned(kicked: Kicked, sizes: Array, edge: float) -> Bracket:
+    """The bracket of the first of rising sizes that fails; a block beyond the first doubt is the last."""
+    bracket: Bracket = (0.0, edge, RETURNS)
+    for start in range(0, len(sizes), BLOCK):
+        block, low = sizes[start : start + BLOCK], bracket[0]
+        doubt = bracket[2] == UNDECIDED
+        bracket = _narrowed(kicked, block[:: 2 if doubt else 1], bracket, 1.0)
+        if doubt:
+            bracket = (low, *bracket[1:])
+        if doubt or bracket[2] in CERTAIN:
+            break
+    return bracket
+
+
+def _narrowed(kicked: Kicked, sizes: Array, bracket: Bracket, effort: float) -> Bracket:
+    """A bracket after rising sizes inside it have been tried."""
+    if not len(sizes):
+        return bracket
+    found = kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, effort=effort)
     if np.any(found == INTERRUPTED):
         raise KeyboardInterrupt
-    failed = np.flatnonzero(found != RETURNS)
-    if not len(failed):
-        return float(sizes[-1]), float(sizes[-1]), RETURNS
-    i = int(failed[0])
-    return (float(sizes[i - 1]) if i else low), float(sizes[i]), int(found[i])
+    low, high, outcome = bracket
+    others = np.flatnonzero(found != RETURNS)
+    survived = int(others[0]) if len(others) else len(sizes)
+    failed = np.flatnonzero(np.isin(found, CERTAIN))
+    if len(failed):
+        high, outcome = float(sizes[failed[0]]), int(found[failed[0]])
+    elif len(others) and outcome == RETURNS:
+        outcome = UNDECIDED
+    return (float(sizes[survived - 1]) if survived else low), high, outcome
 
 
-def _result(rig: Slider, kicked: Kicked, low: float, high: float, outcome: str) -> Threshold:
-    middle = 0.5 * (low + high) if np.isfinite(high) else np.inf
-    amount = float(kicked.amount(middle)[0]) if np.isfinite(middle) else np.inf
-    return Threshold(rig, kicked.kick.name, int(kicked.sign), middle, (low, high), amount, kicked.kick.unit, outcome,
-                     kicked.highest)  # fmt: skip
+def _result(rig: Slider, kicked: Kicked, bracket: Bracket, edge: float, precision: float) -> Threshold:
+    low, high, outcome = bracket
+    at_edge = bool(np.isfinite(high) and high == edge)
+    if at_edge and high * BEYOND <= kicked.highest:
+        found = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([high * BEYOND]))[0])
+        outcome = found if found in CERTAIN else UNDECIDED
+    decided = bool(high - low <= precision * high) if np.isfinite(high) else outcome == RETURNS
+    size = high if at_edge else 0.5 * (low + high)
+    if np.isinf(high):
+        size = np.inf if outcome == RETURNS else np.nan
+    amount = float(kicked.amount(size)[0]) if np.isfinite(size) else size
+    word = "" if outcome == RETURNS else OUTCOMES[outcome]
+    return Threshold(rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word,
+                     kicked.highest, at_edge, decided)  # fmt: skip
 
 
-def threshold_map(
-    rig: Slider,
-    vary: Mapping[str, Any],
-    kick: str = "velocity",
-    *,
-    direction: int = 1,
-    reference: str = "before",
-    precision: float = 1e-4,
-    rtol: float = 1e-8,
-    threads: int | None = None,
-    progress: bool | None = None,
-    branch: int = 0,
-) -> Any:
-    """Thresholds of many rigs, as a map over two parameters for instance.
+def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
+    """Smallest size beyond which rigs `which` (n,) have no stable steady sliding to return to; inf if none is found.
 
-    Parameters
-    ----------
-    rig, kick, direction, reference, precision, rtol, branch
-        As for `threshold`.
-    vary : mapping of str to array_like or xarray.DataArray
-        Parameters by dotted name, SI units; arrays broadcast, DataArrays by dimension name.
-    threads : int, optional
-        All cores unless given.
-    progress : bool, optional
-        Whether to show a progress bar; on a terminal unless given.
-
-    Returns
-    -------
-    ndarray or xarray.DataArray
-        Sizes without unit, as in `Threshold`: 0 where steady sliding is unstable, inf where no kick in the
-        range fails, NaN where there is no steady sliding. After Ctrl-C, NaN too where nothing is known yet, and the
-        middle of the bracket reached where something is.
+    Looked for between rising `sizes`, then bisected to rounding.
     """
-    flat, _, shape, dims, coords = broadcast_arrays(rig, Protocol(), vary, {})
-    size = int(np.prod(shape, dtype=int))
-    found = np.full(size, np.nan)
-    rounds = COARSE_MAP + int(np.ceil(np.log2(0.35 / precision)))
-    with progress_bar(size * rounds, progress) as advanced:
-        for group_rig, chosen, index in regimes(rig, flat, size):
-            count = size if index is None else len(index)
-            part = {name: np.broadcast_to(np.asarray(a, dtype=float), (size,)) for name, a in chosen.items()}
-            part = {name: a if index is None else a[index] for name, a in part.items()}
-            kicked = Kicked(group_rig, kick, direction, reference, part, branch, rtol)
-            where = slice(None) if index is None else index
-            found[where] = _mapped(kicked, count, precision, threads, advanced)
-    values = found.reshape(shape)
-    if not dims:
-        return values if values.ndim else float(values)
-    import xarray as xr
-
-    return xr.DataArray(values, dims=dims, coords=coords, name=f"{kick}_threshold", attrs={"units": "1"})
-
-
-def _mapped(kicked: Kicked, count: int, precision: float, threads: int | None, advanced: Any) -> Array:
-    """Thresholds of all rigs of one kind: first a scan of sizes, then bisection of all brackets together."""
-    result = np.where(kicked.exists, np.where(kicked.stable, np.inf, 0.0), np.nan)
-    result = np.broadcast_to(result, (count,)).copy()
-    alive = np.flatnonzero(np.broadcast_to(kicked.stable, (count,)))
-    if not len(alive):
-        return result
-    sizes = np.geomspace(max(kicked.kick.low, kicked.highest * 1e-4), kicked.highest, COARSE_MAP)
-    low, high = np.zeros(count), np.full(count, np.inf)
-    searching = alive
-    for size in sizes:  # rising sizes, for the rigs that have survived all smaller ones
-        found = kicked.outcomes(searching, np.full(len(searching), size), threads, advanced)
-        if np.any(found == INTERRUPTED):
-            result[alive] = np.where(np.isfinite(high[alive]), 0.5 * (low[alive] + high[alive]), np.nan)
-            return result
-        failed = found != RETURNS
-        high[searching[failed]] = size
-        searching = searching[~failed]
-        low[searching] = size
-        if not len(searching):
+    found = np.full(len(which), np.inf)
+    if not kicked.moves_rest:
+        return found
+    low, high = np.zeros(len(which)), np.full(len(which), np.inf)
+    going = np.arange(len(which))
+    for size in sizes:
+        good = kicked.may_return(which[going], np.full(len(going), size))
+        high[going[~good]] = size
+        low[going[good]] = size
+        going = going[good]
+        if not len(going):
             break
     open_ = np.flatnonzero(np.isfinite(high))
-    while len(open_):
+    for _ in range(60):
         middle = 0.5 * (low[open_] + high[open_])
-        found = kicked.outcomes(open_, middle, threads, advanced)
-        known = found != INTERRUPTED
-        low[open_[known & (found == RETURNS)]] = middle[known & (found == RETURNS)]
-        high[open_[known & (found != RETURNS)]] = middle[known & (found != RETURNS)]
-        if not np.all(known):
-            break
-        open_ = open_[high[open_] - low[open_] > precision * high[open_]]
-    bounded = np.isfinite(high)
-    result[bounded] = 0.5 * (low[bounded] + high[bounded])
-    return result
+        good = kicked.may_return(which[open_], middle)
+        low[open_[good]], high[open_[~good]] = middle[good], middle[~good]
+    found[open_] = high[open_]
+    return found
 
 
 @dataclass(frozen=True)
@@ -274,22 +260,36 @@ class KickMargin:
         The protocol piece.
     threshold : Threshold
     ratio : float
-        Threshold over the step's own size: above 1 it is survived.
-    survives : bool
+        Threshold over the step's own size; NaN where there is no threshold to compare with.
+    outcome : str
+        What comes of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
+        ``undecided``. Beyond the threshold larger kicks may return again.
     """
 
     step: Any
     threshold: Threshold
     ratio: float
-    survives: bool
+    outcome: str
+
+    @property
+    def survives(self) -> bool | None:
+        """Whether the step returns to steady sliding; None where that is undecided."""
+        return None if self.outcome == "undecided" else self.outcome == "returns"
 
     def __str__(self) -> str:
-        word = "survives" if self.survives else "does not survive"
-        return f"{word} it: the limit is {self.ratio:.4g} times this step\n{self.threshold}"
+        words = {True: "survives it", False: f"does not survive it ({self.outcome})", None: "undecided"}
+        ratio = f": the limit is {self.ratio:.4g} times this step" if np.isfinite(self.ratio) else ""
+        return f"{words[self.survives]}{ratio}\n{self.threshold}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units."""
+        ratio = float(self.ratio) if np.isfinite(self.ratio) else None
+        return {"survives": self.survives, "outcome": self.outcome, "ratio": ratio,
+                "threshold": self.threshold.to_dict()}  # fmt: skip
 
 
 def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
-    """Distance of an expected disturbance from the smallest that is not survived.
+    """Distance of an expected disturbance from the smallest that is not survived, and what comes of itself.
 
     Parameters
     ----------
@@ -318,6 +318,10 @@ def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: i
         raise NotAvailable("a stop or reversal of the drive is no step from one steady sliding to another; simulate it")
     up = amount >= (rig.drive.velocity if kick == "velocity" else 0)
     found = threshold(rig, kick, direction=1 if up else -1, precision=precision, branch=branch)
-    size = Kicked(rig, kick, found.direction, "before", {}, branch, 1e-10).size_of(amount)
+    kicked = Kicked(rig, kick, found.direction, "before", {}, branch, None)
+    size = kicked.size_of(amount)
+    outcome = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([size]))[0])
+    if outcome == INTERRUPTED:
+        raise KeyboardInterrupt
     ratio = found.size / size if size else np.inf
-    return KickMargin(step, found, float(ratio), bool(ratio > 1))
+    return KickMargin(step, found, float(ratio), OUTCOMES[outcome])

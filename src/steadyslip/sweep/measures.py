@@ -25,7 +25,7 @@ from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.motion import simulate_many
 from steadyslip.motion.many import EVENT_UNITS
 from steadyslip.motion.status import WORDS
-from steadyslip.nonlinear import threshold_map
+from steadyslip.nonlinear.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks import KICKS
 from steadyslip.nonlinear.onset import onset_map
 from steadyslip.protocol import Protocol
@@ -249,15 +249,19 @@ class KickThreshold(Measure, name="threshold"):
     precision: float = parameter("1", small, "relative, of the size found", default=1e-4)
 
     def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("threshold", "1", f"size of the smallest {self.kick} kick not survived"),)
+        return (
+            Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
+            Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),
+            Output("threshold_high", "1", f"size of the smallest {self.kick} kick known not to be survived"),
+        )
 
     def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         direction = -1 if self.reverse else 1
-        found = threshold_map(
+        found, _, _ = threshold_brackets(
             rig, vary, self.kick, direction=direction, reference=self.reference, precision=self.precision, threads=1,
             progress=False,
         )  # fmt: skip
-        return {"threshold": found}
+        return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high}
 
     def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
         return 5e-3

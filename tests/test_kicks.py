@@ -1,0 +1,268 @@
+"""What comes of kicks is said only where it is certain: where they lead, neighbourhoods, cycles, doubt."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import steadyslip as ss
+from dimensionless import unit_rig
+from kicks_at_random import KINDS, Reference, drawn, outcome_of
+from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
+from steadyslip.motion.setup import Options, prepare
+from steadyslip.nonlinear import outcomes as outcomes_module
+from steadyslip.nonlinear.brackets import threshold_brackets
+from steadyslip.nonlinear.closed_orbits import _attraction
+from steadyslip.nonlinear.kicks import Kicked
+from steadyslip.nonlinear.neighbourhood import Neighbourhood, rates_at
+from steadyslip.nonlinear.outcomes import BLOW_UP, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.rest import rest_of
+
+STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
+
+
+def rest_at(a_rig, velocity=None, pressure=0.0):
+    jobs = prepare(a_rig, None, 1.0, {}, {}, Options())
+    return rest_of(jobs, np.array([velocity or a_rig.drive.velocity]), np.array([pressure]))
+
+
+def tilted(angle, factor, **more):
+    base = rig(friction=rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56)),
+               contact=ss.InclinedSpring(preload=SIGMA, angle=angle), **more)  # fmt: skip
+    return base.with_values({"stiffness": factor * ss.critical_stiffness(base)})
+
+
+def heavy(law, factor, mass, a=0.01, b=0.015):
+    """The rigs of the issue: constant 5 MPa, mu .6."""
+    base = ss.Slider(
+        friction=ss.RateState(a=a, b=b, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=law),
+        contact=ss.Constant(preload=5e6), stiffness=1e10, mass=mass, drive=ss.Steady(1e-6),
+    )  # fmt: skip
+    return base.with_values({"stiffness": factor * ss.critical_stiffness(base)})
+
+
+# -- the steady sliding that a kick leads to
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e3])
+@pytest.mark.parametrize("contact", CONTACTS, ids=lambda c: c.name)
+def test_own_steady_sliding_and_its_growth_rate(contact, mass):
+    """Nothing moves there, and the eigenvalues are those of the characteristic polynomial."""
+    for friction in ONE_MEMORY[1:3]:
+        a_rig = rig(friction=friction, contact=contact, mass=mass)
+        rest = rest_at(a_rig)
+        rates = rates_at(rest, rest.state[:, None, :])[0, 0] / rest.scales[0]
+        assert np.max(np.abs(rates)) < 1e-12 * np.max(np.abs(rest.roots))
+        assert rest.leading[0].real == pytest.approx(
+            ss.growth_rate(a_rig), rel=1e-6, abs=1e-12 * np.abs(rest.roots).max()
+        )
+
+
+@pytest.mark.parametrize("friction", ONE_MEMORY, ids=lambda f: f.name + str(getattr(f, "regularised", "")))
+def test_after_a_velocity_step_the_rig_is_one_driven_at_the_new_velocity(friction):
+    contact = ss.InclinedSpring(preload=SIGMA, angle=0.3)
+    a_rig = rig(friction=friction, contact=contact)
+    for factor in (0.2, 7.0):
+        moved = rest_at(a_rig, factor * V0)
+        expected = ss.growth_rate(a_rig.with_values({"drive.velocity": factor * V0}))
+        assert moved.leading[0].real == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [-0.5, 0.0, 0.4])
+def test_after_a_step_of_normal_stress_the_rig_is_one_with_more_preload(angle):
+    for share in (-0.4, 0.3):
+        moved = rest_at(tilted(angle, 1.5), pressure=share * SIGMA)
+        expected = ss.growth_rate(tilted(angle, 1.5).with_values({"preload": (1 + share) * SIGMA}))
+        assert moved.leading[0].real == pytest.approx(expected, rel=1e-7)
+
+
+def test_there_is_none_where_the_stress_is_gone():
+    assert not rest_at(tilted(0.0, 1.5), pressure=-1.01 * SIGMA).exists[0]
+
+
+# -- the neighbourhood
+
+
+@pytest.mark.parametrize(
+    "a_rig",
+    [
+        tilted(0.5, 1.1),
+        rig(friction=STEEP, stiffness=1e11, mass=1e-8 * 0.0145 * SIGMA * D_C / V0**2),
+        unit_rig("aging", 0.5, 0.8, mass=1e-2),
+        unit_rig("prz", 0.5, 2.0, mass=1e-6, damping=1e-3),
+    ],
+    ids=["massless", "mass of 1e-8", "ringing", "prz"],
+)
+def test_motion_from_the_edge_of_the_neighbourhood_only_goes_inwards(a_rig):
+    """By SciPy on the uncompiled rates, from directions that were not among those tested."""
+    rest = rest_at(a_rig)
+    near = Neighbourhood(rest)
+    radius = float(near.computed()[0])
+    assert radius > 1e-4
+    random = np.random.default_rng(3)
+    slowest = 1 / -rest.leading[0].real
+    for q in random.normal(size=(4, rest.state.shape[1])):
+        start = near.basis[0] @ (radius * q / np.linalg.norm(q))
+
+        def rates(t, z):
+            return rates_at(rest, (rest.state[0] + rest.scales[0] * z)[None, None])[0, 0] / rest.scales[0]
+
+        run = solve_ivp(rates, (0, 2 * slowest), start, method="Radau", rtol=1e-8, atol=1e-8 * radius)
+        away = near.distance(np.zeros(len(run.t), dtype=int), rest.state + rest.scales * run.y.T)
+        assert np.all(np.diff(away) < 1e-5 * radius)
+        assert away[-1] < 0.4 * radius
+
+
+def test_unstable_or_neutral_sliding_has_none():
+    for a_rig in (unit_rig("slip", 0.5, 0.4), unit_rig("slip", 0.5, 0.5)):
+        assert Neighbourhood(rest_at(a_rig)).computed()[0] == 0
+
+
+# -- closed orbits
+
+
+def test_a_double_multiplier_of_one_does_not_attract():
+    """A family of closed orbits: periods differ, so that errors split the double multiplier by their root."""
+    ahead = np.array([[1.0, 0.0]])
+    family = np.array([[[1.0, 40.0], [-1e-6, 1.0]]])
+    assert not _attraction(family, ahead)[0]
+    assert np.min(np.abs(np.linalg.eigvals(family[0]))) < 1.01  # which eigenvalues alone would not tell
+    assert _attraction(np.array([[[1.0, 40.0], [0.0, 0.9]]]), ahead)[0]
+    assert not _attraction(np.array([[[1.0, 40.0], [0.0, -1.1]]]), ahead)[0]
+    assert not _attraction(np.array([[[0.5, 0.0], [0.0, 0.1]]]), ahead)[0]  # not even the motion itself comes back
+
+
+# -- with mass: recovery is no oscillation, and unstable sliding gets no return
+
+
+def outcomes(a_rig, kick, sizes, direction=1):
+    found = Kicked(a_rig, kick, direction, "before", {}, 0, None).outcomes(np.zeros(len(sizes), int), np.array(sizes))
+    return [OUTCOMES[i] for i in found]
+
+
+def test_ringing_while_the_block_sticks_is_no_cycle():
+    """It makes two peaks agree to 1e-8 on the way back to steady sliding."""
+    a_rig = heavy(ss.Slip(), 1.3, 1e10)
+    assert outcomes(a_rig, "displacement", [5.0, 20.0, 39.1, 60.0, 150.0]) == ["returns"] * 5
+
+
+def test_peaks_that_shrink_towards_a_cycle_are_no_return():
+    a_rig = heavy(ss.Aging(), 0.5, 2.5e9)
+    assert outcomes(a_rig, "displacement", [1.0, 50.0, 90.8, 120.0]) == ["oscillation"] * 4
+    assert outcomes(a_rig, "velocity", [0.5], -1) == ["oscillation"]
+
+
+def test_outcomes_change_at_a_threshold_with_mass():
+    """A step of velocity, beyond which mass makes the new sliding unstable."""
+    a_rig = heavy(ss.Slip(), 1.3, 1e10)
+    found = ss.threshold(a_rig, "velocity", precision=1e-3)
+    below, above = outcomes(a_rig, "velocity", [0.95 * found.size, 1.05 * found.size])
+    assert (below, above) == ("returns", "oscillation")
+
+
+# -- no threshold beyond an edge
+
+
+@pytest.mark.parametrize("angle", [-0.5, 0.0])
+def test_no_threshold_beyond_the_edge_of_the_new_sliding(angle):
+    """A step of normal stress: the edge is that of a rig with as much more preload."""
+    a_rig = tilted(angle, 1.15)
+    edge = ss.boundary(a_rig, "contact.preload")
+    edges = [one.value for one in edge] if isinstance(edge, (list, tuple)) else [edge.value]
+    step = min(e for e in edges if e > SIGMA) - SIGMA
+    found = ss.threshold(a_rig, "normal-stress")
+    assert 0 < found.amount <= step * (1 + 1e-9)
+    assert found.bracket[0] < found.size <= found.bracket[1]
+    if found.edge:
+        assert found.amount == pytest.approx(step, rel=1e-6)
+        assert found.bracket[0] > 0.99 * found.bracket[1]
+        assert "edge of stability" in str(found)
+
+
+# -- the velocity after the step
+
+
+@pytest.mark.parametrize(("angle", "expected"), [(30, 2.9124218), (-30, 2.2918110)])
+def test_a_given_steady_stress_holds_at_the_rigs_own_velocity(angle, expected):
+    rock = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
+    loaded = rig(friction=rock, contact=ss.InclinedSpring(preload=SIGMA, angle=np.radians(angle)))
+    loaded = loaded.with_values({"stiffness": 1.2 * ss.critical_stiffness(loaded)})
+    stress = ss.steady_state(loaded).normal_stress
+    given = rig(friction=rock, contact=ss.InclinedSpring(steady_normal_stress=stress, angle=np.radians(angle)),
+                stiffness=loaded.stiffness)  # fmt: skip
+    assert ss.threshold(given, reference="after").size == pytest.approx(expected, abs=2e-7)
+
+
+# -- doubt
+
+
+def doubtful(low, high, limit):
+    """Outcomes of a made-up rig: returns below `limit`, blow-up above, undecided in between."""
+
+    def made(runs, threads=None, advanced=None):
+        size = np.abs(runs.jump) / runs.rest.scales[:, 0]
+        return np.where((size > low) & (size < high), UNDECIDED, np.where(size < limit, RETURNS, BLOW_UP))
+
+    return made
+
+
+def test_doubt_is_carried_through(monkeypatch):
+    a_rig = tilted(0.3, 1.2)
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.outcomes_of", doubtful(5.0, 6.0, 5.5))
+    found = ss.threshold(a_rig, "displacement")
+    assert (found.decided, found.outcome) == (False, "blow-up")
+    assert found.bracket == pytest.approx((5.0, 6.0), rel=0.02)
+    assert "undecided between" in str(found)
+    assert found.to_dict()["decided"] is False
+    brackets, _, _ = threshold_brackets(a_rig, {"mass": np.zeros(2)}, "displacement")
+    assert np.isnan(brackets.size).all()
+    assert np.all(brackets.low <= 5.0)
+    assert np.all((brackets.low > 4.8) & (brackets.high >= 6.0) & (brackets.high < 6.2))
+    margin = ss.margin_to_kick(a_rig, ss.DisplacementStep(at=0.0, by=5.5 * found.amount / found.size))
+    assert margin.survives is None
+    assert "undecided" in str(margin)
+    assert margin.to_dict()["survives"] is None
+    analysis = ss.analyze(a_rig, kick="displacement")
+    assert "(undecided from size" in " ".join(str(analysis).split())
+
+
+def test_narrow_doubt_leaves_a_threshold_and_endless_doubt_none(monkeypatch):
+    a_rig = tilted(0.3, 1.2)
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.outcomes_of", doubtful(5.0, 5.1, 5.05))
+    size = ss.threshold_map(a_rig, {"mass": np.zeros(1)}, "displacement")
+    assert size[0] == pytest.approx(5.05, rel=0.03)
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.outcomes_of", doubtful(5.0, np.inf, 1e9))
+    found = ss.threshold(a_rig, "displacement")
+    assert np.isnan(found.size)
+    assert "undecided beyond" in str(found)
+    assert found.to_dict()["size"] is None
+    assert np.isnan(ss.threshold_map(a_rig, {"mass": np.zeros(1)}, "displacement")[0])
+
+
+def test_what_takes_too_long_is_undecided(monkeypatch):
+    """An unstable rig whose cycle nobody may look for: nothing is said of it."""
+    monkeypatch.setattr(outcomes_module, "_alike", lambda now, before: np.zeros(len(now), dtype=bool))
+    monkeypatch.setattr(outcomes_module, "MOST_TURNS", 20.0)
+    monkeypatch.setattr(outcomes_module, "MOST_LOADING", 50.0)
+    assert outcomes(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["undecided"]
+
+
+def test_doubt_has_a_colour():
+    a_rig = tilted(0.3, 1.2)
+    outcome = np.array([["returns", "undecided"], ["blow-up", "returns"]])
+    found = ss.Basin(a_rig, np.array([-1e-6, 1e-6]), np.array([1e-7, 1e-6]), outcome, ())
+    assert "undecided" in found.plot().get_legend_handles_labels()[1]
+
+
+# -- a fixed part of benchmarks/kicks.py
+
+
+def test_random_kicks_equal_scipy():
+    """Massless and tilted here; the other kinds by hand."""
+    random = np.random.default_rng(11)
+    told = 0
+    for _ in range(12):
+        case = drawn(random, KINDS[:1])
+        found, truth = outcome_of(case), Reference(case).outcome()
+        assert found in (truth, "undecided") or truth == "?", str(case)
+        told += found == truth
+    assert told >= 10

@@ -32,6 +32,11 @@ _WORDS = {
 }
 _SPELLINGS = {word: name for name, words in _WORDS.items() for word in words}
 _SUFFIXES = ("s", "ms", "min", "h", "m", "cm", "mm", "um", "nm", "Pa", "kPa", "MPa", "GPa", "N", "kN", "mN", "uN")
+_TIMES = {"time", "times", "elapsed", "elapsedtime", "uhrzeit", "datetime", "date", "datum"}
+_FRICTION = re.compile(r"friction|^reib(ungs?)?(wert|zahl|koeff|beiwert|$)")
+_DISPLACED = re.compile(r"disp|position|slip|ram|verschieb|vorschub|weg$|déplacement")
+_ACROSS = re.compile(r"normalweg|vertikal|normalversch")
+_SHEAR = re.compile(r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement")
 _BRACKETS = re.compile(r"^(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*$")
 
 
@@ -95,25 +100,28 @@ def _known_unit(text: str) -> str | None:
 
 def _guessed_role(name: str, has_unit: str | None) -> str | None:
     """The role that a bare name, and its unit, suggest."""
-    plain = re.sub(r"[^a-zµμστ]+", " ", name.lower().replace("_", " ")).strip()
+    plain = re.sub(r"[^a-zµμστäöüßéè]+", " ", name.lower().replace("_", " ")).strip()
     words = set(plain.split())
     dimension = None if has_unit is None else unit(has_unit)[1]
     if dimension == unit("m/s")[1]:
         return "velocity"
     joined = plain.replace(" ", "")
-    if joined in ("t", "time", "elapsedtime", "zeit", "times") or words & {"time", "elapsed"}:
+    if joined in ("t", "timestamp", "temps") or words & _TIMES:
+        return "time"
+    if re.search(r"zeit", joined) and dimension in (None, unit("s")[1]):
         return "time"
     stress = dimension in (unit("Pa")[1], unit("N")[1])
-    if joined in ("mu", "µ", "μ", "f", "cof") or "friction" in plain or "frict" in words:
+    if joined in ("mu", "µ", "μ", "f", "cof") or words & {"frict", "frottement"} or _FRICTION.search(joined):
         return "shear" if stress else "friction"
-    if words & {"velocity", "vel", "rate", "speed", "vlp", "v"} or "velocity" in joined:
+    if words & {"velocity", "vel", "rate", "speed", "vlp", "v", "vitesse"} or re.search(r"velocity|geschw", joined):
         return "velocity"
-    displaced = re.search(r"disp|position|slip|ram", joined) or words & {"lp", "lpd", "d"}
-    if displaced and not (stress or words & {"normal", "vertical", "horizontal normal"}):
+    displaced = _DISPLACED.search(joined) or words & {"lp", "lpd", "d", "weg", "hub"}
+    across = words & {"normal", "vertical", "horizontal normal"} or _ACROSS.search(joined)
+    if displaced and not (stress or across):
         return "displacement"
-    if re.search(r"normal|sigma|σ", joined) or words & {"sn", "fn", "effective"}:
+    if re.search(r"normal|sigma|σ", joined) or words & {"sn", "fn", "effective", "nor", "norm"}:
         return None if dimension == unit("m")[1] or displaced else "normal"
-    if re.search(r"shear|tau|τ", joined) or words & {"ft", "fs"}:
+    if _SHEAR.search(joined) or words & {"ft", "fs", "shr"}:
         return "shear"
     return None
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem, SteadyslipError
 from steadyslip.inputs import check_file, read_bytes
+from steadyslip.lab.moments import from_the_first, moment
+from steadyslip.lab.xlook import is_xlook, read_xlook
 
 Array = np.ndarray
 MISSING = {"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "nat", "#n/a", "-nan"}
@@ -78,7 +80,13 @@ def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = Fa
 
 
 def _text(path: Path, skip_bad_lines: bool) -> Columns:
+    from steadyslip.lab.columns import _known_unit
+
     raw, notes = read_bytes(path, MOST_TEXT), []
+    if is_xlook(raw):
+        found_names, found_units, numbers = read_xlook(raw, str(path))
+        known = [None if unit is None else _known_unit(unit) for unit in found_units]
+        return Columns(found_names, numbers, np.arange(1, numbers.shape[1] + 1), known, ["read as XLOOK file"])
     if b"\0" in raw[:4096]:
         message = f"{str(path)!r} is not text; allowed endings of other formats: .h5, .hdf5, .mat, .parquet"
         raise NotAvailable(message)
@@ -105,6 +113,10 @@ def _text(path: Path, skip_bad_lines: bool) -> Columns:
     if comma:
         notes.append("numbers are written with a decimal comma")
     values, lines, faults = _numbers(body, delimiter, comma, names)
+    for k, cell in enumerate(_cells(body[0][1], delimiter)[: len(names)]):
+        if moment(cell.strip('"')) is not None and values.shape[1]:
+            values[k], units[k] = from_the_first(values[k]), "s"
+            notes.append(f"column {names[k]!r} holds times of day or dates; counted in seconds from the first")
     if faults and not skip_bad_lines:
         more = [Problem("file", f"... and {len(faults) - SHOWN} more such lines")] if len(faults) > SHOWN else []
         advice = Problem("file", "mend these lines, or leave them out with skip_bad_lines (--skip-bad-lines)")
@@ -151,7 +163,7 @@ def _number(cell: str, comma: bool) -> float | None:
     try:
         return float(plain.replace(",", ".") if comma else plain)
     except ValueError:
-        return None
+        return moment(plain)
 
 
 def _header(

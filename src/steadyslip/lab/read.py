@@ -40,8 +40,9 @@ def read_record(
     Parameters
     ----------
     path : path
-        Text with any of the usual separators, with or without header; HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``) or
-        Parquet (``.parquet``).
+        Text with any of the usual separators, with or without header, times in numbers, as a clock (``12:30:01.5``) or
+        with a date (ISO 8601); HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``) or Parquet (``.parquet``); binary files of
+        XLOOK, whatever their name.
     area : float or str, optional
         Contact area, m^2, where shear and normal are forces; 1 m^2 unless given, so that forces stay forces.
     normal_stress : float or str, optional

@@ -1,0 +1,47 @@
+"""Times of day and dates as seconds."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+
+import numpy as np
+
+Array = np.ndarray
+DAY = 86_400.0
+_CLOCK = re.compile(r"^(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)$")
+_DATE = re.compile(r"^(\d{4})-(\d\d)-(\d\d)[T ](\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)(Z|[+-]\d\d:?\d\d)?$")
+
+
+def moment(text: str) -> float | None:
+    """Seconds since midnight, or since 1970 where there is a date; None if it is neither.
+
+    >>> moment("12:30:01.5"), moment("1970-01-02T00:00:00Z"), moment("12.5")
+    (45001.5, 86400.0, None)
+    """
+    if match := _CLOCK.match(text):
+        hours, minutes, seconds = match.groups()
+        return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
+    if match := _DATE.match(text):
+        year, month, day, hours, minutes = (int(part) for part in match.groups()[:5])
+        try:
+            start = datetime(year, month, day, hours, minutes, tzinfo=UTC)
+        except ValueError:
+            return None
+        return start.timestamp() + float(match[6].replace(",", ".")) - _offset(match[7])
+    return None
+
+
+def _offset(zone: str | None) -> float:
+    if zone is None or zone == "Z":
+        return 0.0
+    digits = zone[1:].replace(":", "")
+    size = 3600.0 * int(digits[:2]) + 60.0 * int(digits[2:])
+    return size if zone[0] == "+" else -size
+
+
+def from_the_first(times: Array) -> Array:
+    """Seconds since the first, a day added wherever a clock has passed midnight."""
+    later = np.concatenate([[0.0], np.cumsum(np.diff(times) < -0.5 * DAY)])
+    found = times + DAY * later
+    return np.asarray(found - found[0])

@@ -26,11 +26,14 @@ import time
 
 import numpy as np
 import rivals
+from numba import njit
 from problems import Problem, problems
 
 import steadyslip as ss
-from steadyslip.compiled.build import compiled
-from steadyslip.compiled.source import indented
+from steadyslip.compiled.build import machine_code
+from steadyslip.compiled.jump import jump
+from steadyslip.compiled.kernel import Record
+from steadyslip.compiled.nodes import Program
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.setup import Options, prepare
 
@@ -43,7 +46,7 @@ def ours_single(problem: Problem, tolerance: float, variants: np.ndarray) -> tup
     """The kernel call for one trajectory, no events."""
     jobs = prepare(problem.rig(), None, problem.until, {}, problem.start, Options(rtol=tolerance))
     machine = jobs.program(lanes=1, dense=False)
-    _ = machine.module
+    _ = machine.code.advance
     call = Call(machine, jobs.tables(machine, 0, 1, False, False), 1, np.empty(0))
     begin = time.perf_counter()
     call.go(10**12)
@@ -125,26 +128,26 @@ def compare(problem: Problem, kind: str) -> dict[str, Curve]:
     return curves
 
 
+@njit
+def repeated(address: int, record: np.ndarray, scratch: np.ndarray, rounds: int) -> None:
+    for _ in range(rounds):
+        jump(address, record, 0.0, scratch)
+
+
 def bare_rate(problem: Problem) -> tuple[float, float]:
     """ns per right-hand side: alone in vector code, and in the ensemble kernel (rejected steps counted)."""
     jobs = prepare(problem.rig(), None, problem.until, {}, problem.start, Options(rtol=1e-6))
-    text = jobs.program(lanes=LANES, dense=False).text
-    n = text.size
-    loads = [*text._load_constants(), *text._loads([(f"y{i}", "Y", i) for i in range(n)]), *text._inputs_at("0.0")]
-    stores = [f"{text.cell('Y', i)} = y{i} + 1e-12*g{i}" for i in range(n)]
-    loop = f"    for _ in range(quota):\n        for l in range({LANES}):\n" + indented(
-        [*loads, *text.rate_lines, *stores], 3
-    )
-    signature = "S, ids, cursor, constants, initial, settings, segments, times, statuses, final, tally, samples, log"
-    source = f"@njit(**ENTRY)\ndef advance({signature}, recorded, quota):\n{loop}    return 0\n\n\n"
-    source += "@njit(**ENTRY)\ndef observe(constants, settings, states, inputs, own, values):\n    pass\n"
-    module = compiled(source)
-    work = np.full(text.row_count * LANES, 0.01)
-    a, b, c = np.zeros((1, 1)), np.zeros(1, dtype=np.int64), np.zeros((1, 1, 1))
+    kernel = jobs.program(lanes=LANES, dense=False).kernel
+    bare = Record(kernel, Program("step"))
+    for i, rate in enumerate(bare.evaluated(kernel.rates, bare.point(0.0))):
+        place = kernel.layout.state + i
+        bare.program.store(place, bare.program.load(place) + 1e-12 * rate)
+    address = machine_code([bare.program], LANES)["step"]
+    work, scratch = np.full(kernel.layout.rows * LANES, 0.01), np.zeros(8)
     rounds, best = 20_000, np.inf
     for _ in range(7):
         begin = time.perf_counter()
-        module.advance(work, b, b, a, a, a, c, np.zeros(1), b, a, a, c, a, a, rounds)
+        repeated(address, work, scratch, rounds)
         best = min(best, time.perf_counter() - begin)
     machine = jobs.program(lanes=LANES, dense=False)
     jobs = prepare(problem.rig(), None, problem.until, problem.vary(2048), problem.start, Options(rtol=1e-6))

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from types import ModuleType
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from steadyslip.compiled.build import compiled, interpreted
+from steadyslip.compiled.build import Code, compiled, interpreted
 from steadyslip.compiled.kernel import Choice
-from steadyslip.compiled.lockstep import LockstepText
+from steadyslip.compiled.lockstep import LockstepKernel
 from steadyslip.compiled.reduction import Reduction, W, reduce_model
 from steadyslip.compiled.variational import with_directions
 from steadyslip.expressions import array_function
@@ -39,16 +39,21 @@ class ExperimentProgram:
     plain: bool = False
 
     @cached_property
-    def text(self) -> LockstepText:
+    def kernel(self) -> LockstepKernel:
         friction = self.reduction.outputs["tau"] / self.reduction.outputs["sigma"]
         extended = with_directions(self.reduction, self.directions)
         choice = Choice(self.method, level="linear", lanes=1 if self.plain else LANES, dense=False)
-        return LockstepText(extended, choice, friction)
+        return LockstepKernel(extended, choice, friction)
 
     @cached_property
-    def module(self) -> ModuleType:
+    def code(self) -> Code:
         """Machine code, or plain Python if `plain`."""
-        return interpreted(self.text.text()) if self.plain else compiled(self.text.text())
+        return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
+
+    @cached_property
+    def through_table(self) -> Callable[..., None]:
+        """`steadyslip.compiled.lockstep_driver.through_table` of this model."""
+        return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
 
     @cached_property
     def _parameters(self) -> list[sp.Symbol]:
@@ -63,14 +68,14 @@ class ExperimentProgram:
 
     @cached_property
     def _values(self) -> Any:
-        constants = list(self.text.constants.symbols)
+        constants = list(self.kernel.constants.symbols)
         return array_function(self._parameters, [*constants, *self._start])
 
     @cached_property
     def _slopes(self) -> Any:
         """Derivatives of constants and starting values in every parameter, σss following the parameters."""
         model = self.reduction.model
-        expressions = [*self.text.constants.symbols, *self._start]
+        expressions = [*self.kernel.constants.symbols, *self._start]
         residual = model.steady_stress - model.sigma_ss
         found = []
         for symbol in model.parameters.values():
@@ -94,7 +99,7 @@ class ExperimentProgram:
             values = _stacked(self._values(*arguments, sigma), jobs)
             slopes = _stacked(self._slopes(*arguments, sigma), jobs).reshape(jobs, count, -1)
         rates = np.matmul(chain, slopes)
-        table, size = self.text.constants, len(self.text.constants.symbols)
+        table, size = self.kernel.constants, len(self.kernel.constants.symbols)
         constants = table.with_rates(values[:, :size], rates[:, :, :size], {})
         start = np.concatenate([values[:, None, size:], rates[:, :, size:]], axis=1)
         return constants, np.ascontiguousarray(start.reshape(jobs, -1))

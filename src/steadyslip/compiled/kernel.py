@@ -1,23 +1,24 @@
-"""The text of a kernel: the equations of one reduced Model in the step of one method, inside the driver.
+"""The programs of one reduced Model and one method: a step, and what the driver asks for between steps.
 
-State of all lanes lies in one flat array: quantity `row` of lane `l` is ``S[row*W + l]``. One pass of the
-stepping loop advances every lane by one step of its own size; there is no branch and no call in it, so that it
-becomes vector code. Everything rare (breakpoints, events, samples, the end) is done by the driver, lane by
-lane. A single run is the same kernel with one lane.
+One pass of `step` advances every lane by one step of its own size; there is no branch in it, so that it becomes vector
+code. Everything rare (breakpoints, events, samples, the end) is done by the driver, lane by lane, with the other
+programs. A single run is the same with one lane.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
+from functools import cached_property
 
 import sympy as sp
 
+from steadyslip.compiled.layout import Layout, Out, Row, make_layout
 from steadyslip.compiled.methods import METHODS, Method
+from steadyslip.compiled.nodes import Loop, Node, Program, Value, exp, larger, log, primitive, select, smaller, weighted
 from steadyslip.compiled.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
-from steadyslip.compiled.source import Constants, Lines, indented, statements, weighted
+from steadyslip.compiled.rosenbrock import Pattern, factorised, substituted
+from steadyslip.compiled.source import Constants, Formulas
 
 LEVELS = ("constant", "linear", "harmonic")
 CHANNELS = ("v", "q", "p")
@@ -25,13 +26,10 @@ OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 _SLOPE_NAMES = {s: f"slope_{c}" for s, c in zip(SLOPES[:3], CHANNELS, strict=True)}
 _INPUT_NAMES = {s: f"in_{c}" for s, c in zip(INPUTS[:3], CHANNELS, strict=True)} | {TIME: "time"}
 NEWTON_STEPS = 6
-ABREAST = 3  # chains of operations that are interleaved, each a vector of lanes
+FASTER = 1.000001  # than the load point, beyond rounding: slipping
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
 # hardly any rejections, and an end error near rtol after tens of cycles
-SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
-# slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)
-TALLY_ROWS = 32
-Where = Callable[[str, int], str]
+Point = dict[str, Value]
 
 
 @dataclass(frozen=True)
@@ -50,8 +48,6 @@ class Choice:
         Trajectories side by side.
     dense : bool
         Whether stages are kept for dense output (events, samples).
-    field : bool
-        Whether the kernel can also be asked for rates at given states.
     """
 
     method: str
@@ -59,11 +55,18 @@ class Choice:
     harmonics: int = 0
     lanes: int = 1
     dense: bool = True
-    field: bool = False
 
 
-class KernelText:
-    """Writes the source of one kernel."""
+class Kernel:
+    """Writes the programs of one kernel.
+
+    Attributes
+    ----------
+    layout : Layout
+    constants : Constants
+    size : int
+        Length of the state.
+    """
 
     varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # the steady drive is a constant too
 
@@ -77,11 +80,11 @@ class KernelText:
             self.names[reduction.unknown] = "z"
             variables.add(reduction.unknown)
         self.constants = Constants(variables)
-        self.rates = [self._fixed(rate) for rate in reduction.rates]
+        self._rates = [self._fixed(rate) for rate in reduction.rates]
         self.driven = self._answers_to_constants()
-        self.timed = choice.level != "constant" or any(rate.has(TIME) for rate in self.rates)
-        self._blocks()
-        self._rows()
+        self.timed = choice.level != "constant" or any(rate.has(TIME) for rate in self._rates)
+        self._write()
+        self.layout = self._made_layout()
 
     def _fixed(self, expression: sp.Expr) -> sp.Expr:
         """Lifted; slopes vanish where inputs are constant."""
@@ -93,11 +96,11 @@ class KernelText:
         """By position in the state: what a change of the constants adds to the rates of `Reduction.direction`."""
         reduction = self.reduction
         found = {
-            reduction.state.index(symbol): self._change(self.rates[i], direction)
+            reduction.state.index(symbol): self._change(self._rates[i], direction)
             for direction, symbols in enumerate(reduction.directions)
             for i, symbol in enumerate(symbols)
         }
-        self.rates = [rate + found.get(k, 0) for k, rate in enumerate(self.rates)]
+        self._rates = [rate + found.get(k, 0) for k, rate in enumerate(self._rates)]
         return found
 
     def _change(self, expression: sp.Expr, direction: int) -> sp.Expr:
@@ -125,410 +128,382 @@ class KernelText:
             entry -= sp.diff(self.driven[i], unknown) * sp.diff(residual, variable) / sp.diff(residual, unknown)
         return entry
 
-    # -- the equations as lines
+    # -- the equations
 
-    def _blocks(self) -> None:
-        reduction = self.reduction
-        outputs = [(f"o_{name}", self._fixed(reduction.outputs[name])) for name in OUTPUTS]
-        rates = [(f"g{i}", rate) for i, rate in enumerate(self.rates)]
-        solve = self._solve_lines()
-        self.rate_lines = solve + statements(rates, self.names)
-        self.full_lines = solve + statements(rates + outputs[:3], self.names)
-        self.output_lines = solve + statements(outputs, self.names)
-        n = self.size
-        self.restore_lines = solve + statements(
-            [(f"k{i}", self._fixed(e)) for i, e in enumerate(reduction.restored)], self.names
-        )
-        self.jacobian_lines: Lines = []
+    def _formulas(self, expressions: Sequence[sp.Expr]) -> Formulas:
+        return Formulas(expressions, self.names)
+
+    def _write(self) -> None:
+        """All formulas; in this order their constants are numbered."""
+        reduction, n = self.reduction, self.size
+        outputs = [self._fixed(reduction.outputs[name]) for name in OUTPUTS]
+        self.residual: Formulas | None = None
+        if reduction.unknown is not None and reduction.residual is not None:
+            pair = (reduction.residual, sp.diff(reduction.residual, reduction.unknown))
+            self.residual = self._formulas([self._fixed(e) for e in pair])
+        self.rates = self._formulas(self._rates)
+        self.full = self._formulas(self._rates + outputs[:3])
+        self.outputs = self._formulas(outputs)
+        self.restored = self._formulas([self._fixed(e) for e in reduction.restored])
         self.pattern: Pattern = set()
         if self.method.implicit:
             matrix = reduction.jacobian()
             found = {(i, k): self._entry(matrix, i, k) for i in range(n) for k in range(n)}
             self.pattern = {place for place, entry in found.items() if entry != 0}
-            entries = [(f"j{i}_{k}", found[i, k]) for i, k in sorted(self.pattern)]
+            entries = [found[place] for place in sorted(self.pattern)]
             if self.timed:
-                entries += [(f"ft{i}", self._fixed(e)) for i, e in enumerate(reduction.time_derivative())]
-            self.jacobian_lines = statements(entries, self.names)
-        self.restart_lines: Lines = []
+                entries += [self._fixed(e) for e in reduction.time_derivative()]
+            self.jacobian = self._formulas(entries)
+        self.restart: Formulas | None = None
         if reduction.restart is not None:
             w = sp.Symbol("w", real=True)
             known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | {w: "w"} | _INPUT_NAMES | _SLOPE_NAMES
-            pair = [("residual", reduction.restart), ("slope", sp.diff(reduction.restart, w))]
-            self.restart_lines = statements([(n, self._fixed(e)) for n, e in pair], known)
+            pair = (reduction.restart, sp.diff(reduction.restart, w))
+            self.restart = Formulas([self._fixed(e) for e in pair], known)
 
-    def _solve_lines(self) -> Lines:
-        """Newton's method for the unknown, a fixed number of steps; the failure is NaN."""
-        reduction = self.reduction
-        if reduction.unknown is None:
-            return []
-        pair = [("residual", reduction.residual), ("slope", sp.diff(reduction.residual, reduction.unknown))]
-        inner = statements([(n, self._fixed(e)) for n, e in pair], self.names)
-        clamped = "change = min(max(residual/slope, -2.0), 2.0)"
-        if str(reduction.unknown) == "a_x" or reduction.velocity == "linear":
-            clamped = "change = residual/slope"
-        return [
-            f"for _ in range({NEWTON_STEPS}):",
-            *("    " + line for line in inner),
-            f"    {clamped}",
-            "    z = z - change",
-            "z = z if abs(change) <= 1e-7*abs(z) + 1e-9*abs(z_scale) else math.nan",
-        ]
+    def _made_layout(self) -> Layout:
+        reduction, choice = self.reduction, self.choice
+        massless = reduction.restart is not None
+        return make_layout(
+            lanes=choice.lanes,
+            size=self.size,
+            kept=len(reduction.continuous),
+            constants=len(self.constants.all),
+            harmonics=choice.harmonics,
+            stages=self.method.stages if choice.dense else 0,
+            massless=massless,
+            solved=massless and reduction.unknown is not None,
+            w=reduction.names.index("w") if "w" in reduction.names else -1,
+            x=reduction.names.index("x"),
+        )
 
-    # -- where things lie
-
-    def _rows(self) -> None:
-        n, choice = self.size, self.choice
-        reduction = self.reduction
-        groups = {
-            "Y": n, "F": n, "OUT": 3, "GAP": 1, "CONTINUOUS": len(reduction.continuous), "Z": 1, "Z_SCALE": 1,
-            "TAU": 1, "H": 1, "END": 1, "START": 1, "STOP": 1, "SEGMENT": 1, "ATOL": n, "RTOL": 1,
-            "INPUT": 3, "SLOPE": 3, "AMPLITUDE": 3 * choice.harmonics, "OMEGA": 3 * choice.harmonics,
-            "PHASE": 3 * choice.harmonics, "ACTIVE": 1, "FLAG": 1, "GOOD": 1, "ACCEPTED": 1, "REJECTED": 1,
-            "FAILURES": 1, "ERROR": 1,
-            "MOST": 1, "V_HIGH": 1, "V_LOW": 1, "SIGMA_LOW": 1, "WATCH": 1, "NEXT": 1, "RECORD": 1,
-            "SETTLED": 1, "SAME": 1, "SLIPPING": 1, "RESTING": 1, "V_DRIVE": 1, "TALLY": TALLY_ROWS,
-            **self._further_rows(),
-            "CONSTANT": len(self.constants.all),
-        }  # fmt: skip
-        if choice.dense:
-            groups |= {"OLD": n, "STAGE": n * self.method.stages, "DONE": 1, "TAU_OLD": 1, "OUT_OLD": 3}
-        self.rows: dict[str, int] = {}
-        position = 0
-        for name, count in groups.items():
-            self.rows[name] = position
-            position += count
-        self.row_count = position
-
-    def _further_rows(self) -> dict[str, int]:
-        return {}
-
-    def cell(self, name: str, offset: int = 0) -> str:
-        """Text of one quantity of lane l."""
-        return f"S[{(self.rows[name] + offset) * self.choice.lanes} + l]"
-
-    def entry(self, name: str, offset: int = 0) -> str:
-        """Text of one quantity of the record of a lane."""
-        return f"R[{self.rows[name] + offset}]"
-
-    def _loads(self, names: list[tuple[str, str, int]], where: Where | None = None) -> Lines:
-        return [f"{variable} = {(where or self.cell)(row, offset)}" for variable, row, offset in names]
-
-    def _load_constants(self, where: Where | None = None) -> Lines:
-        return self._loads(self._constant_rows(), where)
-
-    def _constant_rows(self) -> list[tuple[str, str, int]]:
-        """What every evaluation reads: variable, row, offset."""
-        rows = [(str(s), "CONSTANT", i) for i, s in enumerate(self.constants.all)]
-        rows += [(f"start_{c}", "INPUT", i) for i, c in enumerate(CHANNELS)]
-        if self.choice.level != "constant":
-            rows += [(f"rise_{c}", "SLOPE", i) for i, c in enumerate(CHANNELS)]
-        for i, c in enumerate(CHANNELS):
-            for h in range(self.choice.harmonics):
-                k = i * self.choice.harmonics + h
-                rows += [(f"amplitude_{c}{h}", "AMPLITUDE", k), (f"omega_{c}{h}", "OMEGA", k)]
-                rows.append((f"phase_{c}{h}", "PHASE", k))
-        if self._needs_clock():
-            rows.append(("start", "START", 0))
-        if self.reduction.unknown is not None:
-            rows += [("z", "Z", 0), ("z_scale", "Z_SCALE", 0)]
-        return rows
-
-    def _needs_clock(self) -> bool:
-        return bool(self.reduction.model.imposed != 0)
-
-    def _inputs_at(self, moment: str) -> Lines:
-        """Inputs and their slopes at local time `moment` of the segment."""
-        level, lines = self.choice.level, []
-        for c in CHANNELS:
-            text = f"start_{c}" if level == "constant" else f"start_{c} + rise_{c}*({moment})"
-            slope = f"rise_{c}"
-            for h in range(self.choice.harmonics):
-                angle = f"angle_{c}{h}"
-                lines.append(f"{angle} = omega_{c}{h}*({moment}) + phase_{c}{h}")
-                text += f" + amplitude_{c}{h}*sin({angle})"
-                slope += f" + amplitude_{c}{h}*omega_{c}{h}*cos({angle})"
-            lines.append(f"in_{c} = {text}")
-            if level != "constant":
-                lines.append(f"slope_{c} = {slope}")
-        if self._needs_clock():
-            lines.append(f"time = start + ({moment})")
-        return lines
+    @cached_property
+    def programs(self) -> tuple[Program, ...]:
+        """All programs, in the order of `Routines`."""
+        return (
+            self._step(), self._rates_program(), self._outputs_program(), self._restore_program(),
+            self._place_program(), self._balance_program(), self._dense_program(),
+        )  # fmt: skip
 
     # -- the step
 
-    def step(self) -> Lines:
-        """One step of one lane, from loading to the flag that asks for the driver's attention."""
-        n, choice = self.size, self.choice
-        lines = self._load_constants()
-        lines += self._loads([(f"b{i}", "Y", i) for i in range(n)] + [(f"f{i}", "F", i) for i in range(n)])
-        lines += self._loads([(f"atol{i}", "ATOL", i) for i in range(n)] + [("rtol", "RTOL", 0)])
-        lines += self._loads([("tau", "TAU", 0), ("proposed", "H", 0), ("end", "END", 0)])
-        lines += ["rest = end - tau", "last = proposed >= rest*0.99999999", "h = rest if last else proposed"]
-        if not self.timed:
-            lines += self._inputs_at("tau")
-        lines += self._rosenbrock() if self.method.implicit else self._runge_kutta()
-        lines.append("error = 0.0")
-        for i in range(n):
-            lines += [f"scaled = e{i}/(atol{i} + rtol*max(abs(b{i}), abs(y{i})))", "error += scaled*scaled"]
-        lines += [
-            f"error = error*{1 / self.counted!r}",
-            "good = error <= 1.0",
-            "size = log(min(max(error, 1e-10), 1e30))",
-            f"earlier = {self.cell('ERROR')}",
-            f"kept = {-0.5 * PROPORTIONAL / self.method.order!r}*size + {0.5 * INTEGRAL / self.method.order!r}*earlier",
-            f"factor = 0.8*exp(kept if good else {-0.5 / self.method.order!r}*size)",
-            "factor = min(max(factor, 0.2), 6.0) if error < 1e60 else 0.2",
-            f"{self.cell('ERROR')} = size if good else earlier",
-            "after = end if last else tau + h",
-            "next_h = h*factor",
-            "next_h = max(proposed, next_h) if last and good else next_h",
-        ]
-        if choice.dense:
-            lines += [f"{self.cell('OLD', i)} = b{i}" for i in range(n)]
-            lines += [f"{self.cell('STAGE', s * n + i)} = {self._stage(s, i)}" for s in range(self.method.stages)
-                      for i in range(n)]  # fmt: skip
-            lines += [f"{self.cell('OUT_OLD', i)} = {self.cell('OUT', i)}" for i in range(3)]
-            lines += [f"{self.cell('DONE')} = h", f"{self.cell('TAU_OLD')} = tau"]
-        lines += self._bookkeeping()
-        return lines
+    def _step(self) -> Program:
+        """One step of every lane, from loading to the flag that asks for the driver's attention."""
+        step = Step(self)
+        step.advance()
+        step.keep()
+        return step.program
 
-    def _stage(self, s: int, i: int) -> str:
-        if self.method.implicit:
-            return f"u{s}_{i}"
-        return f"f{i}" if s == 0 else f"k{s}_{i}"
+    # -- programs of one record, for the driver
 
-    def _at_stage(self, s: int) -> Lines:
-        return self._inputs_at(f"tau + {self.method.nodes[s]!r}*h") if self.timed else []
+    def _rates_program(self) -> Program:
+        record = Record(self, Program("rates"))
+        point = record.point(record.program.load(Row.TAU))
+        found = record.evaluated(self.full, point)
+        for i in range(self.size):
+            record.program.store(self.layout.rate + i, found[i])
+        for i, row in enumerate((Row.V, Row.ACCELERATION, Row.SIGMA)):
+            record.program.store(row, found[self.size + i])
+        record.program.store(Row.GAP, found[self.size] - record.faster(point))
+        record.keep_unknown()
+        return record.program
 
-    def _runge_kutta(self) -> Lines:
-        method, n, lines = self.method, self.size, []
-        stage = [[self._stage(s, i) for s in range(method.stages)] for i in range(n)]
-        for s in range(1, method.stages):
-            lines += [f"y{i} = b{i} + h*({weighted(method.a[s], stage[i])})" for i in range(n)]
-            lines += self._at_stage(s)
-            lines += self.full_lines if s == method.stages - 1 else self.rate_lines
-            lines += [f"k{s}_{i} = g{i}" for i in range(n)]
-        return lines + [f"e{i} = h*({weighted(method.error, stage[i])})" for i in range(n)]
+    def _outputs_program(self) -> Program:
+        record = Record(self, Program("outputs"))
+        program, n = record.program, self.size
+        point = record.inputs(program.number) | {f"y{i}": program.load(i, "y") for i in range(n)}
+        for i, value in enumerate(record.evaluated(self.outputs, point)):
+            program.store(n + i, value, "y")
+        program.store(n + Out.V_LP, point["in_v"], "y")
+        return program
 
-    def _rosenbrock(self) -> Lines:
-        method, n, lines = self.method, self.size, []
-        lines += [f"y{i} = b{i}" for i in range(n)]
-        if self.timed:
-            lines += self._inputs_at("tau")
-        lines += self.jacobian_lines
-        lines += ["inverse = 1.0/h", f"diagonal = inverse*{1 / method.gamma!r}"]
-        factors, filled = _factorised(n, self.pattern)
-        lines += factors
-        arguments = method.arguments()
-        for s in range(method.stages):
-            if s:
-                for i in range(n):
-                    terms = [f"u{k}_{i}" for k in range(s)]
-                    if s < len(method.a):
-                        lines.append(f"y{i} = b{i} + {weighted(arguments[s], terms)}")
-                    else:
-                        lines.append(f"y{i} = y{i} + u{s - 1}_{i}")
-                lines += self._at_stage(s)
-                lines += self.rate_lines
-            for i in range(n):
-                right = f"g{i}" if s else f"f{i}"
-                if s and any(method.c[s]):
-                    right += f" + inverse*({weighted(method.c[s], [f'u{k}_{i}' for k in range(s)])})"
-                if self.timed and abs(method.time_weights[s]) > 1e-12:
-                    right += f" + h*{method.time_weights[s]!r}*ft{i}"
-                lines.append(f"r{i} = {right}")
-            lines += _substituted(n, s, filled)
-        lines += [f"y{i} = y{i} + u{method.stages - 1}_{i}" for i in range(n)]
-        lines += [f"e{i} = u{method.stages - 1}_{i}" for i in range(n)]
-        if self.timed:
-            lines += self._inputs_at("tau + h")
-        return lines + self.full_lines
+    def _restore_program(self) -> Program:
+        record = Record(self, Program("restore"))
+        point = record.point(record.program.load(Row.TAU))
+        for i, value in enumerate(record.evaluated(self.restored, point)):
+            record.program.store(self.layout.continuous + i, value)
+        return record.program
 
-    def _bookkeeping(self) -> Lines:
-        """Keep or reject the step; raise the flag where the driver is needed."""
-        n, cell = self.size, self.cell
-        lines = [f"{cell('Y', i)} = y{i} if good else b{i}" for i in range(n)]
-        lines += [f"{cell('F', i)} = g{i} if good else f{i}" for i in range(n)]
-        outputs = ("o_v", "o_acceleration", "o_sigma")
-        lines += [f"before{i} = {cell('OUT', i)}" for i in range(3)]
-        lines += [f"now{i} = {name} if good else before{i}" for i, name in enumerate(outputs)]
-        lines += [f"{cell('OUT', i)} = now{i}" for i in range(3)]
-        if self.reduction.unknown is not None:
-            lines.append(f"{cell('Z')} = z if good else {cell('Z')}")
-        lines += [
-            "moved = after if good else tau",
-            f"{cell('TAU')} = moved",
-            f"{cell('H')} = next_h",
-            f"{cell('GOOD')} = 1.0 if good else 0.0",
-            f"{cell('ACCEPTED')} += 1.0 if good else 0.0",
-            f"{cell('REJECTED')} += 0.0 if good else 1.0",
-            f"failures = 0.0 if good else {cell('FAILURES')} + 1.0",
-            f"{cell('FAILURES')} = failures",
-            f"gap = now0 - max(1.000001*in_v, {cell('V_LOW')}) if good else {cell('GAP')}",
-            f"{cell('GAP')} = gap",
-            "slipping = 1.0 if gap > 0.0 else 0.0",
-            f"resting = 1.0 if abs(now0) < {cell('V_LOW')} else 0.0",
-            "turn = 1.0 if before1*h > 1e-10*abs(now0) and now1 <= 0.0 else 0.0",  # more than rounding
-            "event = turn + (1.0 if before1*h < -1e-10*abs(now0) and now1 >= 0.0 else 0.0)",
-            f"event += abs(slipping - {cell('SLIPPING')}) + abs(resting - {cell('RESTING')})",
-            f"event = event*{cell('WATCH')}",
-            "flag = 1.0 if moved >= end else 0.0",
-            f"flag += 1.0 if {cell('ACCEPTED')} + {cell('REJECTED')} >= {cell('MOST')} else 0.0",
-            "flag += 1.0 if failures >= 40.0 else 0.0",
-            f"flag += 1.0 if abs(now0) >= {cell('V_HIGH')} else 0.0",
-            f"flag += 1.0 if now2 <= {cell('SIGMA_LOW')} else 0.0",
-            f"flag += 1.0 if moved > {cell('NEXT')} else 0.0",
-            f"flag += {cell('RECORD')}*(1.0 if good else 0.0)",
-            f"{cell('FLAG')} = (flag + event)*{cell('ACTIVE')}",
-        ]
-        return lines
-
-    # -- functions for the driver
-
-    def functions(self) -> str:
-        """Scalar functions of one lane that the driver calls."""
-        n, load = self.size, self._load_constants(self.entry)
-        from_rows = self._loads([(f"y{i}", "Y", i) for i in range(n)] + [("tau", "TAU", 0)], self.entry)
-        rates = [*load, *from_rows, *self._inputs_at("tau"), *self.full_lines]
-        rates += [f"{self.entry('F', i)} = g{i}" for i in range(n)]
-        rates += [f"{self.entry('OUT', i)} = o_{name}" for i, name in enumerate(OUTPUTS[:3])]
-        rates.append(f"{self.entry('GAP')} = o_v - max(1.000001*in_v, {self.entry('V_LOW')})")
-        outputs = [*load, *(f"y{i} = y[{i}]" for i in range(n)), *self._inputs_at("tau"), *self.output_lines]
-        outputs += [f"out[{i}] = o_{name}" for i, name in enumerate(OUTPUTS)] + ["out[5] = in_v"]
-        restore = [*load, *from_rows, *self._inputs_at("tau"), *self.restore_lines]
-        restore += [f"{self.entry('CONTINUOUS', i)} = k{i}" for i in range(len(self.reduction.continuous))]
-        if self.reduction.unknown is not None:
-            rates.append(f"{self.entry('Z')} = z")
-        text = _function("rates_at(R)", rates) + _function("outputs_at(R, tau, y, out)", outputs)
-        text += _function("restore_at(R)", restore)
-        text += self._residual_function() + self._state_function()
-        return text + _function("dense_at(R, theta, y)", self._dense())
-
-    def _residual_function(self) -> str:
+    def _balance_program(self) -> Program:
         """The balance as a function of w after a jump; without one, velocity simply continues."""
-        if not self.restart_lines:
-            return _function("balance_at(R, w)", ["return 0.0, 1.0"])
-        continuous = [(f"k{i}", "CONTINUOUS", i) for i in range(len(self.reduction.continuous))]
-        lines = [
-            *self._load_constants(self.entry),
-            *self._loads(continuous, self.entry),
-            "tau = 0.0",
-            *self._inputs_at("tau"),
-        ]
-        return _function("balance_at(R, w)", [*lines, *self.restart_lines, "return residual, slope"])
+        record = Record(self, Program("balance"))
+        program = record.program
+        found: list[Value] = [0.0, 1.0]
+        if self.restart is not None:
+            point = record.inputs(0.0) | {"w": program.number}
+            point |= {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}
+            found = self.restart(record.constants | point)
+        for i, value in enumerate(found):
+            program.store(i, value, "y")
+        return program
 
-    def _state_function(self) -> str:
-        """Y from the continuous variables and w."""
-        reduction, lines = self.reduction, []
+    def _place_program(self) -> Program:
+        """The state from the continuous variables and w."""
+        program, reduction = Program("place"), self.reduction
         for i, symbol in enumerate(reduction.state):
+            value = program.number
             if symbol in reduction.continuous:
-                source = self.entry("CONTINUOUS", reduction.continuous.index(symbol))
-            else:
-                source = "w"
-            lines.append(f"{self.entry('Y', i)} = {source}")
+                value = program.load(self.layout.continuous + reduction.continuous.index(symbol))
+            program.store(self.layout.state + i, value)
         if reduction.unknown is not None and str(reduction.unknown) == "w":
-            lines.append(f"{self.entry('Z')} = w")
-        return _function("place_at(R, w)", lines)
+            program.store(Row.Z, program.number)
+        return program
 
-    def _dense(self) -> Lines:
+    def _dense_program(self) -> Program:
+        program = Program("dense")
+        if self.choice.dense:
+            for i in range(self.size):
+                program.store(i, self._interpolated(program, i, program.number), "y")
+        return program
+
+    def _interpolated(self, program: Program, i: int, theta: Node) -> Value:
+        """State variable i at the fraction theta of the last step."""
         method, n = self.method, self.size
-        if not self.choice.dense:
-            return ["pass"]
-        stage = [[self.entry("STAGE", s * n + i) for s in range(method.stages)] for i in range(n)]
-        lines: Lines = []
+        old = program.load(self.layout.old + i)
+        stages = [program.load(self.layout.stage + s * n + i) for s in range(method.stages)]
         if not method.implicit:
-            for s, polynomial in enumerate(method.dense):
-                text = "0.0"
-                for weight in reversed(polynomial):
-                    text = f"({weight!r} + theta*{text})"
-                lines.append(f"weight{s} = theta*{text}")
-            weights = [f"weight{s}" for s in range(method.stages)]
+            weights = [theta * horner(polynomial, theta) for polynomial in method.dense]
+            terms = [weight * k for weight, k in zip(weights, stages, strict=True)]
+            return old + program.load(Row.DONE) * total(terms)
+        inner = horner([weighted(row, stages) for row in method.dense], theta)
+        change = weighted(method.arguments()[method.stages], stages)
+        return old + theta * (change + (1.0 - theta) * inner)
+
+
+def horner(coefficients: Sequence[Value], x: Node) -> Value:
+    """A polynomial, lowest coefficient first."""
+    value: Value = 0.0
+    for coefficient in reversed(coefficients):
+        value = coefficient + x * value
+    return value
+
+
+def total(terms: Sequence[Value]) -> Value:
+    """Their sum, from the left."""
+    value = terms[0]
+    for term in terms[1:]:
+        value = value + term
+    return value
+
+
+class Record:
+    """What every evaluation within one program reads: constants, inputs, the unknown."""
+
+    def __init__(self, kernel: Kernel, program: Program) -> None:
+        self.kernel, self.program = kernel, program
+        layout, load = kernel.layout, program.load
+        self.constants: Point = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
+        self.z: Value = 0.0
+        if kernel.reduction.unknown is not None:
+            self.z, self.z_scale = load(Row.Z), load(Row.Z_SCALE)
+
+    def inputs(self, moment: Value) -> Point:
+        """Inputs and their slopes at a local time of the segment."""
+        choice, layout, load, found = self.kernel.choice, self.kernel.layout, self.program.load, {}
+        for i, c in enumerate(CHANNELS):
+            value: Value = load(Row.INPUT + i)
+            if choice.level != "constant":
+                slope: Value = load(Row.SLOPE + i)
+                value = value + slope * moment
+                for h in range(choice.harmonics):
+                    k = i * choice.harmonics + h
+                    amplitude, omega = load(layout.amplitude + k), load(layout.omega + k)
+                    angle = omega * moment + load(layout.phase + k)
+                    value = value + amplitude * primitive("sin", angle)
+                    slope = slope + amplitude * omega * primitive("cos", angle)
+                found[f"slope_{c}"] = slope
+            found[f"in_{c}"] = value
+        if self.kernel.reduction.model.imposed != 0:
+            found["time"] = load(Row.START) + moment
+        return found
+
+    def state(self) -> list[Node]:
+        """The record's own state."""
+        return [self.program.load(self.kernel.layout.state + i) for i in range(self.kernel.size)]
+
+    def point(self, moment: Value) -> Point:
+        """The record's state and the inputs at a local time."""
+        return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
+
+    def evaluated(self, formulas: Formulas, point: Point, solved: bool = True) -> list[Value]:
+        """Formulas at a point, the unknown solved for there."""
+        if solved and self.kernel.residual is not None:
+            self.z = self._solved(self.kernel.residual, point)
+        return formulas(self.constants | point | {"z": self.z})
+
+    def _solved(self, residual: Formulas, point: Point) -> Value:
+        """Newton's method for the unknown, a fixed number of steps; the failure is NaN."""
+        reduction = self.kernel.reduction
+        clamped = not (str(reduction.unknown) == "a_x" or reduction.velocity == "linear")
+
+        def improved(z: Node) -> tuple[list[Value], list[Value]]:
+            value, slope = residual(self.constants | point | {"z": z})
+            change = value / slope
+            if clamped:
+                change = smaller(larger(change, -2.0), 2.0)
+            z = z - change
+            return [z], [z, change]
+
+        z, change = Loop(NEWTON_STEPS, [self.z], improved).outcome()
+        found: Value = select(abs(change) <= 1e-7 * abs(z) + 1e-9 * abs(self.z_scale), z, float("nan"))
+        return found
+
+    def keep_unknown(self) -> None:
+        """Store it, as a guess for the next time."""
+        if self.kernel.reduction.unknown is not None:
+            self.program.store(Row.Z, self.z)
+
+    def faster(self, point: Point) -> Value:
+        """The velocity above which the block slips."""
+        limit: Value = larger(FASTER * point["in_v"], self.program.load(Row.V_LOW))
+        return limit
+
+
+class Step(Record):
+    """Writes one step."""
+
+    def __init__(self, kernel: Kernel, name: str = "step") -> None:
+        super().__init__(kernel, Program(name))
+        load, layout, n = self.program.load, kernel.layout, kernel.size
+        self.old = self.state()
+        self.first: list[Value] = [load(layout.rate + i) for i in range(n)]
+        self.atol, self.rtol = [load(layout.atol + i) for i in range(n)], load(Row.RTOL)
+        self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.END)
+        rest = self.end - self.tau
+        self.rest = rest
+        self.last = self.proposed >= rest * 0.99999999
+        self.h: Value = select(self.last, rest, self.proposed)
+        self.new: Sequence[Value] = ()
+        self.steady = None if kernel.timed else self.inputs(self.tau)
+
+    def advance(self) -> None:
+        """The step itself, its error and the size of the next."""
+        method = self.kernel.method
+        errors = self._rosenbrock() if method.implicit else self._runge_kutta()
+        error: Value = 0.0
+        for i, e in enumerate(errors):
+            scaled = e / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i])))
+            error = error + scaled * scaled
+        error = error * (1 / self.kernel.counted)
+        self.good = error <= 1.0
+        self.size = log(smaller(larger(error, 1e-10), 1e30))
+        self.earlier = self.program.load(Row.ERROR)
+        kept = -0.5 * PROPORTIONAL / method.order * self.size + 0.5 * INTEGRAL / method.order * self.earlier
+        factor = 0.8 * exp(select(self.good, kept, -0.5 / method.order * self.size))
+        factor = select(error < 1e60, smaller(larger(factor, 0.2), 6.0), 0.2)
+        self.after = select(self.last, self.end, self.tau + self.h)
+        next_h = self.h * factor
+        self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
+
+    def _inputs_of(self, s: int) -> Point:
+        """Inputs at stage s."""
+        if self.steady is not None:
+            return self.steady
+        return self.inputs(self.tau + self.kernel.method.nodes[s] * self.h)
+
+    def _found(self, formulas: Formulas, y: Sequence[Value], inputs: Point) -> list[Value]:
+        return self.evaluated(formulas, inputs | {f"y{i}": value for i, value in enumerate(y)})
+
+    def _runge_kutta(self) -> list[Value]:
+        method, n, h = self.kernel.method, self.kernel.size, self.h
+        self.stages: list[Sequence[Value]] = [self.first]
+        for s in range(1, method.stages):
+            y = [self.old[i] + h * weighted(method.a[s], [k[i] for k in self.stages]) for i in range(n)]
+            whole = s == method.stages - 1
+            self.here = self._inputs_of(s)
+            found = self._found(self.kernel.full if whole else self.kernel.rates, y, self.here)
+            self.stages.append(found[:n])
+        self.new, self.rates, self.outputs = y, found[:n], found[n:]
+        return [h * weighted(method.error, [k[i] for k in self.stages]) for i in range(n)]
+
+    def _rosenbrock(self) -> list[Value]:
+        kernel, method, n, h = self.kernel, self.kernel.method, self.kernel.size, self.h
+        beginning = self.steady if self.steady is not None else self.inputs(self.tau)
+        point = beginning | {f"y{i}": value for i, value in enumerate(self.old)}
+        entries = self.evaluated(kernel.jacobian, point, solved=False)
+        jacobian = dict(zip(sorted(kernel.pattern), entries, strict=False))
+        in_time = entries[len(jacobian) :]
+        inverse = 1.0 / h
+        matrix = factorised(n, jacobian, inverse * (1 / method.gamma))
+        arguments = method.arguments()
+        self.stages = []
+        y: list[Value] = list(self.old)
+        for s in range(method.stages):
+            rates: Sequence[Value] = self.first
+            if s:
+                if s < len(method.a):
+                    y = [self.old[i] + weighted(arguments[s], [u[i] for u in self.stages]) for i in range(n)]
+                else:
+                    y = [y[i] + self.stages[-1][i] for i in range(n)]
+                rates = self._found(kernel.rates, y, self._inputs_of(s))
+            right = list(rates)
             for i in range(n):
-                terms = " + ".join(f"{w}*{k}" for w, k in zip(weights, stage[i], strict=True))
-                lines.append(f"y[{i}] = {self.entry('OLD', i)} + {self.entry('DONE')}*({terms})")
-            return lines
-        last = method.arguments()[method.stages]
+                if s and any(method.c[s]):
+                    right[i] = right[i] + inverse * weighted(method.c[s], [u[i] for u in self.stages])
+                if kernel.timed and abs(method.time_weights[s]) > 1e-12:
+                    right[i] = right[i] + h * method.time_weights[s] * in_time[i]
+            self.stages.append(substituted(matrix, right))
+        self.new = [y[i] + self.stages[-1][i] for i in range(n)]
+        self.here = self.steady if self.steady is not None else self.inputs(self.tau + h)
+        found = self._found(kernel.full, self.new, self.here)
+        self.rates, self.outputs = found[:n], found[n:]
+        return list(self.stages[-1])
+
+    def keep(self) -> None:
+        """Keep or reject the step; raise the flag where the driver is needed."""
+        load, store, good = self.program.load, self.program.store, self.good
+        if self.kernel.choice.dense:
+            self._keep_stages()
+        self._keep_state()
+        before = [load(row) for row in (Row.V, Row.ACCELERATION, Row.SIGMA)]
+        v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs, before, strict=True))
+        for row, value in ((Row.V, v), (Row.ACCELERATION, acceleration), (Row.SIGMA, sigma)):
+            store(row, value)
+        moved = select(good, self.after, self.tau)
+        store(Row.TAU, moved)
+        store(Row.H, self.next_h)
+        store(Row.GOOD, select(good, 1.0, 0.0))
+        accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
+        store(Row.ACCEPTED, accepted)
+        store(Row.REJECTED, rejected)
+        failures = select(good, 0.0, load(Row.FAILURES) + 1.0)
+        store(Row.FAILURES, failures)
+        gap = select(good, v - self.faster(self.here), load(Row.GAP))
+        store(Row.GAP, gap)
+        slipping, resting = select(gap > 0.0, 1.0, 0.0), select(abs(v) < load(Row.V_LOW), 1.0, 0.0)
+        change, rounding = before[1] * self.h, 1e-10 * abs(v)  # a turn is more than rounding
+        event = select((change > rounding) & (acceleration <= 0.0), 1.0, 0.0)
+        event = event + select((change < -rounding) & (acceleration >= 0.0), 1.0, 0.0)
+        event = event + (abs(slipping - load(Row.SLIPPING)) + abs(resting - load(Row.RESTING)))
+        reasons = [
+            moved >= self.end,
+            accepted + rejected >= load(Row.MOST),
+            failures >= 40.0,
+            abs(v) >= load(Row.V_HIGH),
+            sigma <= load(Row.SIGMA_LOW),
+            moved > load(Row.NEXT),
+        ]
+        flag = total([select(reason, 1.0, 0.0) for reason in reasons])
+        flag = flag + load(Row.RECORD) * select(good, 1.0, 0.0)
+        store(Row.FLAG, (flag + event * load(Row.WATCH)) * load(Row.ACTIVE))
+
+    def _keep_state(self) -> None:
+        layout, store, good = self.kernel.layout, self.program.store, self.good
+        for i in range(self.kernel.size):
+            store(layout.state + i, select(good, self.new[i], self.old[i]))
+            store(layout.rate + i, select(good, self.rates[i], self.first[i]))
+        store(Row.ERROR, select(good, self.size, self.earlier))
+        if self.kernel.reduction.unknown is not None:
+            store(Row.Z, select(good, self.z, self.program.load(Row.Z)))
+
+    def _keep_stages(self) -> None:
+        layout, n, load, store = self.kernel.layout, self.kernel.size, self.program.load, self.program.store
         for i in range(n):
-            text = "0.0"
-            for row in reversed(method.dense):
-                text = f"({weighted(row, stage[i])} + theta*{text})"
-            change = weighted(last, stage[i])
-            lines.append(f"y[{i}] = {self.entry('OLD', i)} + theta*({change} + (1.0 - theta)*{text})")
-        return lines
-
-    def text(self) -> str:
-        """The whole kernel, to be compiled behind the primitives and a preamble."""
-        header: dict[str, float] = {f"ROW_{name}": row for name, row in self.rows.items()}
-        for name in ("OLD", "STAGE", "DONE", "TAU_OLD", "OUT_OLD"):
-            header.setdefault(f"ROW_{name}", 0)  # named by the driver, not used without dense output
-        header |= {"W": self.choice.lanes, "N": self.size, "ROWS": self.row_count, "DENSE": self.choice.dense}
-        header |= {"TALLY_ROWS": TALLY_ROWS, "SLIP_EVENT": SLIP_EVENT}
-        header |= {"NC": len(self.constants.all), "NK": len(self.reduction.continuous)}
-        header |= {"HARMONICS": self.choice.harmonics, "MASSLESS": self.reduction.restart is not None}
-        header["STATE_W"] = self.reduction.names.index("w") if "w" in self.reduction.names else -1
-        header["IMPLICIT"] = header["MASSLESS"] and self.reduction.unknown is not None
-        constants = "".join(f"{name} = {value!r}\n" for name, value in header.items())
-        parts = ["driver.py", "field.py"] if self.choice.field else ["driver.py"]
-        driver = "\n\n".join(files("steadyslip.compiled").joinpath(p).read_text(encoding="utf-8") for p in parts)
-        step, count = self.step(), "W"
-        if self.choice.lanes > 1 and not any(line.startswith("for ") for line in step):
-            step, count = _abreast(step, self.choice.lanes // ABREAST, ABREAST), f"W // {ABREAST}"
-        loop = f"\n\n@njit(**FLAT)\ndef step_lanes(S):\n    for l in range({count}):\n" + indented(step, 2)
-        return constants + self.functions() + loop + "\n\n" + driver
-
-
-def _function(signature: str, lines: Lines) -> str:
-    return f"\n\n@njit(**PLAIN)\ndef {signature}:\n" + indented(lines, 1)
-
-
-def _abreast(lines: Lines, apart: int, count: int) -> Lines:
-    """The same statements for lanes l, l + apart, l + 2 apart, ..., line by line.
-
-    One chain of dependent operations leaves a processor idle for most of the time; several fill its gaps
-    (measured: two take 1.6 to 1.9 times less time for each lane, three up to 2.4 times, four no less).
-    """
-    assigned = {match[1] for line in lines if (match := re.match(r"(\w+) \+?= ", line))}
-    names = re.compile(rf"\b({'|'.join(sorted(assigned))})\b")
-
-    def moved(line: str, by: int) -> str:
-        return re.sub(r"S\[(\d+) \+ l\]", lambda match: f"S[{int(match[1]) + by} + l]", line)
-
-    return [names.sub(rf"\1{'_' * c}", moved(line, c * apart)) for line in lines for c in range(count)]
-
-
-Pattern = set[tuple[int, int]]
-
-
-def _factorised(n: int, pattern: Pattern) -> tuple[Lines, Pattern]:
-    """LU factors of W = 1/(hγ) − J without pivoting (the diagonal dominates once h is accepted), and where they are.
-
-    Entries that are zero whatever the numbers are left out: those of J outside `pattern`, and what follows from them.
-    """
-    filled = pattern | {(i, i) for i in range(n)}
-    lines = []
-    for i, k in sorted(filled):
-        parts = (["diagonal"] if i == k else []) + ([f"j{i}_{k}"] if (i, k) in pattern else [])
-        lines.append(f"w{i}_{k} = {' - '.join(parts) if i == k else '-' + parts[0]}")
-    for k in range(n):
-        lines.append(f"p{k} = 1.0/w{k}_{k}")
-        for i in range(k + 1, n):
-            if (i, k) not in filled:
-                continue
-            lines.append(f"w{i}_{k} = w{i}_{k}*p{k}")
-            for c in range(k + 1, n):
-                if (k, c) in filled:
-                    before = f"w{i}_{c}" if (i, c) in filled else ""
-                    lines.append(f"w{i}_{c} = {before} - w{i}_{k}*w{k}_{c}")
-                    filled.add((i, c))
-    return lines, filled
-
-
-def _substituted(n: int, s: int, filled: Pattern) -> Lines:
-    """Solve for stage s from r."""
-    lines = []
-    for i in range(1, n):
-        lines += [f"r{i} = r{i} - w{i}_{k}*r{k}" for k in range(i) if (i, k) in filled]
-    for i in reversed(range(n)):
-        known = "".join(f" - w{i}_{k}*u{s}_{k}" for k in range(i + 1, n) if (i, k) in filled)
-        lines.append(f"u{s}_{i} = (r{i}{known})*p{i}")
-    return lines
+            store(layout.old + i, self.old[i])
+        for s, stage in enumerate(self.stages):
+            for i in range(n):
+                store(layout.stage + s * n + i, stage[i])
+        for row, now in ((Row.V_OLD, Row.V), (Row.ACCELERATION_OLD, Row.ACCELERATION), (Row.SIGMA_OLD, Row.SIGMA)):
+            store(row, load(now))
+        store(Row.DONE, self.h)
+        store(Row.TAU_OLD, self.tau)

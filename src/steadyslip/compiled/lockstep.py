@@ -1,4 +1,4 @@
-"""The text of a kernel that takes all lanes through one table of inputs together, with sensitivities.
+"""The kernel that takes all lanes through one table of inputs together, with sensitivities.
 
 Measured histories have a breakpoint at every sample. Lanes that each looked after their own breakpoints would spend
 most of their time there; lanes that share the samples of one record need not: they enter every row of the table
@@ -8,18 +8,18 @@ derivatives in several directions are written down at every sample.
 
 from __future__ import annotations
 
-from importlib.resources import files
+from functools import cached_property
 
 import sympy as sp
 
-from steadyslip.compiled.kernel import CHANNELS, Choice, KernelText
+from steadyslip.compiled.kernel import Choice, Kernel, Record, Step
+from steadyslip.compiled.layout import Layout, Row, make_layout
+from steadyslip.compiled.nodes import Program, as_node, select
 from steadyslip.compiled.reduction import V_LP, P, Q, Reduction
-from steadyslip.compiled.source import Lines, indented, statements
-from steadyslip.errors import InternalError
 
 
-class LockstepText(KernelText):
-    """Writes the source of one such kernel.
+class LockstepKernel(Kernel):
+    """Writes the programs of one such kernel.
 
     Parameters
     ----------
@@ -38,66 +38,65 @@ class LockstepText(KernelText):
         self.own = len(reduction.state) // (1 + len(reduction.directions))
         super().__init__(reduction, choice)
 
-    def _blocks(self) -> None:
+    def _write(self) -> None:
         self.counted = self.own  # sensitivities have tolerances of their own, and are not diluted by each other
-        super()._blocks()
-        self.full_lines = self.rate_lines
+        super()._write()
+        self.full = self.rates
         expression = self._fixed(self.observed)
-        wanted = [("seen0", expression)]
+        wanted = [expression]
         for direction, column in enumerate(self.reduction.directions):
-            total = self._change(expression, direction)
-            for variable, change in zip(self.reduction.state[: self.own], column, strict=True):
-                total += self._fixed(self.reduction.derivative(self.observed, variable)) * change
-            wanted.append((f"seen{direction + 1}", total))
-        self.seen_lines = self._solve_lines() + statements(wanted, self.names)
+            change = self._change(expression, direction)
+            for variable, slope in zip(self.reduction.state[: self.own], column, strict=True):
+                change += self._fixed(self.reduction.derivative(self.observed, variable)) * slope
+            wanted.append(change)
+        self.seen = self._formulas(wanted)
 
-    def _further_rows(self) -> dict[str, int]:
-        return {"SEEN": 1 + len(self.reduction.directions), "BEFORE": self.own}
-
-    def _bookkeeping(self) -> Lines:
-        """Keep or reject the step; a lane that has arrived stays as it is."""
-        cell = self.cell
-        lines = [f"{cell('Y', i)} = y{i} if good else b{i}" for i in range(self.size)]
-        lines += [f"{cell('F', i)} = g{i} if good else f{i}" for i in range(self.size)]
-        if self.reduction.unknown is not None:
-            lines.append(f"{cell('Z')} = z if good else {cell('Z')}")
-        return [
-            *lines,
-            "moves = 1.0 if rest > 0.0 else 0.0",
-            f"{cell('ERROR')} = size if good and rest > 0.0 else earlier",
-            f"{cell('TAU')} = after if good else tau",
-            f"{cell('H')} = next_h",
-            f"{cell('ACCEPTED')} += moves if good else 0.0",
-            f"{cell('REJECTED')} += 0.0 if good else moves",
-            f"{cell('FAILURES')} = 0.0 if good else {cell('FAILURES')} + 1.0",
-        ]
-
-    def _lanes(self, name: str, lines: Lines) -> str:
-        load = self._load_constants() + self._loads([(f"y{i}", "Y", i) for i in range(self.size)] + [("tau", "TAU", 0)])
-        body = [*load, *self._inputs_at("tau"), *lines]
-        return f"\n\n@njit(**FLAT)\ndef {name}(S):\n    for l in range(W):\n" + indented(body, 2)
-
-    def text(self) -> str:
-        """The whole kernel, to be compiled behind the primitives and a preamble."""
-        header = {f"ROW_{name}": row for name, row in self.rows.items()}
+    def _made_layout(self) -> Layout:
         directions = len(self.reduction.directions)
-        header |= {"W": self.choice.lanes, "N": self.size, "OWN": self.own, "DIRECTIONS": directions}
-        header |= {"ROWS": self.row_count, "NC": len(self.constants.all)}
-        header |= {"POSITION": self.reduction.names.index("x")}
-        constants = "".join(f"{name} = {value!r}\n" for name, value in header.items())
-        constants += f"INPUT_RATES = {self._input_rates()!r}\n"
-        rates = [*self.rate_lines, *(f"{self.cell('F', i)} = g{i}" for i in range(self.size))]
-        if self.reduction.unknown is not None:
-            rates.append(f"{self.cell('Z')} = z")
-        seen = [*self.seen_lines, *(f"{self.cell('SEEN', i)} = seen{i}" for i in range(1 + directions))]
-        step = "\n\n@njit(**FLAT)\ndef step_lanes(S):\n    for l in range(W):\n" + indented(self.step(), 2)
-        driver = files("steadyslip.compiled").joinpath("lockstep_driver.py").read_text(encoding="utf-8")
-        return constants + self._lanes("rates_lanes", rates) + self._lanes("see_lanes", seen) + step + "\n\n" + driver
+        return make_layout(
+            lanes=self.choice.lanes,
+            size=self.size,
+            kept=0,
+            constants=len(self.constants.all),
+            own=self.own,
+            directions=directions,
+            x=self.reduction.names.index("x"),
+            seen=1 + directions,
+        )
 
-    def _input_rates(self) -> tuple[int, ...]:
+    @cached_property
+    def programs(self) -> tuple[Program, ...]:
+        """What `steadyslip.compiled.lockstep_driver` calls."""
+        return self._step(), self._lanes_program("rates_lanes"), self._lanes_program("see_lanes")
+
+    def _step(self) -> Program:
+        """One step; a lane that has arrived stays as it is."""
+        step = Step(self)
+        step.advance()
+        step._keep_state()
+        load, store, good = step.program.load, step.program.store, step.good
+        moves = select(step.rest > 0.0, 1.0, 0.0)
+        store(Row.ERROR, select(as_node(good, "bool") & (step.rest > 0.0), step.size, step.earlier))
+        store(Row.TAU, select(good, step.after, step.tau))
+        store(Row.H, step.next_h)
+        store(Row.ACCEPTED, load(Row.ACCEPTED) + select(good, moves, 0.0))
+        store(Row.REJECTED, load(Row.REJECTED) + select(good, 0.0, moves))
+        store(Row.FAILURES, select(good, 0.0, load(Row.FAILURES) + 1.0))
+        return step.program
+
+    def _lanes_program(self, name: str) -> Program:
+        record = Record(self, Program(name))
+        point = record.point(record.program.load(Row.TAU))
+        rates = name == "rates_lanes"
+        place = self.layout.rate if rates else self.layout.seen
+        for i, value in enumerate(record.evaluated(self.rates if rates else self.seen, point)):
+            record.program.store(place + i, value)
+        if rates:
+            record.keep_unknown()
+        return record.program
+
+    def input_rates(self) -> tuple[int, ...]:
         """Where the rates of change of the inputs lie among the constants, direction by direction; -1 if nowhere."""
         order = {pair: len(self.constants.symbols) + i for i, pair in enumerate(self.constants.rates)}
         directions = range(len(self.reduction.directions))
-        if len(CHANNELS) != len(self.varied_inputs):
-            raise InternalError("len(CHANNELS) == len(self.varied_inputs)")
-        return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs) or (-1,)
+        return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs)

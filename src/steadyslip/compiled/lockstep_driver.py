@@ -1,132 +1,147 @@
-"""What `steadyslip.compiled.lockstep` kernels do between steps. Kernel text, not imported.
+"""What `steadyslip.compiled.lockstep` kernels do between steps. The same code for every model; see `driver`.
 
-Quantity X of lane l is ``S[ROW_X*W + l]``. A row of `segments` is start, end, jump of the load point, then values and
-slopes of the inputs.
+A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs.
 """
 
-WELL, LOST = 0, 1
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from steadyslip.compiled.layout import INPUTS, Array, Layout, Routines, Row, call
+
+RTOL, GUESS, SCALE, MOST, ATOL = 0, 1, 2, 3, 4
+"""Columns of the settings: error per step, guess of the unknown and its scale, limit of steps, absolute tolerances."""
 
 
-@njit(**PLAIN)
-def load(S, group, jobs, constants, initial, settings):
-    """Put the next W jobs into the lanes; lanes without one repeat the last."""
-    for l in range(W):
-        j = min(group + l, jobs - 1)
+def load(S: Array, layout: Layout, group: int, jobs: int, constants: Array, initial: Array, settings: Array) -> None:
+    """Put the next jobs into the lanes; lanes without one repeat the last."""
+    W = layout.lanes
+    for lane in range(W):
+        j = min(group + lane, jobs - 1)
         c, i, s = min(j, constants.shape[0] - 1), min(j, initial.shape[0] - 1), min(j, settings.shape[0] - 1)
-        for k in range(NC):
-            S[(ROW_CONSTANT + k) * W + l] = constants[c, k]
-        for k in range(N):
-            S[(ROW_Y + k) * W + l] = initial[i, k]
-            S[(ROW_ATOL + k) * W + l] = settings[s, 4 + k]
-        S[ROW_RTOL * W + l] = settings[s, 0]
-        S[ROW_Z * W + l] = settings[s, 1]
-        S[ROW_Z_SCALE * W + l] = settings[s, 2]
-        S[ROW_MOST * W + l] = settings[s, 3]
-        S[ROW_H * W + l] = 1e300
-        S[ROW_FAILURES * W + l] = 0.0
-        S[ROW_ACCEPTED * W + l] = 0.0
-        S[ROW_REJECTED * W + l] = 0.0
-        S[ROW_ERROR * W + l] = 0.0
-        S[ROW_ACTIVE * W + l] = 1.0
+        for k in range(layout.constants):
+            S[(layout.constant + k) * W + lane] = constants[c, k]
+        for k in range(layout.size):
+            S[(layout.state + k) * W + lane] = initial[i, k]
+            S[(layout.atol + k) * W + lane] = settings[s, ATOL + k]
+        S[Row.RTOL * W + lane] = settings[s, RTOL]
+        S[Row.Z * W + lane] = settings[s, GUESS]
+        S[Row.Z_SCALE * W + lane] = settings[s, SCALE]
+        S[Row.MOST * W + lane] = settings[s, MOST]
+        S[Row.H * W + lane] = 1e300
+        S[Row.FAILURES * W + lane] = 0.0
+        S[Row.ACCEPTED * W + lane] = 0.0
+        S[Row.REJECTED * W + lane] = 0.0
+        S[Row.ERROR * W + lane] = 0.0
+        S[Row.ACTIVE * W + lane] = 1.0
 
 
-@njit(**PLAIN)
-def enter(S, group, k, segments, input_rates):
+def enter(S: Array, layout: Layout, group: int, k: int, segments: Array, input_rates: Array, places: Array) -> None:
     """Start row k of the table: new inputs, jump of the load point."""
-    for l in range(W):
-        row = segments[min(group + l, segments.shape[0] - 1), k]
-        S[ROW_TAU * W + l] = 0.0
-        S[ROW_START * W + l] = row[0]
-        S[ROW_END * W + l] = row[1] - row[0]
-        S[(ROW_Y + POSITION) * W + l] -= row[2]
-        for i in range(3):
-            S[(ROW_INPUT + i) * W + l] = row[3 + i]
-            S[(ROW_SLOPE + i) * W + l] = row[6 + i]
+    W = layout.lanes
+    for lane in range(W):
+        row = segments[min(group + lane, segments.shape[0] - 1), k]
+        S[Row.TAU * W + lane] = 0.0
+        S[Row.START * W + lane] = row[0]
+        S[Row.END * W + lane] = row[1] - row[0]
+        S[(layout.state + layout.x) * W + lane] -= row[2]
+        for i in range(INPUTS):
+            S[(Row.INPUT + i) * W + lane] = row[3 + i]
+            S[(Row.SLOPE + i) * W + lane] = row[6 + i]
         if input_rates.shape[1] > 0:
-            own = min(group + l, input_rates.shape[0] - 1)
-            for d in range(DIRECTIONS):
-                for i in range(3):
-                    place = INPUT_RATES[3 * d + i]
+            own = min(group + lane, input_rates.shape[0] - 1)
+            for d in range(layout.directions):
+                for i in range(INPUTS):
+                    place = places[INPUTS * d + i]
                     if place >= 0:
-                        S[(ROW_CONSTANT + place) * W + l] = input_rates[own, d, k, i]
+                        S[(layout.constant + place) * W + lane] = input_rates[own, d, k, i]
 
 
-@njit(**PLAIN)
-def move_nodes(S, group, k, node_rates):
+def move_nodes(S: Array, layout: Layout, group: int, k: int, node_rates: Array) -> bool:
     """Sensitivities jump where the start of a row moves with a direction: by the difference of the rates there."""
     moved = False
-    for l in range(W):
-        own = min(group + l, node_rates.shape[0] - 1)
-        for d in range(DIRECTIONS):
-            rate = node_rates[own, d, k]
+    W, own = layout.lanes, layout.own
+    for lane in range(W):
+        job = min(group + lane, node_rates.shape[0] - 1)
+        for d in range(layout.directions):
+            rate = node_rates[job, d, k]
             if rate != 0.0:
                 moved = True
-                for i in range(OWN):
-                    change = S[(ROW_BEFORE + i) * W + l] - S[(ROW_F + i) * W + l]
-                    S[(ROW_Y + OWN * (1 + d) + i) * W + l] += rate * change
+                for i in range(own):
+                    change = S[(layout.before + i) * W + lane] - S[(layout.rate + i) * W + lane]
+                    S[(layout.state + own * (1 + d) + i) * W + lane] += rate * change
     return moved
 
 
-@njit(**PLAIN)
-def cross(S):
+def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
     """Take every living lane to the end of the row."""
+    W = layout.lanes
     while True:
         waiting = 0
-        for l in range(W):
-            if S[ROW_TAU * W + l] < S[ROW_END * W + l]:
-                steps = S[ROW_ACCEPTED * W + l] + S[ROW_REJECTED * W + l]
-                if S[ROW_ACTIVE * W + l] == 0.0 or S[ROW_FAILURES * W + l] >= 40.0 or steps >= S[ROW_MOST * W + l]:
-                    S[ROW_ACTIVE * W + l] = 0.0
-                    S[ROW_TAU * W + l] = S[ROW_END * W + l]
+        for lane in range(W):
+            if S[Row.TAU * W + lane] < S[Row.END * W + lane]:
+                steps = S[Row.ACCEPTED * W + lane] + S[Row.REJECTED * W + lane]
+                dead = S[Row.ACTIVE * W + lane] == 0.0 or S[Row.FAILURES * W + lane] >= 40.0
+                if dead or steps >= S[Row.MOST * W + lane]:
+                    S[Row.ACTIVE * W + lane] = 0.0
+                    S[Row.TAU * W + lane] = S[Row.END * W + lane]
                 else:
                     waiting += 1
         if waiting == 0:
             return
-        step_lanes(S)
+        call(routines.step, S, 0.0, y)
 
 
-@njit(**PLAIN)
-def keep(S, group, k, samples, seen):
+def keep(
+    S: Array, layout: Layout, routines: Routines, group: int, k: int, samples: Array, seen: Array, y: Array
+) -> None:  # fmt: skip
     """Write down what is observed in every lane that has a sample here."""
+    W = layout.lanes
     any_here = False
-    for l in range(W):
-        any_here = any_here or samples[min(group + l, samples.shape[0] - 1), k] >= 0
+    for lane in range(W):
+        any_here = any_here or samples[min(group + lane, samples.shape[0] - 1), k] >= 0
     if not any_here:
         return
-    see_lanes(S)
-    for l in range(W):
-        sample = samples[min(group + l, samples.shape[0] - 1), k]
-        if group + l < seen.shape[0] and sample >= 0:
-            for i in range(1 + DIRECTIONS):
-                value = S[(ROW_SEEN + i) * W + l]
-                seen[group + l, i, sample] = value if S[ROW_ACTIVE * W + l] > 0.0 else math.nan
+    call(routines.see_lanes, S, 0.0, y)
+    for lane in range(W):
+        sample = samples[min(group + lane, samples.shape[0] - 1), k]
+        if group + lane < seen.shape[0] and sample >= 0:
+            for i in range(1 + layout.directions):
+                value = S[(layout.seen + i) * W + lane]
+                seen[group + lane, i, sample] = value if S[Row.ACTIVE * W + lane] > 0.0 else math.nan
 
 
-@njit(**ENTRY)
-def through_table(constants, initial, settings, segments, samples, node_rates, input_rates, seen, steps):
+def through_table(
+    layout: Layout, routines: Routines, places: Array, constants: Array, initial: Array, settings: Array,
+    segments: Array, samples: Array, node_rates: Array, input_rates: Array, seen: Array, steps: Array,
+) -> None:  # fmt: skip
     """Take all jobs through the table.
 
     One row per job, or one shared row: `constants`, `initial` (states), `settings` (rtol, guess, its scale, limit of
     steps, absolute tolerances), `segments` (jobs, k, 9), `samples` (jobs, k + 1), the place in `seen` (jobs,
     1 + directions, samples) of what is observed at the start of each row and at the end, -1 for none. `node_rates`
-    (jobs, directions, k) and `input_rates` (jobs, directions, k, 3) have no directions where none moves the table.
+    (jobs, directions, k) and `input_rates` (jobs, directions, k, 3) have no directions where none moves the table;
+    `places` says where among the constants the rates of the inputs belong.
     """
-    S = np.zeros(ROWS * W)
+    W = layout.lanes
+    S, y = np.zeros(layout.rows * W), np.empty(2)
     rows = segments.shape[1]
     jobs = seen.shape[0]
     for group in range(0, jobs, W):
-        load(S, group, jobs, constants, initial, settings)
+        load(S, layout, group, jobs, constants, initial, settings)
         for k in range(rows):
-            for i in range(OWN * W):
-                S[ROW_BEFORE * W + i] = S[ROW_F * W + i]
-            enter(S, group, k, segments, input_rates)
-            rates_lanes(S)
-            if k > 0 and node_rates.shape[1] > 0 and move_nodes(S, group, k, node_rates):
-                rates_lanes(S)
-            keep(S, group, k, samples, seen)
-            cross(S)
-        keep(S, group, rows, samples, seen)
-        for l in range(W):
-            if group + l < jobs:
-                steps[group + l, 0] = S[ROW_ACCEPTED * W + l]
-                steps[group + l, 1] = S[ROW_REJECTED * W + l]
+            for i in range(layout.own * W):
+                S[layout.before * W + i] = S[layout.rate * W + i]
+            enter(S, layout, group, k, segments, input_rates, places)
+            call(routines.rates_lanes, S, 0.0, y)
+            if k > 0 and node_rates.shape[1] > 0 and move_nodes(S, layout, group, k, node_rates):
+                call(routines.rates_lanes, S, 0.0, y)
+            keep(S, layout, routines, group, k, samples, seen, y)
+            cross(S, layout, routines, y)
+        keep(S, layout, routines, group, rows, samples, seen, y)
+        for lane in range(W):
+            if group + lane < jobs:
+                steps[group + lane, 0] = S[Row.ACCEPTED * W + lane]
+                steps[group + lane, 1] = S[Row.REJECTED * W + lane]

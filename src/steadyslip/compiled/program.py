@@ -5,40 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from steadyslip.compiled.build import compiled, interpreted
-from steadyslip.compiled.kernel import Choice, KernelText
+from steadyslip.compiled.build import Code, compiled, interpreted
+from steadyslip.compiled.kernel import Choice, Kernel
+from steadyslip.compiled.layout import SETTINGS, TALLY, Status
 from steadyslip.compiled.reduction import Reduction, reduce_model
 from steadyslip.model import Model
 
-STATUSES = (
-    "running", "done", "contact lost", "blow-up", "too many steps", "stuck", "no velocity", "settled", "periodic",
-)  # fmt: skip
+STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
 LOG_KINDS = (
     "", "slip begins", "slip ends", "velocity peak", "arrest", "restart", "contact lost", "blow-up", "velocity trough",
 )  # fmt: skip
-TALLY = (
-    "events",
-    "peak_velocity",
-    "lowest_velocity",
-    "event_begin",
-    "event_duration",
-    "event_slip",
-    "event_stress_drop",
-    "event_peak_velocity",
-    "recurrence",
-    "arrests",
-    "velocity_peaks",
-    "last_peak_time",
-    "peak_period",
-    "peak_growth",
-)
-SETTINGS = ("rtol", "most_steps", "v_high", "v_low", "sigma_low", "watch", "record", "guess", "z_scale", "first_step",
-            "settled", "same", "v_drive")  # fmt: skip
+__all__ = ["LOG_KINDS", "SETTINGS", "STATUSES", "TALLY", "Program", "program"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,23 +37,18 @@ class Program:
     plain: bool = False
 
     @cached_property
-    def text(self) -> KernelText:
-        return KernelText(self.reduction, self.choice)
+    def kernel(self) -> Kernel:
+        return Kernel(self.reduction, self.choice)
 
     @cached_property
-    def source(self) -> str:
-        """The kernel's own text."""
-        return self.text.text()
-
-    @cached_property
-    def module(self) -> ModuleType:
+    def code(self) -> Code:
         """Machine code, or plain Python if `plain`."""
-        return interpreted(self.source) if self.plain else compiled(self.source)
+        return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
 
     @cached_property
     def _constants(self) -> Any:
         model = self.reduction.model
-        return self.text.constants.function([*model.parameters.values(), model.sigma_ss])
+        return self.kernel.constants.function([*model.parameters.values(), model.sigma_ss])
 
     def constants(self, arguments: tuple[Any, ...], sigma: Any) -> np.ndarray:
         """Constants of every rig, (rigs, number); parameters and steady normal stress broadcast."""
@@ -87,7 +63,7 @@ class Program:
     def settings(self, values: Mapping[str, Any], atol: np.ndarray) -> np.ndarray:
         """Rows of settings by name, `atol` (rigs or 1, state) last."""
         size = max([len(atol), *(np.size(value) for value in values.values())])
-        table = np.empty((size, len(SETTINGS) + self.text.size))
+        table = np.empty((size, len(SETTINGS) + self.kernel.size))
         for column, name in enumerate(SETTINGS):
             table[:, column] = values[name]
         table[:, len(SETTINGS) :] = atol

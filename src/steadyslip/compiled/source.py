@@ -1,4 +1,4 @@
-"""SymPy expressions to straight-line kernel text.
+"""SymPy expressions to straight-line programs.
 
 What depends on parameters only is lifted out first: it becomes a *constant* of the trajectory, computed once
 by NumPy for any number of rigs, so that kernels see few operations and never a parameter's unit. Common
@@ -12,73 +12,11 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from sympy.printing.pycode import PythonCodePrinter
+from sympy.core.relational import Relational
 
+from steadyslip.compiled.nodes import PRIMITIVES, Value, as_node, primitive, select
 from steadyslip.errors import NotAvailable
 from steadyslip.expressions import array_function
-
-Lines = list[str]
-
-PRIMITIVES = (
-    "exp", "log", "log1p", "expm1", "sinh", "cosh", "tanh", "asinh", "asinh_exp", "sin", "cos", "sqrt", "power", "sign",
-)  # fmt: skip
-
-
-class _Printer(PythonCodePrinter):  # type: ignore[misc]  # SymPy's printers are untyped
-    """Kernel text: our own primitives, products for small powers, selections for branches."""
-
-    def _print_Function(self, expr: sp.Expr) -> str:  # noqa: N802
-        name = type(expr).__name__
-        if name not in PRIMITIVES:
-            raise NotAvailable(
-                f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
-                f"{', '.join(PRIMITIVES)}, tan, abs, powers and Piecewise"
-            )
-        return f"{name}({', '.join(self._print(argument) for argument in expr.args)})"
-
-    _print_exp = _print_log = _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_Function
-    _print_sin = _print_cos = _print_asinh_exp = _print_sign = _print_Function
-
-    def _print_Abs(self, expr: sp.Expr) -> str:  # noqa: N802
-        return f"abs({self._print(expr.args[0])})"
-
-    def _print_tan(self, expr: sp.Expr) -> str:
-        argument = self._print(expr.args[0])
-        return f"(sin({argument})/cos({argument}))"
-
-    def _print_Rational(self, expr: sp.Expr) -> str:  # noqa: N802
-        return repr(float(expr))
-
-    def _print_Integer(self, expr: sp.Expr) -> str:  # noqa: N802
-        return repr(float(expr))
-
-    def _print_NumberSymbol(self, expr: sp.Expr) -> str:  # noqa: N802
-        return repr(float(expr))
-
-    _print_Pi = _print_NumberSymbol  # noqa: N815
-    _print_Exp1 = _print_NumberSymbol  # noqa: N815
-
-    def _print_DiracDelta(self, expr: sp.Expr) -> str:  # noqa: N802
-        return "0.0"  # the derivative of sign, but for one point
-
-    def _print_Pow(self, expr: sp.Expr, rational: bool = False) -> str:  # noqa: N802
-        base, exponent = expr.args
-        text = f"({self._print(base)})"
-        if exponent.is_Integer and 0 < int(exponent) <= 8:
-            return "(" + "*".join([text] * int(exponent)) + ")"
-        if exponent.is_Integer and -8 <= int(exponent) < 0:
-            return "(1.0/(" + "*".join([text] * -int(exponent)) + "))"
-        if exponent == sp.Rational(1, 2):
-            return f"sqrt({text})"
-        if exponent == -sp.Rational(1, 2):
-            return f"(1.0/sqrt({text}))"
-        return f"power({text}, {self._print(exponent)})"
-
-    def _print_Piecewise(self, expr: sp.Expr) -> str:  # noqa: N802
-        text = "math.nan"
-        for value, condition in reversed(expr.args):
-            text = f"({self._print(value)} if {self._print(condition)} else {text})"
-        return text
 
 
 class Constants:
@@ -154,26 +92,134 @@ class Constants:
         return array_function(arguments, list(self.symbols))
 
 
-def statements(targets: Sequence[tuple[str, sp.Expr]], names: dict[sp.Symbol, str]) -> Lines:
-    """Assignments that compute named targets; temporaries start with an underscore."""
-    renamed = [expression.xreplace({s: sp.Symbol(n, real=True) for s, n in names.items()}) for _, expression in targets]
-    temporaries, results = sp.cse(renamed, symbols=(sp.Symbol(f"_{i}", real=True) for i in range(10**6)))
-    printer = _Printer()
-    lines = [f"{symbol} = {printer.doprint(expression)}" for symbol, expression in temporaries]
-    return lines + [f"{n} = {printer.doprint(e)}" for (n, _), e in zip(targets, results, strict=True)]
+class Formulas:
+    """Expressions that are computed together.
+
+    Parameters
+    ----------
+    expressions : sequence of sympy.Expr
+    names : mapping of sympy.Symbol to str
+        What their symbols are called where values are given; a symbol's own name unless given.
+    """
+
+    def __init__(self, expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str]) -> None:
+        called = {s: sp.Symbol(n, real=True) for s, n in names.items()}
+        renamed = [sp.sympify(expression).xreplace(called) for expression in expressions]
+        symbols = (sp.Symbol(f"_{i}", real=True) for i in range(10**6))
+        self.temporaries, self.results = sp.cse(renamed, symbols=symbols)
+
+    def __call__(self, values: Mapping[str, Value]) -> list[Value]:
+        """The value of each expression; values are numbers or nodes of a program."""
+        known = dict(values)
+        for symbol, expression in self.temporaries:
+            known[symbol.name] = _value(expression, known)
+        return [_value(expression, known) for expression in self.results]
 
 
-def indented(lines: Iterable[str], depth: int) -> str:
-    """Lines as text, `depth` levels deep."""
-    return "".join("    " * depth + line + "\n" for line in lines)
+def _value(e: Any, known: Mapping[str, Value]) -> Any:
+    """An expression from the values of its symbols: products for small powers, selections for branches."""
+    if e.is_Symbol:
+        return known[e.name]
+    if e.is_Add:
+        return _sum(e, known)
+    if e.is_Mul:
+        negative, value = _product(e, known)
+        return -value if negative else value
+    if e.is_Pow:
+        return _power(_value(e.base, known), e.exp, known)
+    if isinstance(e, sp.Piecewise):
+        return _piecewise(e, known)
+    if isinstance(e, (sp.Number, sp.NumberSymbol)):
+        return float(e)
+    return _called(e, known)
 
 
-def weighted(weights: Iterable[float], terms: Iterable[str]) -> str:
-    """A weighted sum as text, zero weights left out."""
-    parts = []
-    for weight, term in zip(weights, terms, strict=False):
-        if weight == 1.0:
-            parts.append(term)
-        elif weight:
-            parts.append(f"{weight!r}*{term}")
-    return " + ".join(parts) or "0.0"
+def _sum(e: sp.Expr, known: Mapping[str, Value]) -> Any:
+    total: Any = None
+    for term in e.as_ordered_terms():
+        negative, value = _product(term, known)
+        if total is None:
+            total = -value if negative else value
+            continue
+        total = total - value if negative else total + value
+    return total
+
+
+def _product(e: Any, known: Mapping[str, Value]) -> tuple[bool, Any]:
+    """Whether a term is subtracted, and what is: the first factor negated where it stands alone comes to the same."""
+    coefficient, rest = e.as_coeff_Mul()
+    if e.is_Number or not e.is_Mul:
+        return (True, float(-e)) if e.is_Number and e < 0 else (False, _value(e, known))
+    negative = bool(coefficient < 0)
+    if negative and rest.is_Add:
+        e = rest if coefficient == -1 else sp.Mul(-coefficient, rest, evaluate=False)
+    elif negative:
+        e = -coefficient * rest
+    above, below = [], []
+    for factor in e.as_ordered_factors() if e.is_Mul else [e]:
+        if factor.is_Pow and factor.exp.is_Rational and factor.exp.is_negative:
+            below.append(_power(_value(factor.base, known), -factor.exp, known))
+        else:
+            above.append(_value(factor, known))
+    value = _multiplied(above or [1.0])
+    return negative, value / _multiplied(below) if below else value
+
+
+def _multiplied(factors: Sequence[Any]) -> Any:
+    value = factors[0]
+    for factor in factors[1:]:
+        value = value * factor
+    return value
+
+
+def _power(base: Any, exponent: Any, known: Mapping[str, Value]) -> Any:
+    if exponent.is_Integer and 0 < abs(int(exponent)) <= 8:
+        value = _multiplied([base] * abs(int(exponent)))
+        return value if exponent > 0 else 1.0 / value
+    if abs(exponent) == sp.Rational(1, 2):
+        root = primitive("sqrt", base)
+        return root if exponent > 0 else 1.0 / root
+    return primitive("power", base, _value(exponent, known))
+
+
+def _piecewise(e: sp.Piecewise, known: Mapping[str, Value]) -> Any:
+    value: Any = np.nan
+    for branch, condition in reversed(e.args):
+        holds = _condition(condition, known)
+        value = _value(branch, known) if holds is True else select(as_node(holds, "bool"), _value(branch, known), value)
+    return value
+
+
+def _condition(c: Any, known: Mapping[str, Value]) -> Any:
+    if c in (sp.true, sp.false):
+        return bool(c)
+    if isinstance(c, Relational):
+        left, right = (_value(side, known) for side in (c.lhs, c.rhs))
+        compared = {"<": lambda: left < right, "<=": lambda: left <= right, ">": lambda: left > right,
+                    ">=": lambda: left >= right, "==": lambda: (left <= right) & (left >= right),
+                    "!=": lambda: (left < right) | (left > right)}  # fmt: skip
+        return compared[c.rel_op]()
+    parts = [as_node(_condition(part, known), "bool") for part in c.args]
+    if isinstance(c, sp.Not):
+        return ~parts[0]
+    value = parts[0]
+    for part in parts[1:]:
+        value = value & part if isinstance(c, sp.And) else value | part
+    return value
+
+
+def _called(e: sp.Expr, known: Mapping[str, Value]) -> Any:
+    name = type(e).__name__
+    arguments = [_value(argument, known) for argument in e.args]
+    if name == "Abs":
+        return abs(arguments[0])
+    if name == "tan":
+        return primitive("sin", *arguments) / primitive("cos", *arguments)
+    if name == "DiracDelta":
+        return 0.0  # the derivative of sign, but for one point
+    if name not in PRIMITIVES:
+        raise NotAvailable(
+            f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
+            f"{', '.join(PRIMITIVES)}, tan, abs, powers and Piecewise"
+        )
+    return primitive(name, *arguments)

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from steadyslip.compiled.kernel import SLIP_EVENT
+from steadyslip.compiled.driver import SLIP_EVENT
 from steadyslip.errors import NoSteadySliding, ParameterError, Problem
 from steadyslip.figures.style import (
     BLACK,

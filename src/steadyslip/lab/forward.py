@@ -152,7 +152,7 @@ class Forward:
         def work(first: int, last: int, _: threading.Event) -> None:
             part = slice(first, last)
             own = table.part(part)
-            self.program.module.through_table(
+            self.program.through_table(
                 constants[part], start[part], settings[part], own.segments, own.samples, own.node_rates,
                 own.input_rates, found[part], taken[part],
             )  # fmt: skip

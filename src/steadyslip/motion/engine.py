@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.compiled.program import SETTINGS, STATUSES, TALLY, Program
+from steadyslip.compiled import driver
+from steadyslip.compiled.layout import LOG_COLUMNS, Cursor, Final, Row, Setting
+from steadyslip.compiled.program import STATUSES, TALLY, Program
 from steadyslip.motion.setup import Jobs
 
 LANES = 24  # three vectors of eight doubles, see compiled.kernel
@@ -39,19 +41,20 @@ class Call:
     """The arrays of one chain of calls to a kernel."""
 
     def __init__(self, machine: Program, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
-        text = machine.text
-        lanes = text.choice.lanes
-        self.advance, self.rows = machine.module.advance, text.rows
+        layout = self.layout = machine.kernel.layout
+        lanes = layout.lanes
+        self.advance = machine.code.advance
         self.tables, self.times = tables, times
-        self.work = np.zeros(text.row_count * lanes)
+        self.work = np.zeros(layout.rows * lanes)
         self.ids = np.zeros(lanes, dtype=np.int64)
-        self.cursor = np.array([0, size, lanes, -1, 0, 0, 0, 0], dtype=np.int64)
+        self.cursor = np.zeros(len(Cursor), dtype=np.int64)
+        self.cursor[[Cursor.LAST_JOB, Cursor.BUSY, Cursor.PAUSED]] = size, lanes, -1
         self.status = np.zeros(size, dtype=np.int64)
-        self.final = np.full((size, 4 + text.size), np.nan)
+        self.final = np.full((size, Final.STATE + layout.size), np.nan)
         self.tally = np.full((size, len(TALLY)), np.nan)
-        self.samples = np.full((size, len(times), text.size), np.nan)
-        self.log = np.zeros((0, 8))
-        self.recorded = np.zeros((0, 2 + text.size))
+        self.samples = np.full((size, len(times), layout.size), np.nan)
+        self.log = np.zeros((0, LOG_COLUMNS))
+        self.recorded = np.zeros((0, 2 + layout.size))
 
     def go(self, quota: int) -> int:
         """0 done, 1 a buffer is full, 2 quota used up."""
@@ -63,20 +66,19 @@ class Call:
 
     def time(self) -> float:
         """Time that the job of the only lane has reached, s."""
-        tau, start, end, stop = (float(self.work[self.rows[name]]) for name in ("TAU", "START", "END", "STOP"))
-        return min(start + tau, stop) if tau < end else stop
+        return driver.clock(self.work, float(self.work[Row.TAU]))
 
     def cut_off(self) -> None:
         """Where the job of the only lane is, as its end: it will not go on."""
-        first = self.rows["Y"]
-        reached = [self.work[self.rows[name]] for name in ("SEGMENT", "ACCEPTED", "REJECTED")]
-        self.final[0] = [self.time(), *reached, *self.work[first : first + self.final.shape[1] - 4]]
+        reached = self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED]]
+        first = self.layout.state
+        self.final[0] = [self.time(), *reached, *self.work[first : first + self.layout.size]]
 
     def outcome(self) -> Outcome:
         self.status[self.status == 0] = INTERRUPTED
         return Outcome(
             self.status, self.final, self.tally, self.samples,
-            self.log[: self.cursor[4]], self.recorded[: self.cursor[5]],
+            self.log[: self.cursor[Cursor.LOGGED]], self.recorded[: self.cursor[Cursor.RECORDED]],
         )  # fmt: skip
 
 
@@ -98,9 +100,9 @@ def run_tables(
     """
     settings = tables[2][0]
     call = Call(machine, tables, 1, times)
-    if settings[SETTINGS.index("watch")]:
-        call.log = np.zeros((64, 8))
-    if settings[SETTINGS.index("record")]:
+    if settings[Setting.WATCH]:
+        call.log = np.zeros((64, LOG_COLUMNS))
+    if settings[Setting.RECORD]:
         call.recorded = np.zeros((512, call.recorded.shape[1]))
     try:
         while (reason := call.go(QUOTA * 10)) != 0:

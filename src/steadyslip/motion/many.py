@@ -340,5 +340,5 @@ def _run(
         with lock:
             store.put(where, jobs, machine, start, outcome)
 
-    _ = machine.module  # compile before the threads start
+    _ = machine.code.advance  # compile before the threads start
     return run_many(work, size, threads, advanced=advanced)

@@ -106,7 +106,7 @@ def observe(
     constants, _, settings, _ = jobs.tables(machine, first, last, False, False)
     inputs = inputs_at(jobs.segments, first + lane, segment, time)
     values = np.empty((len(time), 5 + len(reduction.continuous)))
-    machine.module.observe(constants, settings, np.ascontiguousarray(states), inputs, lane.astype(np.int64), values)
+    machine.code.observe(constants, settings, np.ascontiguousarray(states), inputs, lane.astype(np.int64), values)
     found = dict(zip(("v", "acceleration", "normal_stress", "shear_stress", "spring_stress"), values.T, strict=False))
     found["x"] = states[:, 0]
     continuous = {str(s): values[:, 5 + i] for i, s in enumerate(reduction.continuous)}

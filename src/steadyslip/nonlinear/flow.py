@@ -55,7 +55,7 @@ def _restored(reduction: Reduction) -> Any:
 
 @lru_cache(maxsize=64)
 def _with_sensitivities(reduction: Reduction, method: str) -> Program:
-    return Program(with_sensitivities(reduction), Choice(method, dense=False, field=True))
+    return Program(with_sensitivities(reduction), Choice(method, dense=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +157,7 @@ class Runs:
         ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
         varied = np.concatenate([settings[0], ratio, scales])[None]
         found = self.sensitive.constants(values.arguments, sigma)
-        varying = self.sensitive.text.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
+        varying = self.sensitive.kernel.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
         return Setting(value, unit, values, sigma, inputs, (constants, settings), (varying, varied))
 
     def _settings_at(self, values: Values, sigma: Array, value: float) -> Array:
@@ -226,7 +226,7 @@ class Runs:
         inputs[:, :3] = setting.inputs
         values = np.empty_like(full)
         own = np.zeros(count, dtype=np.int64)
-        self.sensitive.module.field(*setting.varied, full, inputs, own, values)
+        self.sensitive.code.field(*setting.varied, full, inputs, own, values)
         matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return values[:, :n], matrix, values[:, n + n * n :]
 

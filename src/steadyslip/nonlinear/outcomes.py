@@ -133,7 +133,7 @@ def advanced_runs(
         segments=constant_inputs(span, velocity, jump, pressure), size=len(which),
     )  # fmt: skip
     machine: Program = jobs.program(LANES, dense=True)
-    _ = machine.module  # compile before the threads start
+    _ = machine.code.advance  # compile before the threads start
     n = rest.state.shape[1]
     count = len(which)
     found = Spans(np.full(count, len(STATUSES)), np.full((count, n), np.nan), np.zeros(count),

@@ -181,7 +181,7 @@ def test_no_threshold_beyond_the_edge_of_the_new_sliding(angle):
 # -- the velocity after the step
 
 
-@pytest.mark.parametrize(("angle", "expected"), [(30, 2.9124218), (-30, 2.2918110)])
+@pytest.mark.parametrize(("angle", "expected"), [(30, 2.9124235), (-30, 2.2918127)])
 def test_a_given_steady_stress_holds_at_the_rigs_own_velocity(angle, expected):
     rock = rate_state(normal_memory=ss.LinkerDieterich(alpha=0.56))
     loaded = rig(friction=rock, contact=ss.InclinedSpring(preload=SIGMA, angle=np.radians(angle)))
@@ -189,7 +189,9 @@ def test_a_given_steady_stress_holds_at_the_rigs_own_velocity(angle, expected):
     stress = ss.steady_state(loaded).normal_stress
     given = rig(friction=rock, contact=ss.InclinedSpring(steady_normal_stress=stress, angle=np.radians(angle)),
                 stiffness=loaded.stiffness)  # fmt: skip
-    assert ss.threshold(given, reference="after").size == pytest.approx(expected, abs=2e-7)
+    found = ss.threshold(given, reference="after").size
+    assert found == pytest.approx(ss.threshold(loaded, reference="after").size, rel=1e-7)
+    assert found == pytest.approx(expected, abs=2e-7)  # by SciPy in slip time: 2.9124232 returns, 2.9124236 does not
 
 
 # -- doubt

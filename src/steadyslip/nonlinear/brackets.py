@@ -126,6 +126,7 @@ class _Search:
     def __init__(self, kicked: Kicked, count: int, threads: int | None, advanced: Any) -> None:
         self.kicked, self.threads, self.advanced = kicked, threads, advanced
         self.stable, self.exists = (np.broadcast_to(a, (count,)) for a in (kicked.stable, kicked.exists))
+        self.rig = np.arange(count) if kicked.size > 1 else np.zeros(count, dtype=int)
         self.low, self.high = np.zeros(count), np.full(count, np.inf)
         self.doubt = np.full((count, 2), np.nan)  # ends of what is undecided inside the bracket
         self.beyond = np.where(self.exists, np.where(self.stable, INTERRUPTED, UNSTABLE), ABSENT)
@@ -136,7 +137,7 @@ class _Search:
         kicked, alive = self.kicked, np.flatnonzero(self.stable)
         sizes = np.geomspace(max(kicked.kick.low, kicked.highest * 1e-4), kicked.highest, COARSE)
         edge = np.full(len(self.low), np.inf)
-        edge[alive] = edges(kicked, alive, sizes)
+        edge[alive] = edges(kicked, self.rig[alive], sizes)
         going = alive
         for size in sizes:  # rising sizes, for the rigs in which no smaller one has failed
             over = size >= edge[going]
@@ -170,7 +171,7 @@ class _Search:
         """Try kicks of rigs `which`, note what comes of them; whether each rig is still without one that fails."""
         if not len(which):
             return np.zeros(0, dtype=bool)
-        found = self.kicked.outcomes(which, sizes, self.threads, self.advanced, effort=1.0)
+        found = self.kicked.outcomes(self.rig[which], sizes, self.threads, self.advanced, effort=1.0)
         self.whole = self.whole and not np.any(found == INTERRUPTED)
         failed, back, doubtful = np.isin(found, CERTAIN), found == RETURNS, found == UNDECIDED
         rig, size = which[failed], sizes[failed]

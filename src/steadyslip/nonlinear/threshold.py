@@ -244,7 +244,7 @@ def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
     open_ = np.flatnonzero(np.isfinite(high))
     for _ in range(60):
         middle = 0.5 * (low[open_] + high[open_])
-        good = kicked.may_return(which[open_], middle)
+        good = kicked.rest_after(which[open_], middle).leading.real < 0
         low[open_[good]], high[open_[~good]] = middle[good], middle[~good]
     found[open_] = high[open_]
     return found

@@ -118,8 +118,10 @@ class Neighbourhood:
 
 
 def modes(matrix: Array) -> tuple[Array, Array]:
-    """Real weighted modes of stable matrices (m, n, n) as columns, and where they are good enough to use (m,)."""
+    """Real weighted modes of stable matrices (m, n, n) as columns, slow ones first, and where they can be used (m,)."""
     roots, vectors = np.linalg.eig(matrix)
+    order = np.lexsort((-roots.imag, -roots.real))  # the slowest first
+    roots, vectors = np.take_along_axis(roots, order, axis=1), np.take_along_axis(vectors, order[:, None, :], axis=2)
     size = np.max(np.abs(vectors), axis=1)
     vectors = vectors / size[:, None, :]
     imaginary = np.abs(roots.imag) > 1e-12 * np.abs(roots)

@@ -66,7 +66,9 @@ def main(arguments):
     if command == "test" and "--oldest" in rest:
         install(OLDEST, "test-oldest")
         chosen = [word for word in rest if word != "--oldest"]
-        return call(OLDEST.python, "-m", "pytest", *OLDEST_OPTIONS, *(chosen or OLDEST_TESTS), folder=HERE)
+        named = any(os.path.exists(os.path.join(HERE, word.split("::")[0])) for word in chosen)
+        chosen += () if named else OLDEST_TESTS
+        return call(OLDEST.python, "-m", "pytest", *OLDEST_OPTIONS, *chosen, folder=HERE)
     if command == "test":
         install(NEWEST, "test")
         return call(NEWEST.python, "-m", "pytest", *rest, folder=HERE)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from sympy.core.relational import Relational
+from sympy.logic.boolalg import Boolean
 
 from steadyslip.compiled.nodes import PRIMITIVES, Value, as_node, primitive, select
 from steadyslip.errors import NotAvailable
@@ -131,6 +132,8 @@ def _value(e: Any, known: Mapping[str, Value]) -> Any:
         return _piecewise(e, known)
     if isinstance(e, (sp.Number, sp.NumberSymbol)):
         return float(e)
+    if isinstance(e, Boolean):  # a condition that several branches share
+        return _condition(e, known)
     return _called(e, known)
 
 
@@ -193,6 +196,8 @@ def _piecewise(e: sp.Piecewise, known: Mapping[str, Value]) -> Any:
 def _condition(c: Any, known: Mapping[str, Value]) -> Any:
     if c in (sp.true, sp.false):
         return bool(c)
+    if c.is_Symbol:
+        return known[c.name]
     if isinstance(c, Relational):
         left, right = (_value(side, known) for side in (c.lhs, c.rhs))
         compared = {"<": lambda: left < right, "<=": lambda: left <= right, ">": lambda: left > right,

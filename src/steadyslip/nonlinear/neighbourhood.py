@@ -17,7 +17,6 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from steadyslip.nonlinear.rest import Rest, field_of
 
@@ -143,6 +142,8 @@ def directions(n: int) -> Array:
     if n == 2:
         angle = np.arange(48) * (2 * np.pi / 48)
         return np.column_stack([np.cos(angle), np.sin(angle)])
+    from scipy.stats import qmc  # slow to import
+
     normal = ndtri(qmc.Sobol(n, seed=1).random(64 * (n - 1)) * (1 - 2e-9) + 1e-9)
     found = np.vstack([normal, np.eye(n), -np.eye(n)])
     return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from steadyslip.linear.cubic import coefficients, hopf_line
+from steadyslip.linear.polynomials import quietly
 from steadyslip.linear.response import Response, has_closed_form, response_numbers
 from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.values import model_values
@@ -23,6 +26,7 @@ def _response(analysis: Analysis) -> Response | None:
     return response_numbers(values) if has_closed_form(values.model) else None
 
 
+@quietly
 def why_all(analysis: Analysis) -> str:
     """The plain cause of stability at every stiffness, where there is one."""
     known = _response(analysis)
@@ -41,6 +45,7 @@ def _damped(analysis: Analysis) -> bool:
     return bool(rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
+@quietly
 def why_none(analysis: Analysis) -> str:
     """Which condition of stability rules out every stiffness, where that can be told."""
     known = _response(analysis)
@@ -55,6 +60,8 @@ def why_none(analysis: Analysis) -> str:
     if not _reachable(1 + known.mu * known.B2, -known.mu * known.B3, gain):
         return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
     numerator, denominator = hopf_line(**numbers)
+    if not np.isfinite(numerator) or not np.isfinite(denominator):
+        return ""  # products beyond floating point decide nothing
     if _reachable(denominator, numerator, gain):
         return ": where no oscillation grows, a disturbance grows without oscillating"
     return f": an oscillation grows at every stiffness{_why_oscillating(known, denominator)}"
@@ -90,6 +97,7 @@ def _why_none_in_general(analysis: Analysis) -> str:
     return ""
 
 
+@quietly
 def why_ill_posed(analysis: Analysis) -> str:
     """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
     known = _response(analysis)

@@ -361,8 +361,8 @@ def open_map(path, sound, forged):
 
 
 def open_cache(path, sound, forged):
-    found = build._FileCache(path)._sound_content()
-    if found is not None and found != build._FileCache(sound)._sound_content():
+    found = build._Kept(path).read()
+    if found is not None and found != build._Kept(sound).read():
         raise Wrong("opened with other content")
 
 

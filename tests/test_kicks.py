@@ -85,7 +85,7 @@ def test_there_is_none_where_the_stress_is_gone():
 @pytest.mark.parametrize(
     "a_rig",
     [
-        tilted(0.5, 1.1),
+        tilted(0.5, 2.0),
         rig(friction=STEEP, stiffness=1e11, mass=1e-8 * 0.0145 * SIGMA * D_C / V0**2),
         unit_rig("aging", 0.5, 0.8, mass=1e-2),
         unit_rig("prz", 0.5, 2.0, mass=1e-6, damping=1e-3),

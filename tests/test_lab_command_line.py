@@ -31,18 +31,18 @@ def fitted(tmp_path_factory):
 
 def test_from_a_record_to_estimates(fitted):
     folder, text = fitted
-    assert "velocity step at 11676.3 s: 3.015 um/s to 10.03 um/s" in text
-    assert "friction.d_c      10.09 ± 0.87 um" in text
+    assert "velocity step at 11676.4 s: 3.001 um/s to 10 um/s" in text
+    assert "friction.d_c      9.465 ± 0.43 um" in text
     assert "steps back 1773 times" in text
     assert f"wrote {folder / 'fit.html'}" in text
     data = json.loads((folder / "fit.json").read_text())
-    assert data["parameters"]["friction.a"]["value"] == pytest.approx(0.00696, rel=0.003)
+    assert data["parameters"]["friction.a"]["value"] == pytest.approx(0.009204, rel=0.003)
     assert data["search"]["converged"] is True
     assert data["correlated"] is True
     page = (folder / "fit.html").read_text()
     assert page.count("<svg") == 2
     assert "http-equiv" not in page
-    assert "d_c = 1.00" in page
+    assert "d_c = 9.4" in page
     assert (folder / "fit.png").stat().st_size > 10_000
 
 

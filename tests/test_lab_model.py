@@ -32,6 +32,7 @@ def truth(plan, rig, jumps=()):
     return space, space.coordinates(np.array([*(known[n] for n in plan.free), *jumps]))
 
 
+@pytest.mark.parametrize("drive", ["commanded", "measured"])
 @pytest.mark.parametrize("uniform", [True, False])
 @pytest.mark.parametrize(
     ("protocol", "alpha", "jumps"),
@@ -42,10 +43,10 @@ def truth(plan, rig, jumps=()):
         (lab.PULSED, 0.4, (120.2, 160.5)),
     ],
 )
-def test_measured_histories_drive_the_model_as_the_protocol_did(protocol, alpha, jumps, uniform):
+def test_records_drive_the_model_as_the_protocol_did(protocol, alpha, jumps, uniform, drive):
     """Steps fall between samples: nothing of them may be smeared over the sampling interval."""
     rig = lab.rig(alpha=alpha)
-    plan, columns = plan_of(rig, protocol, uniform=uniform)
+    plan, columns = plan_of(rig, protocol, uniform=uniform, drive=drive)
     space, z = truth(plan, rig, jumps)
     assert len(space) == len(plan.free) + len(jumps)
     seen, _ = replace(plan, rtol=1e-9).comparison().model(z[None])
@@ -95,8 +96,8 @@ def test_sensitivities_are_derivatives(rig, protocol, jumps, options):
     plan, _ = plan_of(rig, protocol, 600, **options)
     space = plan.space()
     known = {name: a.value for name, a in rig.parameters().items()}
-    values = [known.get(u.parameter, 0.002) for u in space.unknowns if not u.parameter.startswith("jump")]
-    order = [u.parameter.startswith("jump") for u in space.unknowns]
+    values = [known.get(u.parameter, 0.002) for u in space.unknowns if not u.parameter.startswith("step")]
+    order = [u.parameter.startswith("step") for u in space.unknowns]
     full = np.empty(len(space))
     full[np.array(order)], full[~np.array(order)] = jumps, values
     z = space.coordinates(full)
@@ -159,7 +160,7 @@ def test_every_law_contact_and_regime(name, monkeypatch):
         free.append("contact.angle")
     forward = Forward(rig, free, rtol=1e-8, threads=1)
     reduction = reduce_model(forward.model, None)
-    forward.program = ExperimentProgram(reduction, len(free), forward.program.method, plain=True)
+    forward.program = ExperimentProgram(reduction, forward.size, forward.program.method, plain=True)
     inputs = make_plan(rig, _bare(run), free=free, protocol=pieces).comparison().parts[0].inputs
     values = np.array([[float(rig.value(n)) for n in free]])
     units = np.maximum(np.abs(values), 1e-3)

@@ -9,8 +9,9 @@ from hypothesis import given, settings, strategies as st
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.lab.columns import split_name
+from steadyslip.lab.kinks import load_course
+from steadyslip.lab.pressing import oscillation
 from steadyslip.lab.record import transient_rows
-from steadyslip.lab.steps import normal_steps, velocity_steps
 
 
 @pytest.fixture(scope="module")
@@ -232,7 +233,7 @@ def test_a_velocity_step_is_found_where_it_is(share, ratio, noise, count):
     time = np.linspace(0.0, 100.0, count)
     moved = np.where(time < 100 * share, time, 100 * share + ratio * (time - 100 * share))
     noisy = moved + noise * np.ptp(moved) * np.random.default_rng(1).standard_normal(count)
-    found = velocity_steps(time, noisy)
+    found = load_course(time, noisy).changes
     bend = abs(ratio - 1) * min(share, 1 - share) * 100
     if bend < 20 * noise * np.ptp(moved):
         return  # lost in the noise
@@ -247,12 +248,11 @@ def test_holds_ramps_pulses_and_oscillations_have_names():
     record = lab.record(lab.rig(alpha=0.3), lab.PULSED)
     assert [s.kind for s in record.steps] == ["velocity step", "normal-stress step", "normal-stress step"]
     time = np.linspace(0, 100, 2000)
-    (wave,) = normal_steps(time, 1e7 + np.where(time > 20, 2e5 * np.sin(time), 0.0))
-    assert wave.kind == "normal-stress oscillation"
-    assert wave.duration == pytest.approx(2 * np.pi, rel=0.02)
-    assert wave.after == pytest.approx(2e5, rel=0.05)
+    wave = oscillation(time, 1e7 + np.where(time > 20, 2e5 * np.sin(time), 0.0))
+    assert wave.period == pytest.approx(2 * np.pi, rel=0.02)
+    assert wave.amplitude == pytest.approx(2e5, rel=0.05)
     ramp = np.cumsum(np.interp(time, [0, 40, 45, 100], [1.0, 1.0, 10.0, 10.0])) * (time[1] - time[0])
-    (step,) = velocity_steps(time, ramp)
+    (step,) = load_course(time, ramp).changes
     assert step.time == pytest.approx(40, abs=3)
     assert step.after / step.before == pytest.approx(10, rel=0.02)
 

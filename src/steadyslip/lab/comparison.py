@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.lab.commanded import CommandedInputs
 from steadyslip.lab.forward import Forward, Table
 from steadyslip.lab.inputs import MeasuredInputs, ProtocolInputs, Sharp
+from steadyslip.lab.loading import Loading
 from steadyslip.lab.record import Record
 from steadyslip.lab.unknowns import Space, Unknown
 from steadyslip.slider import Slider
@@ -29,7 +31,7 @@ class Part:
     rig : Slider
         As the record drives it: its own initial rate and normal stress.
     forward : Forward
-    inputs : MeasuredInputs or ProtocolInputs
+    inputs : CommandedInputs, MeasuredInputs or ProtocolInputs
     data : ndarray (n,)
         What was observed.
     weights : ndarray (n,)
@@ -43,7 +45,7 @@ class Part:
     record: Record
     rig: Slider
     forward: Forward
-    inputs: MeasuredInputs | ProtocolInputs
+    inputs: CommandedInputs | MeasuredInputs | ProtocolInputs
     data: Array
     weights: Array
     rig_places: tuple[int, ...]
@@ -161,6 +163,21 @@ def jump_unknowns(record: int | None, sharp: Sharp) -> list[Unknown]:
     ]
 
 
+def step_unknowns(record: int | None, loading: Loading, pressed: bool) -> list[Unknown]:
+    """When each commanded change begins and, of a ramp, how long it takes, where the columns leave that open."""
+    label = "" if record is None else f"@{record + 1}"
+    changes = [one for one in loading.changes if pressed or one[0] == "load"]
+    found = []
+    for k, (_, _, change) in enumerate(changes, start=1):
+        ends = [("at", change.free, change.earliest, change.latest),
+                ("duration", change.stretches, change.shortest, change.longest)]  # fmt: skip
+        for what, wanted, low, high in ends:
+            name = f"step.{k}.{what}"
+            if wanted:
+                found.append(Unknown(f"{name}{label}", name, "s", record, False, high - low, low, high))
+    return found
+
+
 def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown]:
     """Coefficients of a polynomial in the share of the record that has passed."""
     names = (["offset"] if offset else []) + [f"trend.{k}" for k in range(1, order + 1)]
@@ -168,9 +185,10 @@ def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown
     return [Unknown(f"{n}{label}", n, "1", record, False, 0.1, -np.inf, np.inf) for n in names]
 
 
-def trend_rows(record: Record, order: int, offset: bool, axis: str) -> Array:
-    """Powers of the share of displacement (or time) that has passed."""
-    along: Any = record.time if axis == "time" or record.displacement is None else record.displacement
+def trend_rows(record: Record, order: int, offset: bool, axis: str, moved: Array | None = None) -> Array:
+    """Powers of the share of displacement (or time) that has passed; `moved` is the commanded one, where known."""
+    driven = record.displacement if moved is None else moved
+    along: Any = record.time if axis == "time" or driven is None else driven
     share = (along - along[0]) / (along[-1] - along[0])
     return np.array(([np.ones_like(share)] if offset else []) + [share**k for k in range(1, order + 1)]).reshape(
         -1, len(share)

@@ -12,8 +12,9 @@ from steadyslip.errors import NotAvailable, ParameterError, Problem, unknown_nam
 from steadyslip.lab.comparison import Comparison
 from steadyslip.lab.identify import combinations, prior_information
 from steadyslip.lab.least_squares import SAME, Minima, minimise
+from steadyslip.lab.loading import shifted
 from steadyslip.lab.noise import DETECTED, describe, lag_one, white
-from steadyslip.lab.plan import Plan, check_width, make_plan
+from steadyslip.lab.plan import Plan, check_width, make_plan, with_loading
 from steadyslip.lab.record import Record, transient_rows
 from steadyslip.lab.result import Fit, Search
 from steadyslip.lab.starts import STARTS, search_bounds, starting_points
@@ -36,7 +37,7 @@ def fit(
     *,
     fixed: Sequence[str] = (),
     separate: Sequence[str] = (),
-    drive: str = "measured",
+    drive: str = "commanded",
     protocol: Any = None,
     trend: int = 0,
     trend_axis: str = "displacement",
@@ -50,8 +51,9 @@ def fit(
 ) -> Fit:
     """Fit a rig to one or several records of experiments.
 
-    The model is driven by the measured motion of the load point and the measured normal stress, exactly at the
-    samples and straight between them, from steady sliding at the first sample. Starting values come from the records.
+    The model is driven by the loading that was commanded, as found in the record: rates of the load point by robust
+    straight lines, their changes at times that are fitted along, normal stress constant or smooth between its changes.
+    It starts from steady sliding at the first sample. Starting values come from the records.
 
     Parameters
     ----------
@@ -69,8 +71,9 @@ def fit(
     separate : sequence of str, optional
         Free parameters that every record has to itself; all others are shared.
     drive : str, optional
-        ``measured``: the load point moves as measured, exactly at the samples; ``smoothed``: along straight lines
-        between the places where the measured displacement changes its slope, without the noise of its sensor.
+        ``commanded``: constant rates with steps and ramps between them, as found in the displacement, or a smooth
+        curve where it is not made of straight lines; ``smoothed``: a smooth curve in any case; ``measured``: load
+        point and normal stress exactly as measured at the samples, their noise included.
     protocol : Protocol, Piece or sequence of Piece, optional
         What moves the load point, on the records' clock, instead of the measured displacement.
     trend : int, optional
@@ -216,6 +219,39 @@ def _distinct(rough: Minima, most: int) -> Array:
     return np.array(chosen)
 
 
+def driven_as_measured(fit: Fit) -> dict[str, float] | None:
+    """Where the search ends if the measured columns drive the model instead, from the fit's own minimum."""
+    noisy = [c for loading in fit.plan.loading for c in (loading.load,) if c is not None and np.any(c.errors > 0)]
+    if not noisy or any(course.curve is not None for course in noisy):
+        return None
+    plan = with_loading(replace(fit.plan, drive="measured"))
+    space = plan.space()
+    z = space.coordinates(np.array([fit.values.get(u.name, 0.5 * (u.low + u.high)) for u in space.unknowns]))
+    own = dict(zip(fit.names, zip(*fit.bounds, strict=True), strict=True))
+    low, high = (np.array([own.get(u.name, u.bounds)[side] for u in space.unknowns]) for side in (0, 1))
+    comparison = plan.comparison()
+    found = minimise(lambda x, _: comparison.residuals(x), z[None], low, high, most=30, tolerance=1e-4)
+    if not np.isfinite(found.ssq[0]):
+        return None
+    return dict(zip((u.name for u in space.unknowns), map(float, space.values(found.coordinates[0])), strict=True))
+
+
+def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
+    """What the uncertainty of rates and normal stresses, read off the records, adds to that of the data."""
+    found = np.zeros((len(z), len(z)))
+    seen: Array | None = None
+    for i, loading in enumerate(plan.loading if plan.follows else ()):
+        for moved in shifted(loading, plan.pressed):
+            if seen is None:
+                seen = comparison.model(z[None])[0][0]
+            others = tuple(moved if k == i else own for k, own in enumerate(plan.loading))
+            model = replace(plan, loading=others).comparison().model(z[None])[0][0]
+            push = rows @ ((model - seen) * comparison.weights)
+            if np.all(np.isfinite(push)):
+                found += np.outer(push, push)
+    return found
+
+
 def finished(
     plan: Plan, comparison: Comparison, z: Array, search: Search, errors: str, bounds: tuple[Array, Array]
 ) -> Fit:
@@ -233,6 +269,7 @@ def finished(
         noise = white(own, share) if errors == "independent" else describe(own, share, errors == "correlated")
         noises.append(noise)
         spread += noise.spread(rows[:, where])
+    spread += _from_levels(plan, comparison, z, rows)
     known = prior_information(comparison.space)
     scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
     covariance, lost = combinations(information + scale * known, spread + scale**2 * known, comparison.space)

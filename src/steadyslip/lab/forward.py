@@ -18,6 +18,7 @@ from steadyslip.values import Values, model_values
 Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
 MOST_STEPS = 40  # per row of the table and lane, on average, before a trial is given up
+SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
 _STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
 
 
@@ -54,6 +55,21 @@ class Table:
 
         return Table(own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates))
 
+    def along(self, part: slice, size: int) -> Table:
+        """That of some directions, filled up to as many as a kernel has."""
+        rates = [
+            _padded(array[:, part], size) if array.shape[1] else array for array in (self.node_rates, self.input_rates)
+        ]
+        return Table(self.segments, self.samples, self.count, *rates)
+
+
+def _padded(array: Array, size: int) -> Array:
+    """Further directions in which nothing changes, up to a number of them."""
+    if array.shape[1] == size:
+        return np.ascontiguousarray(array)
+    missing = np.zeros((array.shape[0], size - array.shape[1], *array.shape[2:]))
+    return np.concatenate([array, missing], axis=1)
+
 
 class Forward:
     """Runs an experiment for many sets of parameters at once.
@@ -82,7 +98,8 @@ class Forward:
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
         self.directions = len(names) + shifts if sensitive else 0
-        self.program = experiment_program(self.model, self.directions, automatic_method(reduction))
+        self.size = next((n for n in (0, *SIZES) if n >= self.directions), SIZES[-1])
+        self.program = experiment_program(self.model, self.size, automatic_method(reduction))
 
     def values(self, parameters: Array) -> Values:
         """The model's parameters for rows of the free ones, (jobs, names)."""
@@ -134,12 +151,21 @@ class Forward:
             Friction, then its derivatives; NaN from where a motion cannot be continued, or where there is no
             steady sliding to start from.
         """
-        jobs = len(parameters)
         values = self.values(parameters)
-        sigma = np.broadcast_to(np.asarray(steady_stress(values), dtype=float), (jobs,))
+        sigma = np.broadcast_to(np.asarray(steady_stress(values), dtype=float), (len(parameters),))
         chain = self._chain(parameters, values)
-        if self.directions:
-            chain[:, : len(self.names)] *= units[:, :, None]
+        if not self.directions:
+            return self._run(table, values, sigma, chain)
+        chain[:, : len(self.names)] *= units[:, :, None]
+        parts = [slice(k, k + self.size) for k in range(0, self.directions, self.size)]
+        found = [
+            self._run(table.along(part, self.size), values, sigma, _padded(chain[:, part], self.size)) for part in parts
+        ]
+        return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
+
+    def _run(self, table: Table, values: Values, sigma: Array, chain: Array) -> Array:
+        """One pass, with as many directions as the kernel has."""
+        jobs = len(sigma)
         constants, start = self.program.arrays(values.arguments, sigma, chain)
         settings = self._settings(table, values, sigma, jobs)
         good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
@@ -170,13 +196,13 @@ class Forward:
         reduction = self.program.reduction
         scales, unknown = natural_scales(reduction, values.arguments, sigma)
         size = len(reduction.names)
-        settings = np.empty((jobs, 4 + size * (1 + self.directions)))
+        settings = np.empty((jobs, 4 + size * (1 + self.size)))
         settings[:, 0] = self.rtol
         settings[:, 1] = 0.0
         settings[:, 2] = unknown
         settings[:, 3] = MOST_STEPS * table.samples.shape[1] + 1000
         for i, name in enumerate(reduction.names):
             settings[:, 4 + i] = self.rtol * scales[name]
-            if self.directions:
+            if self.size:
                 settings[:, 4 + size + i :: size] = (LOOSE * np.asarray(scales[name]) * np.ones(jobs))[:, None]
         return settings

@@ -92,6 +92,6 @@ def prior_information(space: Space) -> Array:
     """What is known of times between two samples beforehand: they lie between them, evenly likely."""
     known = np.zeros((len(space), len(space)))
     for i, one in enumerate(space.unknowns):
-        if one.parameter.startswith("jump."):
+        if one.parameter.startswith(("jump.", "step.")):
             known[i, i] = 12.0  # one over the variance of a number between 0 and 1, which is the coordinate's unit
     return known

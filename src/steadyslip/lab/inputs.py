@@ -11,12 +11,13 @@ import numpy as np
 
 from steadyslip.errors import InternalError
 from steadyslip.lab.forward import Table
+from steadyslip.lab.pressing import LEAST_STRESS
 from steadyslip.lab.record import Record
-from steadyslip.lab.steps import LEAST_RATE, LEAST_STRESS, smoothed
 from steadyslip.protocol import Protocol, Segments, pack
 from steadyslip.records import parameters, twin
 
 Array = np.ndarray
+LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
 PER_PERIOD = 200  # rows per period of a sine wave, on which it becomes straight: 1e-4 of its amplitude
 MOST_JUMPS = 20
 STRAIGHT = 5e-4  # of the range of the normal stress: what straight lines may miss of a smooth curve
@@ -45,7 +46,7 @@ class Sharp:
         return np.unique(np.clip(np.concatenate([np.empty(0, dtype=int), *around]), 0, len(time) - 1))
 
 
-def sharp_changes(record: Record, smooth: bool = False) -> Sharp:
+def sharp_changes(record: Record) -> Sharp:
     """Find the changes of a record that straight lines between samples would smear.
 
     A change counts if it stands out of those before and after it. When exactly a displacement bends follows from the
@@ -57,7 +58,7 @@ def sharp_changes(record: Record, smooth: bool = False) -> Sharp:
     kinks: list[tuple[int, float]] = []
     if record.integrated and record.velocity is not None:
         jumps |= set(_jumps(record.time, record.velocity, LEAST_RATE))
-    elif record.displacement is not None and not smooth:
+    elif record.displacement is not None:
         kinks = _kinks(record.time, record.displacement)
     t = record.time
     return Sharp(
@@ -141,11 +142,9 @@ class MeasuredInputs:
     sharp : Sharp
     pressed : ndarray (n,), optional
         Change of the normal stress at the samples, Pa.
-    smooth : bool
-        Whether the load point moves without the noise of the measured displacement.
     """
 
-    def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None, smooth: bool = False) -> None:
+    def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None) -> None:
         time = record.time
         self.origin, self.count = float(time[0]), len(time)
         jumping, bending = {first for first, _ in sharp.jumps}, {first for first, _, _ in sharp.kinks}
@@ -160,7 +159,7 @@ class MeasuredInputs:
         old = np.maximum.accumulate(np.where(self.samples[0] >= 0, self.samples[0], 0))[:-1]  # interval of each row
         rows = np.zeros((1, len(nodes) - 1, 9))
         rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
-        self._measured(rows[0], record, old, pressed, smooth, jumping)
+        self._measured(rows[0], record, old, pressed, jumping)
         halves = np.flatnonzero(self.samples[0][:-1] < 0)  # second parts of cut intervals
         self.moving = np.array([row for row in halves if float(time[old[row]]) in jumping], dtype=int)
         for row in halves:
@@ -169,13 +168,10 @@ class MeasuredInputs:
                 self._cut(rows[0], int(row), record, int(old[row]), first in jumping, pressed)
         self.rows = rows
 
-    def _measured(
-        self, rows: Array, record: Record, old: Array, pressed: Array | None, smooth: bool, jumping: set[float]
-    ) -> None:
+    def _measured(self, rows: Array, record: Record, old: Array, pressed: Array | None, jumping: set[float]) -> None:
         spacing = np.diff(record.time)
         if record.displacement is not None:
-            moved = smoothed(record.time, record.displacement) if smooth else record.displacement
-            rows[:, 3] = (np.diff(moved) / spacing)[old]
+            rows[:, 3] = (np.diff(record.displacement) / spacing)[old]
         if record.integrated and record.velocity is not None:  # the rate itself is the straight line
             slope = (np.diff(record.velocity) / spacing)[old]
             rows[:, 3] = record.velocity[old] + slope * (rows[:, 0] - (record.time[old] - self.origin))

@@ -11,19 +11,31 @@ import numpy as np
 from steadyslip.contact import Constant
 from steadyslip.contact.basic import Prescribed
 from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.lab.comparison import LOSSES, Comparison, Part, jump_unknowns, trend_rows, trend_unknowns
+from steadyslip.lab.commanded import CommandedInputs
+from steadyslip.lab.comparison import (
+    LOSSES,
+    Comparison,
+    Part,
+    jump_unknowns,
+    step_unknowns,
+    trend_rows,
+    trend_unknowns,
+)
 from steadyslip.lab.forward import Forward
-from steadyslip.lab.inputs import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
+from steadyslip.lab.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
+from steadyslip.lab.kinks import smooth_load
+from steadyslip.lab.loading import Loading
 from steadyslip.lab.record import Record
 from steadyslip.lab.unknowns import Space, Unknown, unknown
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
+from steadyslip.quantities import shown
 from steadyslip.records import Address, parameters, resolve
 from steadyslip.slider import Slider
 
 Array = np.ndarray
 AXES = ("displacement", "time")
-DRIVES = ("measured", "smoothed", "protocol")
+DRIVES = ("commanded", "smoothed", "measured", "protocol")
 NEVER_FREE = ("drive.velocity", "slider.area", "friction.v_ref")
 
 
@@ -41,7 +53,8 @@ class Plan:
     separate : tuple of str
         Those of them that every record has to itself.
     drive : str
-        What moves the load point: the ``measured`` displacement, that ``smoothed``, or the ``protocol``.
+        What moves the load point: the ``commanded`` loading found in the record, its displacement ``smoothed`` or as
+        ``measured``, or the ``protocol``.
     protocol : Protocol or None
         On the records' clock.
     trend : int
@@ -57,14 +70,16 @@ class Plan:
     rtol : float
         Error allowed per step of the model.
     sharp : tuple of Sharp
-        What happens at once in each record.
+        What happens at once in each record that drives the model as measured.
+    loading : tuple of Loading
+        What was commanded in each record, as found in its columns.
     """
 
     rig: Slider
     records: tuple[Record, ...]
     free: tuple[str, ...]
     separate: tuple[str, ...] = ()
-    drive: str = "measured"
+    drive: str = "commanded"
     protocol: Protocol | None = None
     trend: int = 0
     trend_axis: str = "displacement"
@@ -74,6 +89,17 @@ class Plan:
     weights: tuple[Array, ...] | None = field(default=None, repr=False)
     rtol: float = 1e-7
     sharp: tuple[Sharp, ...] = field(default=(), repr=False)
+    loading: tuple[Loading, ...] = field(default=(), repr=False)
+
+    @property
+    def follows(self) -> bool:
+        """Whether the model follows a loading that was found, not a column sample by sample."""
+        return self.protocol is None and self.drive != "measured"
+
+    @property
+    def pressed(self) -> bool:
+        """Whether the normal stress is imposed, so that the record's own drives the model."""
+        return isinstance(self.rig.contact, (Constant, Prescribed))
 
     def space(self) -> Space:
         """The unknowns: shared ones, separate ones record by record, trends."""
@@ -83,7 +109,11 @@ class Plan:
             for record in range(len(self.records)) if name in self.separate and several else [None]:
                 found.append(self._unknown(name, record))
         for i in range(len(self.records)):
-            found += jump_unknowns(i if several else None, self.sharp[i])
+            label = i if several else None
+            if self.follows:
+                found += step_unknowns(label, self.loading[i], self.pressed)
+            else:
+                found += jump_unknowns(label, self.sharp[i])
             found += trend_unknowns(i if several else None, self.trend, self.offset)
         return Space(tuple(found))
 
@@ -102,19 +132,23 @@ class Plan:
         return Comparison(parts, space, self.loss, self.width or 1.0)
 
     def _part(self, i: int, record: Record, space: Space, threads: int | None) -> Part:
-        rig, pressed = self.driven(record)
+        rig, pressed = self.driven(record, i)
         places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
         for place, one in enumerate(space.unknowns):
             if one.record in (None, i):
-                kinds = {"protocol": "time", "jump": "time", "trend": "trend", "offset": "trend"}
+                kinds = {"protocol": "time", "jump": "time", "step": "time", "trend": "trend", "offset": "trend"}
                 places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
         forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads)
         inputs: Any
-        if self.protocol is None:
-            smooth = self.drive == "smoothed" and not record.integrated
-            inputs = MeasuredInputs(record, self.sharp[i], pressed, smooth)
+        moved: Array | None = None
+        if self.follows:
+            inputs = CommandedInputs(self.loading[i], record.time, self.pressed and record.normal is not None)
+            load = self.loading[i].load
+            moved = None if load is None else load.integral(record.time)
+        elif self.protocol is None:
+            inputs = MeasuredInputs(record, self.sharp[i], pressed)
         else:
             own_stress = any(piece.channel == NORMAL_STRESS for piece in self.protocol.pieces)
             inputs = ProtocolInputs(
@@ -123,20 +157,27 @@ class Plan:
         weights = np.ones(len(record)) if self.weights is None else self.weights[i]
         return Part(
             record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
-            tuple(places["trend"]), trend_rows(record, self.trend, self.offset, self.trend_axis),
+            tuple(places["trend"]), trend_rows(record, self.trend, self.offset, self.trend_axis, moved),
         )  # fmt: skip
 
-    def driven(self, record: Record) -> tuple[Slider, Array | None]:
+    def driven(self, record: Record, i: int) -> tuple[Slider, Array | None]:
         """The rig as a record drives it, and the measured change of normal stress (Pa) where that is imposed."""
         rig = self.rig
         if self.protocol is None:
-            rate = record.initial_rate
+            load = self.loading[i].load if self.follows else None
+            rate = record.initial_rate if load is None else float(load.at(record.time[:1])[0])
             if rate is None:
                 raise InternalError("rate is not None")
             rig = rig.with_values({"drive.velocity": rate})
-        imposed = isinstance(rig.contact, (Constant, Prescribed))
-        if not imposed or record.normal is None:
+        if not self.pressed or record.normal is None:
             return rig, None
+        stress = None if self.drive == "measured" else self.loading[i].stress
+        if stress is not None and not self.follows:  # of a protocol that leaves the normal stress to the record
+            pressed = stress.at(record.time)
+            rig = replace(rig, contact=Constant(steady_normal_stress=float(pressed[0])))
+            return rig, (record.normal if stress.changes else pressed) - pressed[0]
+        if stress is not None:
+            return replace(rig, contact=Constant(steady_normal_stress=float(stress.at(record.time[:1])[0]))), None
         rig = replace(rig, contact=Constant(steady_normal_stress=float(record.normal[0])))
         return rig, record.normal - record.normal[0]
 
@@ -182,16 +223,21 @@ def make_plan(
         options["drive"] = "protocol"
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
     _check_records(plan)
-    return with_sharp_changes(plan)
+    return with_loading(plan)
 
 
-def with_sharp_changes(plan: Plan) -> Plan:
-    """The plan knowing what happens at once in its records; with a protocol that says it, nothing else does."""
-    if plan.protocol is not None:
-        return replace(plan, sharp=tuple(Sharp() for _ in plan.records))
-    imposed = isinstance(plan.rig.contact, (Constant, Prescribed))
-    drivers = (record if imposed else replace(record, normal=None) for record in plan.records)
-    return replace(plan, sharp=tuple(sharp_changes(driver, plan.drive == "smoothed") for driver in drivers))
+def with_loading(plan: Plan) -> Plan:
+    """The plan knowing what drives the model in its records, which thinned ones no longer tell."""
+    if plan.drive == "measured":
+        drivers = (record if plan.pressed else replace(record, normal=None) for record in plan.records)
+        return replace(plan, sharp=tuple(sharp_changes(driver) for driver in drivers), loading=())
+    found = []
+    for record in plan.records:
+        loading = record.loading
+        if plan.drive == "smoothed" and record.displacement is not None:
+            loading = replace(loading, load=smooth_load(record.time, record.displacement))
+        found.append(loading)
+    return replace(plan, sharp=tuple(Sharp() for _ in plan.records), loading=tuple(found))
 
 
 def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
@@ -227,7 +273,7 @@ def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> lis
 
 def _bad_options(options: dict[str, Any]) -> list[Problem]:
     problems = []
-    choices = {"trend_axis": AXES, "drive": DRIVES[:2], "loss": LOSSES}
+    choices = {"trend_axis": AXES, "drive": DRIVES[:3], "loss": LOSSES}
     for name, allowed in choices.items():
         if options.get(name, allowed[0]) not in allowed:
             problems.append(Problem(name, unknown_name("choice", options[name], allowed)))
@@ -257,6 +303,7 @@ def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[P
 def _check_records(plan: Plan) -> None:
     problems = []
     drives = plan.protocol is not None and any(piece.channel == LOAD_POINT for piece in plan.protocol.pieces)
+    given = float(plan.rig.drive.velocity)
     for i, record in enumerate(plan.records, start=1):
         where = "record" if len(plan.records) == 1 else f"record {i}"
         if plan.protocol is None and record.displacement is None:
@@ -266,6 +313,10 @@ def _check_records(plan: Plan) -> None:
             problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
                                     f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding, so cut it "
                                     "with between=(start, end)"))  # fmt: skip
+        rate = record.initial_rate or 0.0
+        if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
+            message = f"got {shown(given, 'm/s')}, but {record.source} begins at {shown(rate, 'm/s')}; make them agree"
+            problems.append(Problem("drive.velocity", message))
         if plan.protocol is not None and not drives and record.displacement is not None:
             problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "
                                     "away, or give it a velocity-step, hold or velocity-table"))  # fmt: skip

@@ -11,7 +11,10 @@ from typing import Any
 import numpy as np
 
 from steadyslip.errors import NotAvailable, ParameterError, Problem
-from steadyslip.lab.steps import Step, initial_rate, normal_steps, velocity_steps
+from steadyslip.lab.kinks import load_course
+from steadyslip.lab.loading import Loading
+from steadyslip.lab.pressing import oscillation, stress_course
+from steadyslip.lab.steps import Step, steps_of
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown
 from steadyslip.records import Parameter, checked_number, real
@@ -59,17 +62,18 @@ class Record:
     @cached_property
     def steps(self) -> tuple[Step, ...]:
         """What was done to the sample, in the order of time."""
-        found: list[Step] = []
-        if self.displacement is not None:
-            found += velocity_steps(self.time, self.displacement)
-        if self.normal is not None:
-            found += normal_steps(self.time, self.normal)
-        return tuple(sorted(found, key=lambda step: step.time))
+        return steps_of(self.loading, None if self.normal is None else oscillation(self.time, self.normal))
+
+    @cached_property
+    def loading(self) -> Loading:
+        """What was commanded, as found in the measured displacement and normal stress."""
+        load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
+        return Loading(load, None if self.normal is None else stress_course(self.time, self.normal))
 
     @cached_property
     def initial_rate(self) -> float | None:
         """Load-point rate before the first change of it, m/s; None if it was not measured."""
-        return None if self.displacement is None else initial_rate(self.time, self.displacement)
+        return None if self.loading.load is None else float(self.loading.load.at(self.time[:1])[0])
 
     @cached_property
     def rate(self) -> Array | None:

@@ -15,7 +15,7 @@ from steadyslip.lab.comparison import Comparison
 from steadyslip.lab.identify import Combination
 from steadyslip.lab.noise import Noise
 from steadyslip.lab.plan import Plan
-from steadyslip.lab.unknowns import Space
+from steadyslip.lab.unknowns import Space, Unknown
 from steadyslip.pictures import draw
 from steadyslip.quantities import shown, shown_error, shown_range
 from steadyslip.records import resolve
@@ -195,18 +195,33 @@ class Fit(ReadOnly):
         return tuple(self[name] for name in self.names)
 
     @cached_property
+    def as_measured(self) -> dict[str, float] | None:
+        """Values that the displacement and normal stress as measured, instead of the commanded ones, would lead to.
+
+        None where the model does not follow commanded loading, or the columns have no noise to speak of.
+        """
+        from steadyslip.lab.fit import driven_as_measured
+
+        return driven_as_measured(self)
+
+    @cached_property
     def at_bounds(self) -> tuple[str, ...]:
         """Parameters that ran to the end of what was searched, each in a sentence."""
         low, high = self.bounds
         found = []
         for i, one in enumerate(self.space.unknowns):
-            if one.parameter.startswith("jump."):  # bounded by the samples on both sides
+            if one.parameter.startswith("jump.") or self._within_interval(one):  # bounded by samples on both sides
                 continue
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
                     end = shown(float(one.value(bound)), one.unit)
                     found.append(f"{one.name} ended at the {word} value that was searched, {end}")
         return tuple(found)
+
+    def _within_interval(self, one: Unknown) -> bool:
+        """Whether an unknown is the time of a step that lies between two samples."""
+        time = self.plan.records[one.record or 0].time
+        return one.parameter.startswith("step.") and one.high - one.low < 1.01 * float(np.max(np.diff(time)))
 
     @property
     def samples(self) -> int:

@@ -66,6 +66,8 @@ class Spec:
         Whether the file says at which rate mu_ref holds; the rate at the start of the first record unless given.
     contact_given : bool
         Whether it says what presses the surfaces together.
+    drive_given : bool
+        Whether it says how fast the load point moves before a protocol changes that; as in the records unless given.
     """
 
     rig: Slider
@@ -76,6 +78,7 @@ class Spec:
     windows: bool = False
     v_ref_given: bool = False
     contact_given: bool = True
+    drive_given: bool = True
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
         """Read a record as the file says."""
@@ -106,10 +109,19 @@ class Spec:
             )
             raise ParameterError([Problem("normal", message)])
         rate = parts[0].initial_rate
-        known = "friction.v_ref" in self.rig.parameters()
-        if self.v_ref_given or not known or not rate or not rate > 0:
-            return self.rig, parts
-        return self.rig.with_values({"friction.v_ref": rate}), parts
+        rig = self.rig
+        if self.protocol is not None and not self.drive_given:
+            if rate is None or not rate > 0:
+                message = (
+                    f"missing, and {parts[0].source} does not show it; write the rate before the first step, as "
+                    "velocity = '1 um/s' in [drive]"
+                )
+                raise ParameterError([Problem("drive.velocity", message)])
+            rig = rig.with_values({"drive.velocity": rate})
+        if self.v_ref_given or "friction.v_ref" not in rig.parameters():
+            return rig, parts
+        slow = rig.drive.velocity if rate is None or not rate > 0 else rate
+        return rig.with_values({"friction.v_ref": slow}), parts
 
 
 def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
@@ -145,12 +157,15 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
     problems += _checked_record(record) + _checked_fit(options)
     v_ref_given = isinstance(tables.get("friction"), dict) and "v_ref" in tables["friction"]
     contact_given = "contact" in tables
+    drive_given = isinstance(tables.get("drive"), dict) and "velocity" in tables["drive"]
     missing = _completed(tables, options.pop("states", None), problems)
     from steadyslip.config.changes import apply, full_name
 
     for change in others:
         problems += apply(change, tables, lines)
-        missing.discard(full_name(change.partition("=")[0].strip(), tables)[0])
+        named = full_name(change.partition("=")[0].strip(), tables)[0]
+        missing.discard(named)
+        drive_given |= named == "drive.velocity"
     try:
         rig, protocol = from_tables(tables, lines, source, [])
     except RigFileError as error:
@@ -166,7 +181,7 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
         options["free"] = sorted(name for name in missing if name in rig.parameters())
         if "friction.mu_ref" not in missing and "friction.mu_ref" in rig.parameters():
             options["fixed"] = [*options.get("fixed", []), "friction.mu_ref"]
-    return Spec(rig, protocol, record, options, tuple(laws), windows, v_ref_given, contact_given)
+    return Spec(rig, protocol, record, options, tuple(laws), windows, v_ref_given, contact_given, drive_given)
 
 
 def default_spec(evolution: str = "slip") -> Spec:
@@ -259,7 +274,7 @@ def _checked_fit(options: dict[str, Any]) -> list[Problem]:
             options[name] = [value]
         elif value is not None and not (isinstance(value, list) and all(isinstance(x, str) for x in value)):
             problems.append(Problem(f"fit.{name}", f"got {value!r}; allowed: a list of names"))
-    for name, allowed in (("trend_axis", AXES), ("drive", DRIVES[:2])):
+    for name, allowed in (("trend_axis", AXES), ("drive", DRIVES[:3])):
         if options.get(name, allowed[0]) not in allowed:
             problems.append(Problem(f"fit.{name}", unknown_name("choice", options[name], allowed)))
     for name, least, default in (("trend", 0, 0), ("starts", 1, STARTS), ("states", 1, 1)):

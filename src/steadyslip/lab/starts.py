@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.errors import InternalError
+from steadyslip.lab.commanded import CommandedInputs, windows
 from steadyslip.lab.comparison import Part
 from steadyslip.lab.inputs import ProtocolInputs
 from steadyslip.lab.record import Record
@@ -22,6 +23,7 @@ from steadyslip.steady import steady_state
 
 Array = np.ndarray
 STARTS = 48
+NEARBY = 0.5  # share of the window of a time over which starts are spread
 STIFFEST = 100.0  # k d_c/(aσ) of a start: beyond, a record shows no more of the stiffness
 _DIRECT = (0.004, 0.01, 0.025)  # values of a where no step of the rate tells
 
@@ -215,12 +217,22 @@ def _start(unknown: Unknown, part: Part, own: Features, design: tuple[Array, ...
         return steepness * _stress(part)
     if name.startswith(("trend.", "offset")):
         return np.zeros_like(a)
+    if name.startswith("step."):
+        return _near(unknown, part, spare)
     if name.startswith("jump."):
         return unknown.low + (unknown.high - unknown.low) * spare
     present = float(rig.parameters()[name].value or 0.0) if name in rig.parameters() else None
     if present is None:
         return np.full_like(a, _time_of(name, part))
     return present * 10.0 ** (2 * spare - 1) if present else 0.02 * (spare - 0.5)
+
+
+def _near(unknown: Unknown, part: Part, spare: Array) -> Array:
+    """Starting values of a time that the record leaves open: as it has it, or anywhere between two samples."""
+    if not isinstance(part.inputs, CommandedInputs):
+        raise InternalError("times of changes are free in commanded loading only")
+    begin = {(low, high): value for value, low, high in windows(part.inputs.changes)}[(unknown.low, unknown.high)]
+    return np.asarray(begin + NEARBY * (spare - 0.5) * (unknown.high - unknown.low))
 
 
 def _stress(part: Part) -> float:

@@ -1,0 +1,200 @@
+"""Commanded loading: found through noise, glitches and slips of the sensor, and run through exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from steadyslip.lab.commanded import CommandedInputs
+from steadyslip.lab.kinks import load_course, smooth_load
+from steadyslip.lab.loading import Loading, shifted
+from steadyslip.lab.pressing import oscillation, stress_course
+
+STEPS = [(40.3, 1.0, 3.0), (80.1, 3.0, 10.0), (121.7, 10.0, 3.0), (160.2, 3.0, 1.0)]
+HOLDS = [(30.3, 1.0, 0.0), (40.3, 0.0, 1.0), (90.1, 1.0, 0.0), (120.2, 0.0, 1.0)]
+NOTHING = []
+
+
+def moved(time, changes, ramp=0.0):
+    """Displacement of a load point, um: an ideal one, or with every change spread over some time."""
+    found = (changes[0][1] if changes else 1.0) * time
+    for at, before, after in changes:
+        since = np.maximum(time - at, 0.0)
+        bent = since - 0.5 * ramp if not ramp else np.where(since < ramp, since**2 / (2 * ramp), since - ramp / 2)
+        found = found + (after - before) * bent
+    return found
+
+
+def measured(time, changes, noise, glitches, slips, seed, ramp=0.0):
+    """What a sensor would make of it, m."""
+    rng = np.random.default_rng(seed)
+    found = moved(time, changes, ramp) + noise * rng.standard_normal(len(time))
+    for _ in range(glitches):
+        middle, width = rng.uniform(time[0], time[-1]), rng.uniform(0.05, 0.5)
+        found += rng.uniform(2, 5) * rng.choice([-1, 1]) * np.exp(-0.5 * ((time - middle) / width) ** 2)
+    for _ in range(slips):
+        found += rng.uniform(-1.5, 1.5) * (time > rng.uniform(time[0], time[-1]))
+    return 1e-6 * found
+
+
+@pytest.mark.parametrize("changes", [STEPS, HOLDS, NOTHING])
+@pytest.mark.parametrize(("noise", "glitches", "slips"), [(0, 0, 0), (0.03, 4, 0), (0.14, 0, 0), (0.14, 4, 3)])
+def test_rates_and_their_changes_are_found(changes, noise, glitches, slips):
+    time = np.arange(0.0, 200.0, 0.05)
+    for seed in (1, 2, 3):
+        course = load_course(time, measured(time, changes, noise, glitches, slips, seed))
+        assert course.curve is None
+        assert len(course.changes) == len(changes)
+        for found, (at, before, after) in zip(course.changes, changes, strict=True):
+            assert found.duration == 0
+            assert found.earliest - 1e-6 <= at <= found.latest + 1e-6
+            assert (1e6 * found.before, 1e6 * found.after) == pytest.approx((before, after), rel=0.01, abs=1e-9)
+
+
+def test_a_clean_column_leaves_nothing_open():
+    time = np.sort(np.random.default_rng(0).uniform(0, 200, 3000))
+    course = load_course(time, measured(time, STEPS, 0, 0, 0, 0))
+    for found, (at, _, _) in zip(course.changes, STEPS, strict=True):
+        assert not found.free
+        assert found.time == pytest.approx(at, abs=1e-6)
+    assert not list(shifted(Loading(course, None), pressed=True))
+
+
+def test_rates_are_as_sure_as_they_say():
+    """Deviations of rates over their errors have about unit spread."""
+    time = np.arange(0.0, 200.0, 0.1)
+    found = []
+    for seed in range(40):
+        course = load_course(time, measured(time, [(100.0, 1.0, 3.0)], 0.14, 0, 0, seed))
+        found += list((1e6 * course.levels - [1.0, 3.0]) / (1e6 * course.errors))
+    assert 0.8 < np.std(found) < 1.25
+    assert abs(np.mean(found)) < 0.4
+
+
+def test_a_ramp_is_told_from_a_step_or_said_not_to_be():
+    time = np.arange(0.0, 100.0, 0.02)
+    for ramp in (2.0, 5.0):
+        (change,) = load_course(time, measured(time, [(50.0, 1.0, 10.0)], 0.1, 0, 0, 1, ramp)).changes
+        assert change.duration == pytest.approx(ramp, rel=0.1)
+        assert change.time == pytest.approx(50.0, abs=0.2)
+        assert change.shortest <= ramp <= change.longest
+    (change,) = load_course(time, measured(time, [(50.0, 1.0, 10.0)], 0.1, 0, 0, 1)).changes
+    assert change.duration == 0
+    assert 0 < change.longest < 1
+    (change,) = load_course(time, measured(time, [(50.0, 1.0, 10.0)], 0.0, 0, 0, 1, 2.0)).changes
+    assert change.duration == pytest.approx(2.0, rel=1e-3)
+    assert not change.free
+
+
+def test_what_is_not_piecewise_linear_becomes_a_smooth_curve():
+    time = np.linspace(0.0, 100.0, 4000)
+    rate = 2.0 + np.sin(0.2 * time)
+    displacement = 2.0 * time - 5.0 * (np.cos(0.2 * time) - 1.0) + 0.05 * np.random.default_rng(1).standard_normal(4000)
+    course = smooth_load(time, 1e-6 * displacement)
+    inner = slice(100, -100)
+    assert np.sqrt(np.mean((1e6 * course.at(time) - rate)[inner] ** 2)) < 0.05
+
+
+# -- normal stress
+
+
+def test_noise_in_a_constant_normal_stress_is_left_out():
+    time = np.linspace(0, 100, 2000)
+    course = stress_course(time, 1e7 * (1 + 5e-4 * np.random.default_rng(0).standard_normal(2000)))
+    assert not course.changes
+    assert course.curve is None
+    assert course.first == pytest.approx(1e7, rel=5e-5)
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_steps_and_short_ramps_of_normal_stress(noise):
+    time = np.arange(0.0, 100.0, 0.1)
+    for ramp in (0.0, 0.14, 0.55):
+        stress = 1e7 + 5e5 * np.clip((time - 60.03) / max(ramp, 1e-9), 0, 1)
+        course = stress_course(time, stress + 1e7 * noise * np.random.default_rng(2).standard_normal(len(time)))
+        (change,) = course.changes
+        assert change.earliest - 1e-6 <= 60.03 <= change.latest + 1e-6
+        assert (change.before, change.after) == pytest.approx((1e7, 1.05e7), rel=1e-4)
+        if ramp:
+            assert change.shortest - 1e-6 <= ramp <= change.longest + 1e-6
+        else:
+            assert change.duration == 0
+        middle = course.at(np.array([change.time + 0.5 * change.duration]))
+        if ramp:
+            assert middle[0] == pytest.approx(0.5 * (change.before + change.after), rel=1e-9)  # straight
+
+
+def test_a_slow_change_of_normal_stress_is_a_ramp_or_a_curve_not_a_staircase():
+    time = np.linspace(0, 100, 2000)
+    share = np.clip((time - 20) / 60, 0, 1)
+    for noise in (0.0, 5e3):
+        fresh = noise * np.random.default_rng(1).standard_normal(2000)
+        for clean in (1e7 + 2e6 * share, 1e7 + 2e6 * share**2 * (3 - 2 * share)):
+            course = stress_course(time, clean + fresh)
+            assert len(course.changes) <= 1
+            assert np.sqrt(np.mean((course.at(time) - clean) ** 2)) < 3e3
+
+
+def test_an_oscillation_is_followed_without_its_noise():
+    time = np.linspace(0, 220, 2200)
+    clean = 1e7 + 2e5 * np.where(time > 20, np.sin(2 * np.pi * (time - 20) / 20), 0.0)
+    noisy = clean + 5e3 * np.random.default_rng(0).standard_normal(len(time))
+    wave = oscillation(time, noisy)
+    assert wave.period == pytest.approx(20, rel=0.02)
+    course = stress_course(time, noisy)
+    assert np.sqrt(np.mean((course.at(time) - clean) ** 2)) < 2e3
+
+
+# -- tables
+
+
+def loading(noise=0.1, ramp=2.0):
+    time = np.arange(0.0, 100.0, 0.1)
+    load = load_course(time, measured(time, [(50.0, 1.0, 10.0)], noise, 0, 0, 1, ramp))
+    stress = stress_course(time, np.where(time > 70.02, 1.05e7, 1e7))
+    return time, Loading(load, stress)
+
+
+def inputs_of(table, job, at):
+    """Load-point rate and added normal stress of a table at a time."""
+    rows = table.segments[job if len(table.segments) > 1 else 0]
+    k = np.flatnonzero((rows[:, 0] <= at) & (at < rows[:, 1]))[-1]
+    since = at - rows[k, 0]
+    return rows[k, 3] + since * rows[k, 6], rows[k, 5] + since * rows[k, 8]
+
+
+def test_tables_follow_the_course_and_pass_every_sample():
+    time, found = loading()
+    inputs = CommandedInputs(found, time, pressed=True)
+    assert [what for _, what in inputs.free] == ["at", "duration", "at"]
+    start = np.array([[49.0, 3.0, 70.05], [50.2, 1.0, 70.01]])
+    table = inputs.table(start, first=1, directions=4)
+    for job, (at, duration, jump) in enumerate(start):
+        for t in (20.0, at + 0.3 * duration, at + duration + 1.0, jump - 1e-3, jump + 1e-3):
+            rate, stress = inputs_of(table, job, t)
+            share = np.clip((t - at) / duration, 0, 1)
+            low, high = found.load.levels
+            assert rate == pytest.approx(low + share * (high - low), rel=1e-9)
+            assert stress == pytest.approx(5e5 * (t > jump), abs=1e-3)
+        seen = table.samples[job]
+        np.testing.assert_array_equal(np.sort(seen[seen >= 0]), np.arange(len(time)))
+        ends = np.append(table.segments[job][:, 0], table.segments[job][-1, 1])
+        np.testing.assert_allclose(ends[seen >= 0], time[seen[seen >= 0]], atol=1e-12)
+
+
+def test_tables_say_how_they_change():
+    """Nodes that move, and inputs that change where they stand, against differences of tables."""
+    time, found = loading()
+    inputs = CommandedInputs(found, time, pressed=True)
+    start, step = np.array([[49.03, 3.01, 70.05]]), 1e-5
+    table = inputs.table(start, first=0, directions=3)
+    for direction in range(3):
+        shift = step * np.eye(3)[direction]
+        after, before = inputs.table(start + shift), inputs.table(start - shift)
+        moves = (after.segments[0, :, 0] - before.segments[0, :, 0]) / (2 * step)
+        np.testing.assert_allclose(table.node_rates[0, direction], moves, atol=1e-6)
+        for t in (49.77, 51.13):
+            change = (inputs_of(after, 0, t)[0] - inputs_of(before, 0, t)[0]) / (2 * step)
+            rows = table.segments[0]
+            k = np.flatnonzero((rows[:, 0] <= t) & (t < rows[:, 1]))[-1]
+            assert table.input_rates[0, direction, k, 0] == pytest.approx(change, rel=0.05, abs=1e-12)

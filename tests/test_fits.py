@@ -257,7 +257,7 @@ def test_blocks_keep_correlation():
     assert fit.correlated
     blocks = ss.bootstrap(fit, 64)
     single = ss.bootstrap(fit, 64, kind="residual")
-    assert blocks.details["block"] > 20
+    assert blocks.details["block"] == pytest.approx(19, abs=3)
     for name in ("friction.a", "friction.d_c", "slider.stiffness"):
         assert blocks.error(name) > 1.7 * single.error(name)
         assert blocks.error(name) == pytest.approx(fit.errors[name], rel=0.5)
@@ -442,7 +442,7 @@ def test_basalt():
     said = " ".join(str(fit).split())
     assert "driven by commanded loading found in the record, 1 change of rate" in said
     assert "the measured displacement would make a -24%, b -22%, k -54%" in said
-    assert "k/σ 0.006628 ± 0.00064 /um" in said
+    assert "k/σ 0.00663 ± 0.00064 /um" in said
     assert "a ramp of up to" in said
 
 
@@ -482,7 +482,7 @@ def test_sepiolite_strengthens():
     fit = ss.fit(ss.lab_rig("aging"), ss.read_record(SEPIOLITE), trend=2)
     assert fit.search.converged
     assert fit["b"].high < 0
-    assert fit.ssq == pytest.approx(1.8049e-2, rel=1e-3)
+    assert fit.ssq == pytest.approx(1.5890e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
     assert 0.7 < fit.noise[0].lag1 < 0.9
 
 

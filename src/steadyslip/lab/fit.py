@@ -26,6 +26,7 @@ THIN = 400  # samples on which many starts are tried
 HOPE = 2.0  # times the best rough sum of squares: finalists beyond have no chance
 ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
+INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
 
 ERRORS = ("auto", "correlated", "independent")
 
@@ -165,8 +166,24 @@ def _polished(whole: Comparison, rough: Minima, low: Array, high: Array) -> Mini
     """The best of rough minima brought to their end, the best first."""
     chosen = _distinct(rough, FINALISTS)
     found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1)
+    begin = _released(whole.space, found.coordinates[int(np.argmin(found.ssq))], low, high)
+    if len(begin):
+        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=300)
     order = np.argsort(found.ssq, kind="stable")
     return Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
+
+
+def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
+    """The same point with times that ran to the end of their windows put back inside, (0 or more, p).
+
+    Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
+    """
+    times = np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
+    ended = times & ((coordinates <= low) | (coordinates >= high))
+    if not np.any(ended):
+        return np.empty((0, len(coordinates)))
+    share = np.array(INSIDE)[:, None]
+    return np.where(ended, low + share * np.where(ended, high - low, 0.0), coordinates)
 
 
 def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:

@@ -26,6 +26,7 @@ SHORTEST = 0.05  # share of the record, in time or displacement, that is worth a
 SLIP = 0.01  # share of the time of a record that a slip of the sensor may take
 MAIN = 0.6  # share of what is left out between two pieces that one of them makes up: a run of its own
 LEAD = 8.0  # how far a change of rate must lead, in units of how far a displacement strays from straight lines
+PLAIN = 100.0  # how far a piece must lead, in the same units, to be a run of its own however short
 RELIABLE = 8  # samples
 COARSE = 20_000  # samples on which runs are looked for
 
@@ -168,7 +169,11 @@ def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
                 own = []
             own.append(other)
         found.append(own)
-    return found
+    (first, early), (last, late) = ((m, _mean_slope(m, pieces)[0]) for m in (groups[0], groups[-1]))
+    before = _leading_away(np.arange(first[0]), early, pieces.begin[first[0]] - pieces.begin[0], pieces)
+    beyond = np.arange(last[-1] + 1, len(pieces.ends))
+    after = _leading_away(beyond, late, pieces.end[-1] - pieces.end[last[-1]], pieces)
+    return [members for members in (before, *found, after) if members]
 
 
 def _leading_away(inner: Array, rate: float, gap: float, pieces: _Pieces) -> list[int]:
@@ -183,7 +188,8 @@ def _leading_away(inner: Array, rate: float, gap: float, pieces: _Pieces) -> lis
     lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))
     whole = np.sum(pieces.duration[main]) > MAIN * gap and np.sum(pieces.size[main]) >= RELIABLE
     still = abs(slope) < 0.02 * abs(rate) + SURE * error and SURE * error < 0.05 * abs(rate)
-    long = gap > SLIP * pieces.span and np.sum(pieces.lengths[main]) > SHORTEST
+    far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
+    long = gap > SLIP * pieces.span and far
     return [int(k) for k in main] if lasting and whole and (still or long) else []
 
 

@@ -186,7 +186,7 @@ def _leading_away(inner: Array, rate: float, gap: float, pieces: _Pieces) -> lis
     like = SURE * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
     main = inner[np.abs(pieces.slope[inner] - slope) <= like]
     lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))
-    whole = np.sum(pieces.duration[main]) > MAIN * gap and np.sum(pieces.size[main]) >= RELIABLE
+    whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= RELIABLE
     still = abs(slope) < 0.02 * abs(rate) + SURE * error and SURE * error < 0.05 * abs(rate)
     far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
     long = gap > SLIP * pieces.span and far

@@ -155,7 +155,8 @@ class Curve:
         near, far = low, high
         reach = 2 * self.bend * abs(b) + 100 * self.tolerance
         for _ in range(60):
-            s = b - at_high * (b - a) / (at_high - at_low)
+            rise = at_high - at_low  # zero where the measure is rounding on both sides
+            s = b - at_high * (b - a) / rise if rise else a
             if not a < s < b:
                 s = 0.5 * (a + b)
             middle = self.corrected(low.u + s * low.tangent, low.tangent, low.length + s, reach)

@@ -133,9 +133,9 @@ def test_ctrl_c_says_how_to_go_on(tmp_path):
         "-o",
         str(store),
         "--set",
-        "map.over.angle.points=4001",
+        "map.over.angle.points=8001",
         "--set",
-        "map.over.stiffness.points=2001",
+        "map.over.stiffness.points=4001",
     ]
     command = [sys.executable, "-m", "steadyslip", *words, "--workers", "2"]
     process = subprocess.Popen(

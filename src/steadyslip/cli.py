@@ -438,6 +438,10 @@ def _status(command: Callable[[], object]) -> int:
         status = _failed("there is not enough memory for this; ask for fewer points, samples or runs", 2)
     except OSError as error:
         status = _failed(_system_fault(error), 2)
+        if error.filename is None:  # the output itself: what is still buffered would fail once more
+            from steadyslip.output import discard_output
+
+            discard_output()
     except Exception as error:
         if "STEADYSLIP_DEBUG" in os.environ:
             raise

@@ -76,7 +76,7 @@ def of_combinations(count: int | None, seed: int, folder: Path) -> Iterator[tupl
     """The four commands on every combination, or on some by chance."""
     from fuzz_rigs import DRIVES, FRICTION, _rig
     from rigs_of_theory import CONTACTS
-    from steadyslip.config import write_rig
+    from steadyslip.files.specifications import write_rig
 
     every = list(itertools.product(range(len(FRICTION)), range(len(CONTACTS)), (0.0, 1e6), range(len(DRIVES)), RIG))
     chosen = every if count is None else random.Random(seed).sample(every, min(count, len(every)))

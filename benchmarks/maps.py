@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 import steadyslip as ss
-from steadyslip.sweep import cluster, local
+from steadyslip.maps import cluster, local
 
 QUICK = "--quick" in sys.argv
 PART = 10 if QUICK else 1

@@ -30,10 +30,10 @@ from numba import njit
 from problems import Problem, problems
 
 import steadyslip as ss
-from steadyslip.compiled.build import machine_code
-from steadyslip.compiled.jump import jump
-from steadyslip.compiled.kernel import Record
-from steadyslip.compiled.nodes import Program
+from steadyslip.kernels.build import machine_code
+from steadyslip.kernels.jump import jump
+from steadyslip.kernels.kernel import Record
+from steadyslip.kernels.nodes import Program
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.setup import Options, prepare
 

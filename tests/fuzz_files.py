@@ -28,15 +28,15 @@ import numpy as np
 import xarray as xr
 
 import steadyslip as ss
-from steadyslip.compiled import build
-from steadyslip.lab.identify import Combination
-from steadyslip.lab.noise import Noise
-from steadyslip.lab.plan import make_plan
-from steadyslip.lab.result import Fit, Search
-from steadyslip.lab.store import FIT
+from steadyslip.experiments.fitting.identify import Combination
+from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.result import Fit, Search
+from steadyslip.experiments.fitting.store import FIT
+from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.files.sealed import seal, unseal, write_sealed
+from steadyslip.kernels import build
+from steadyslip.maps.store.layout import _seal
 from steadyslip.motion.store import RUN
-from steadyslip.sealed import seal, unseal, write_sealed
-from steadyslip.sweep.layout import _seal
 
 SECONDS, BYTES = 10, 2 * 2**30
 LARGE = (0, 1, -1, 2**31 - 1, -(2**31), 2**30, 255, 10**9)

@@ -26,10 +26,10 @@ import numpy as np
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, rate_state
-from steadyslip.compiled import program
-from steadyslip.compiled.build import interpreted
-from steadyslip.config import protocol_from_text, rig_from_text, rig_to_text
-from steadyslip.errors import SteadyslipError
+from steadyslip.core.errors import SteadyslipError
+from steadyslip.files.specifications import protocol_from_text, rig_from_text, rig_to_text
+from steadyslip.kernels import program
+from steadyslip.kernels.build import interpreted
 from steadyslip.linear.stiffness import growth_rate, stable_stiffness
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.toml"))

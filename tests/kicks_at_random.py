@@ -10,8 +10,8 @@ import numpy as np
 from scipy.integrate import LSODA, Radau
 
 import steadyslip as ss
-from steadyslip.nonlinear.kicks import Kicked
-from steadyslip.nonlinear.outcomes import OUTCOMES
+from steadyslip.nonlinear.kicks.kicks import Kicked
+from steadyslip.nonlinear.kicks.outcomes import OUTCOMES
 
 D_C, V_REF, MU = 1e-6, 1e-6, 0.6
 KINDS = ("slip-tilted", "aging", "slip-mass", "aging-mass", "aging-damped", "prz-mass")

@@ -9,7 +9,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from steadyslip.expressions import array_function
+from steadyslip.core.expressions import array_function
 from steadyslip.steady import steady_stress
 from steadyslip.values import model_values
 

@@ -10,9 +10,9 @@ import pytest
 from matplotlib import pyplot as plt
 
 import steadyslip as ss
-from steadyslip.nonlinear.threshold import Threshold
-from steadyslip.quantities import outside, shown, shown_range
-from steadyslip.sweep import Map, run_map
+from steadyslip.core.quantities import outside, shown, shown_range
+from steadyslip.maps import Map, run_map
+from steadyslip.nonlinear.kicks.threshold import Threshold
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 AREA = 0.01
@@ -110,7 +110,7 @@ def test_maps(rig, tmp_path):
 
 
 def test_a_file_without_a_map_is_told_so(rig, tmp_path):
-    from steadyslip.sweep.commands import map_file, sensitivity_file
+    from steadyslip.maps.commands import map_file, sensitivity_file
 
     path = tmp_path / "rig.toml"
     ss.write_rig(rig, path)

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from steadyslip import Slider, load_history, read_protocol, read_record, read_rig, simulate
-from steadyslip.config import rig_from_text
-from steadyslip.config.lines import key_lines
-from steadyslip.config.toml import MOST_PARTS, NotToml, tables_of
-from steadyslip.errors import ParameterError, QuantityError, SteadyslipError
-from steadyslip.quantities import parse, unit
+from steadyslip.core.errors import ParameterError, QuantityError, SteadyslipError
+from steadyslip.core.quantities import parse, unit
+from steadyslip.files.specifications import rig_from_text
+from steadyslip.files.specifications.lines import key_lines
+from steadyslip.files.specifications.toml import MOST_PARTS, NotToml, tables_of
 
 RIG = """
 [friction]
@@ -343,7 +343,7 @@ def test_a_used_fit_can_be_copied_and_sent():
     import copy
     import pickle
 
-    from steadyslip.lab.result import Fit, Search
+    from steadyslip.experiments.fitting.result import Fit, Search
 
     numbers = np.array([1.0, 2.0])
     fit = Fit("plan", numbers, 1.0, Search(1, 1, (), 3, True), (), np.eye(2), (), (numbers, numbers), "1")

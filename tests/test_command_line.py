@@ -191,7 +191,8 @@ def test_help_shows_brackets_as_they_are():
 
 
 def test_every_end_has_its_status(capsys, monkeypatch):
-    from steadyslip import cli, errors
+    from steadyslip import cli
+    from steadyslip.core import errors
 
     def ends(error):
         def command():

@@ -15,15 +15,16 @@ from hypothesis import given, strategies as st
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.compiled import build, driver, plain, primitives
-from steadyslip.compiled.layout import Cursor, Row, make_layout
-from steadyslip.compiled.methods import METHODS, Method, explicit, order_defect, rodas4, rooted_trees
-from steadyslip.compiled.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
-from steadyslip.compiled.program import Program
-from steadyslip.compiled.source import Constants, Formulas
+from steadyslip.files.sealed import write_sealed
+from steadyslip.kernels import build, driver, primitives
+from steadyslip.kernels.layout import Cursor, Row, make_layout
+from steadyslip.kernels.methods import METHODS, Method, explicit, order_defect, rodas4, rooted_trees
+from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
+from steadyslip.kernels.printers import python as plain
+from steadyslip.kernels.program import Program
+from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.setup import Options, prepare
-from steadyslip.sealed import write_sealed
 
 mpmath.mp.dps = 50
 
@@ -424,7 +425,7 @@ def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
         assert len(set(keys)) == len(keys) - 1
     finally:
         build._surroundings.cache_clear()
-    script = "from steadyslip.compiled import build; print(build.driver_key('advance'))"
+    script = "from steadyslip.kernels import build; print(build.driver_key('advance'))"
     seeds = [
         subprocess.run(
             [sys.executable, "-c", script], env=os.environ | {"PYTHONHASHSEED": seed}, capture_output=True, text=True

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
-from steadyslip.expressions import array_function
+from steadyslip.core.expressions import array_function
 from steadyslip.linear.response import contact_coefficients
 from steadyslip.linear.state_space import state_matrices
 from steadyslip.testing import CONTACT_CHECKS, Surroundings

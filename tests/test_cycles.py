@@ -13,18 +13,18 @@ import pytest
 import steadyslip as ss
 from dimensionless import MU, A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
-from steadyslip.config import read_rig
+from steadyslip.files.specifications import read_rig
 from steadyslip.motion.setup import Options, prepare
-from steadyslip.nonlinear import flow as flow_module
-from steadyslip.nonlinear.branch import SpecialCycle
 from steadyslip.nonlinear.continuation import Curve, Failure
-from steadyslip.nonlinear.flow import Flow, Runs
-from steadyslip.nonlinear.measure import measured
-from steadyslip.nonlinear.outcomes import constant_inputs
-from steadyslip.nonlinear.segments import _cuts
-from steadyslip.nonlinear.shooting import Shooting, multipliers
-from steadyslip.nonlinear.tracer import ENDS, Tracer, _winds
-from steadyslip.nonlinear.verify import verified
+from steadyslip.nonlinear.kicks.outcomes import constant_inputs
+from steadyslip.nonlinear.orbits import flow as flow_module
+from steadyslip.nonlinear.orbits.branch import SpecialCycle
+from steadyslip.nonlinear.orbits.flow import Flow, Runs
+from steadyslip.nonlinear.orbits.measure import measured
+from steadyslip.nonlinear.orbits.segments import _cuts
+from steadyslip.nonlinear.orbits.shooting import Shooting, multipliers
+from steadyslip.nonlinear.orbits.tracer import ENDS, Tracer, _winds
+from steadyslip.nonlinear.orbits.verify import verified
 from test_motion_oracle import LAWS
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -488,7 +488,7 @@ def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(Tracer, "_finished", broken)
-        patched.setattr(sys.modules["steadyslip.nonlinear.cycles"], "cycle_near", stop)
+        patched.setattr(sys.modules["steadyslip.nonlinear.orbits.cycles"], "cycle_near", stop)
         partial = ss.cycles(damped.rig, between=between)
     assert (len(partial) > 3, partial.end, partial.gaps) == (True, "interrupted by the user", ())
 
@@ -496,7 +496,7 @@ def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
         return [SpecialCycle("period doubling", now.cycle, (0.0, 1.0), 0.0, index)] if index == 5 else []
 
     with monkeypatch.context() as patched:
-        patched.setattr(sys.modules["steadyslip.nonlinear.tracer"], "changes", flips)
+        patched.setattr(sys.modules["steadyslip.nonlinear.orbits.tracer"], "changes", flips)
         patched.setattr(Tracer, "doubled", stop)
         partial = ss.cycles(damped.rig, between=between)
     assert (partial.doubled, partial.end) == (None, "interrupted by the user")
@@ -513,7 +513,7 @@ def test_no_small_cycle_at_the_edge_is_no_traceback(damped, monkeypatch):
     branch = ss.cycles(damped.rig, between=(0.4 * damped.onset.value, 1.1 * damped.onset.value))
     (cycle,), (same,) = branch.at(0.5 * damped.onset.value), damped.at(0.5 * damped.onset.value)
     assert cycle.period == pytest.approx(same.period, rel=1e-9)
-    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.cycles"], "cycle_near", lambda *_: None)
+    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.orbits.cycles"], "cycle_near", lambda *_: None)
     nothing = ss.cycles(damped.rig)
     assert (len(nothing), nothing.at(damped.onset.value)) == (0, ())
     assert "no small cycle was found" in nothing.end

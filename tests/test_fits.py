@@ -14,11 +14,11 @@ from scipy.stats import binom
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.lab.comparison import lost
-from steadyslip.lab.fit import finished
-from steadyslip.lab.least_squares import minimise
-from steadyslip.lab.noise import describe, lag_one
-from steadyslip.lab.plan import make_plan
+from steadyslip.experiments.fitting.comparison import lost
+from steadyslip.experiments.fitting.fit import finished
+from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.noise import describe, lag_one
 
 BASALT, SEPIOLITE = (f"examples/data/{name}_velocity_step.txt" for name in ("basalt_b819", "sepiolite_013"))
 

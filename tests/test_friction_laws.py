@@ -9,7 +9,7 @@ import sympy as sp
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
-from steadyslip.expressions import array_function, asinh_exp, numpy_asinh_exp
+from steadyslip.core.expressions import array_function, asinh_exp, numpy_asinh_exp
 from steadyslip.linear.linearise import characteristic_coefficients
 from steadyslip.linear.response import response
 from steadyslip.testing import FRICTION_CHECKS, Conditions

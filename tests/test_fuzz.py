@@ -3,7 +3,7 @@
 import pytest
 
 import fuzz_rigs
-from steadyslip.config import rig_from_text
+from steadyslip.files.specifications import rig_from_text
 
 
 @pytest.mark.parametrize("seed", range(4))

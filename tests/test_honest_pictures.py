@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 
 import steadyslip as ss
 from dimensionless import unit_rig
+from steadyslip.core.quantities import percent
+from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.map_axes import Scale, spaced_by_ratio
-from steadyslip.lab.predict import probability_text
-from steadyslip.quantities import percent
-from steadyslip.sweep.view import _quantiles, _with_failures
+from steadyslip.maps.view.cut import _quantiles, _with_failures
 
 
 @pytest.mark.parametrize("ratio", [2.0, 9.0, 1e4])

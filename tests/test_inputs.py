@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from steadyslip.inputs import UnreadableFile, read_bytes
+from steadyslip.files.inputs import UnreadableFile, read_bytes
 
 
 def test_a_regular_file_comes_whole(tmp_path):

@@ -9,13 +9,13 @@ from dimensionless import unit_rig
 from kicks_at_random import KINDS, Reference, drawn, outcome_of
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.motion.setup import Options, prepare
-from steadyslip.nonlinear import outcomes as outcomes_module
-from steadyslip.nonlinear.brackets import threshold_brackets
-from steadyslip.nonlinear.closed_orbits import _attraction
-from steadyslip.nonlinear.kicks import Kicked
-from steadyslip.nonlinear.neighbourhood import Neighbourhood, rates_at
-from steadyslip.nonlinear.outcomes import BLOW_UP, OUTCOMES, RETURNS, UNDECIDED
-from steadyslip.nonlinear.rest import rest_of
+from steadyslip.nonlinear.kicks import outcomes as outcomes_module
+from steadyslip.nonlinear.kicks.brackets import threshold_brackets
+from steadyslip.nonlinear.kicks.closed_orbits import _attraction
+from steadyslip.nonlinear.kicks.kicks import Kicked
+from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood, rates_at
+from steadyslip.nonlinear.kicks.outcomes import BLOW_UP, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.rest import rest_of
 
 STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
 
@@ -209,7 +209,7 @@ def doubtful(low, high, limit):
 
 def test_doubt_is_carried_through(monkeypatch):
     a_rig = tilted(0.3, 1.2)
-    monkeypatch.setattr("steadyslip.nonlinear.kicks.outcomes_of", doubtful(5.0, 6.0, 5.5))
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(5.0, 6.0, 5.5))
     found = ss.threshold(a_rig, "displacement")
     assert (found.decided, found.outcome) == (False, "blow-up")
     assert found.bracket == pytest.approx((5.0, 6.0), rel=0.02)
@@ -229,10 +229,10 @@ def test_doubt_is_carried_through(monkeypatch):
 
 def test_narrow_doubt_leaves_a_threshold_and_endless_doubt_none(monkeypatch):
     a_rig = tilted(0.3, 1.2)
-    monkeypatch.setattr("steadyslip.nonlinear.kicks.outcomes_of", doubtful(5.0, 5.1, 5.05))
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(5.0, 5.1, 5.05))
     size = ss.threshold_map(a_rig, {"mass": np.zeros(1)}, "displacement")
     assert size[0] == pytest.approx(5.05, rel=0.03)
-    monkeypatch.setattr("steadyslip.nonlinear.kicks.outcomes_of", doubtful(5.0, np.inf, 1e9))
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(5.0, np.inf, 1e9))
     found = ss.threshold(a_rig, "displacement")
     assert np.isnan(found.size)
     assert "undecided beyond" in str(found)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.lab.spec import spec_from_text
+from steadyslip.experiments.spec import spec_from_text
 from steadyslip.report import fit_report
 from test_command_line import run
 

@@ -9,12 +9,12 @@ import pytest
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.compiled.experiment import ExperimentProgram
-from steadyslip.compiled.program import Program
-from steadyslip.compiled.reduction import reduce_model
-from steadyslip.lab.forward import Forward
-from steadyslip.lab.inputs import MeasuredInputs, Sharp, sharp_changes
-from steadyslip.lab.plan import make_plan
+from steadyslip.experiments.fitting.forward import Forward
+from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_changes
+from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.kernels.experiment import ExperimentProgram
+from steadyslip.kernels.program import Program
+from steadyslip.kernels.reduction import reduce_model
 from steadyslip.motion.setup import Jobs
 
 CONSTANT = ss.Constant(steady_normal_stress=lab.STRESS)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from steadyslip.lab.commanded import CommandedInputs
-from steadyslip.lab.kinks import load_course, smooth_load
-from steadyslip.lab.loading import Loading, shifted
-from steadyslip.lab.pressing import oscillation, stress_course
+from steadyslip.experiments.fitting.commanded import CommandedInputs
+from steadyslip.experiments.loading.kinks import load_course, smooth_load
+from steadyslip.experiments.loading.loading import Loading, shifted
+from steadyslip.experiments.loading.pressing import oscillation, stress_course
 
 STEPS = [(40.3, 1.0, 3.0), (80.1, 3.0, 10.0), (121.7, 10.0, 3.0), (160.2, 3.0, 1.0)]
 HOLDS = [(30.3, 1.0, 0.0), (40.3, 0.0, 1.0), (90.1, 1.0, 0.0), (120.2, 0.0, 1.0)]

@@ -123,7 +123,7 @@ def test_what_is_wrong_on_a_worker_is_said(tmp_path):
 
 
 def test_no_scheduler_is_said(tmp_path, monkeypatch):
-    monkeypatch.setattr("steadyslip.sweep.cluster.CONNECT", 0.5)
+    monkeypatch.setattr("steadyslip.maps.work.cluster.CONNECT", 0.5)
     plan = ss.Map(attack.rig(), {"stiffness": ss.Grid(1e9, 2e9, 4)}, ["status"])
     with pytest.raises(ss.NotAvailable, match=r"no Dask scheduler at 'tcp://127\.0\.0\.1:9'"):
         ss.run_map(plan, tmp_path / "map.zarr", cluster="tcp://127.0.0.1:9")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from steadyslip.sweep.view import axes_of, take
+from steadyslip.maps.view.cut import axes_of, take
 
 matplotlib.use("Agg")
 

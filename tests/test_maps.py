@@ -16,10 +16,10 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from dimensionless import unit_rig
-from steadyslip.nonlinear.onset import onset_map
-from steadyslip.sweep.axes import LARGEST_HYPERCUBE, make_sampling
-from steadyslip.sweep.plan import roles
-from steadyslip.sweep.work import do_chunk, job_of
+from steadyslip.maps.plan.axes import LARGEST_HYPERCUBE, make_sampling
+from steadyslip.maps.plan.map import roles
+from steadyslip.maps.work.chunk import do_chunk, job_of
+from steadyslip.nonlinear.onset.hopf import onset_map
 
 ANGLES = ss.Grid("-80 deg", "80 deg", 41)
 STIFFNESSES = ss.Grid("0.1 GPa/m", "100 GPa/m", 30, "log")
@@ -513,7 +513,7 @@ def test_a_function_that_fails_names_the_point(tmp_path):
 
 
 def test_workers_that_cannot_live_are_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr("steadyslip.sweep.local.PATIENCE", 2)
+    monkeypatch.setattr("steadyslip.maps.work.local.PATIENCE", 2)
 
     def dies(one):
         os.kill(os.getpid(), 9)

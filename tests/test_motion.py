@@ -12,11 +12,11 @@ from scipy.special import lambertw
 import steadyslip as ss
 from dimensionless import MU, A, phi_of, unit_rig, y_of
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.compiled.driver import SLIP_EVENT
-from steadyslip.compiled.program import Program
+from steadyslip.core.records import positive, real
+from steadyslip.kernels.driver import SLIP_EVENT
+from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.setup import Options, prepare
-from steadyslip.records import positive, real
 from test_motion_oracle import LAWS
 
 REFERENCE = Path(__file__).parent / "reference"

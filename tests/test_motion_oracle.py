@@ -6,7 +6,7 @@ import pytest
 import steadyslip as ss
 from oracle import Oracle
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.compiled.program import Program
+from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.observe import observe
 from steadyslip.motion.setup import Options, prepare

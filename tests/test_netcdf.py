@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from scipy.io import netcdf_file
 
-from steadyslip import netcdf
+from steadyslip.files import netcdf
 
 
 @pytest.mark.parametrize("version", [1, 2])

@@ -8,7 +8,7 @@ import steadyslip as ss
 from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, rig
 from steadyslip.linear.boundary import boundary
-from steadyslip.nonlinear.derivatives import taylor
+from steadyslip.nonlinear.onset.derivatives import taylor
 from steadyslip.steady import steady_stress
 from steadyslip.values import model_values
 from test_motion_oracle import LAWS

@@ -4,7 +4,7 @@ import pytest
 
 import steadyslip
 from steadyslip import figures, pictures
-from steadyslip.errors import NotAvailable
+from steadyslip.core.errors import NotAvailable
 
 
 def results_with_a_picture():

@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from protocols_at_random import protocols, spans
-from steadyslip.config import piece_from_text, protocol_from_text, read_protocol, write_rig
+from steadyslip.files.specifications import piece_from_text, protocol_from_text, read_protocol, write_rig
 from steadyslip.protocol import (
     DisturbanceStep,
     DisturbanceTable,

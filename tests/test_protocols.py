@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from protocols_at_random import drives, others, protocols, sizes, spans, tables, times
+from steadyslip.core.records import parameters, replaced, shape_of, twin
 from steadyslip.protocol import (
     DisplacementStep,
     DisturbanceHarmonic,
@@ -27,7 +28,6 @@ from steadyslip.protocol import (
     pack,
 )
 from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
-from steadyslip.records import parameters, replaced, shape_of, twin
 
 UNTIL = 64.0
 

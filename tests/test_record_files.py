@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from steadyslip.lab.columns import _guessed_role as role, split_name
-from steadyslip.lab.moments import from_the_first, moment
+from steadyslip.experiments.measured.columns import _guessed_role as role, split_name
+from steadyslip.experiments.measured.moments import from_the_first, moment
 
 ROWS = 60
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings, strategies as st
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.lab.columns import split_name
-from steadyslip.lab.kinks import load_course
-from steadyslip.lab.pressing import oscillation
-from steadyslip.lab.record import transient_rows
+from steadyslip.experiments.loading.kinks import load_course
+from steadyslip.experiments.loading.pressing import oscillation
+from steadyslip.experiments.measured.columns import split_name
+from steadyslip.experiments.measured.record import transient_rows
 
 
 @pytest.fixture(scope="module")
@@ -336,7 +336,7 @@ def test_standing_values_may_be_numbers_of_numpy():
 
 
 def test_a_value_that_is_set_is_not_fitted():
-    from steadyslip.lab.spec import spec_from_text
+    from steadyslip.experiments.spec import spec_from_text
 
     for name in ("stiffness", "slider.stiffness"):
         spec = spec_from_text("[friction]\nevolution = 'slip'\n", "spec", [f"{name}=2 GPa/m"])

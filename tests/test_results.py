@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import rig
-from steadyslip.results import ReadOnly
+from steadyslip.core.results import ReadOnly
 
 
 def arrays(value):

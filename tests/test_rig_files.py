@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
-from steadyslip.config import protocol_from_text
-from steadyslip.config.layout import own_fields, sections
-from steadyslip.config.lines import key_lines, line_of
+from steadyslip.core.records import Option, Parameter, Role
+from steadyslip.files.specifications import protocol_from_text
+from steadyslip.files.specifications.layout import own_fields, sections
+from steadyslip.files.specifications.lines import key_lines, line_of
 from steadyslip.protocol import Piece
-from steadyslip.records import Option, Parameter, Role
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import steadyslip as ss
-from steadyslip.config import protocol_from_text
+from steadyslip.files.specifications import protocol_from_text
 from steadyslip.protocol import pack
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"

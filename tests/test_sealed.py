@@ -5,8 +5,8 @@ import re
 import pytest
 from hypothesis import given, strategies as st
 
-from steadyslip.errors import NotAvailable
-from steadyslip.sealed import Kind, read_sealed, seal, unseal, write_sealed
+from steadyslip.core.errors import NotAvailable
+from steadyslip.files.sealed import Kind, read_sealed, seal, unseal, write_sealed
 
 RUN = Kind("run", 2, 1000, "simulate again")
 

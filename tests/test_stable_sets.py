@@ -9,12 +9,12 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, D_C, EPS, ONE_MEMORY, SIGMA, V0, A, rate_state, rig
+from steadyslip.core.quantities import unit
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.state_space import jacobian
 from steadyslip.linear.stiffness import characteristic, closed_form_interval, general_set
 from steadyslip.model import build_model
-from steadyslip.quantities import unit
 from steadyslip.values import model_values
 
 

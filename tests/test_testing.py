@@ -8,7 +8,7 @@ import sympy as sp
 
 import steadyslip as ss
 from steadyslip import testing
-from steadyslip.records import positive, real
+from steadyslip.core.records import positive, real
 from steadyslip.testing import Conditions, ContractViolation, Surroundings
 from steadyslip.testing.precise import disagreement
 
@@ -192,7 +192,7 @@ def test_law_must_be_registered():
 
 def test_wrong_fdiff_is_caught(monkeypatch):
     """The one primitive that differentiates itself."""
-    from steadyslip.expressions import asinh_exp
+    from steadyslip.core.expressions import asinh_exp
 
     monkeypatch.setattr(asinh_exp, "fdiff", lambda self, argindex=1: sp.Integer(1))
     law = ss.RateState(a=0.0123, b=0.02, d_c=1e-6, mu_ref=0.61, v_ref=1e-6, regularised=True)

@@ -7,7 +7,7 @@ import pytest
 import steadyslip as ss
 from dimensionless import unit_rig
 from rigs_of_theory import rate_state, rig
-from steadyslip.errors import ParameterError
+from steadyslip.core.errors import ParameterError
 from steadyslip.linear.polynomials import roots
 from words_at_random import false_sentences, some_rig
 

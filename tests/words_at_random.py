@@ -12,11 +12,11 @@ import warnings
 import numpy as np
 
 import steadyslip as ss
-from steadyslip.analysis.causes import why_none
-from steadyslip.errors import NoSteadySliding, NotAvailable, ParameterError
-from steadyslip.friction.normal_memory import NoMemory
-from steadyslip.friction.rate_state import State
+from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
+from steadyslip.laws.friction.normal_memory import NoMemory
+from steadyslip.laws.friction.rate_state import State
 from steadyslip.linear.state_space import jacobian
+from steadyslip.verdict.causes import why_none
 
 V0 = 1e-6
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import steadyslip
 from steadyslip import figures
-from steadyslip.config.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.core.quantities import is_per_area, total_unit
+from steadyslip.core.records import Option, Parameter, Part, Record, Samples
+from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
-from steadyslip.quantities import is_per_area, total_unit
-from steadyslip.records import Option, Parameter, Part, Record, Samples
-from steadyslip.slider import Slider
 
 HERE = Path(__file__).parent
 
@@ -135,26 +135,27 @@ section 3 of [Equations and where they live](equations.md). This page is written
 """
 GROUPS = {
     "": "Modules",
-    "analysis": "The verdict",
-    "config": "Rig files",
-    "contact": "Contact laws",
-    "drive": "Drives",
-    "errors": "Exceptions",
-    "friction": "Friction laws",
-    "lab": "Records and fits",
+    "verdict": "The verdict",
+    "files.specifications": "Rig files",
+    "laws.contact": "Contact laws",
+    "machine.drive": "Drives",
+    "core.errors": "Exceptions",
+    "laws.friction": "Friction laws",
+    "experiments": "Records and fits",
     "linear": "Linear stability",
     "model": "The Model",
     "motion": "Motion",
     "nonlinear": "Beyond the edge",
     "protocol": "Protocols of experiments",
-    "records": "To declare a law of your own",
-    "slider": "The rig",
+    "core.records": "To declare a law of your own",
+    "machine.slider": "The rig",
     "steady": "Steady sliding",
-    "sweep": "Maps",
+    "maps": "Maps",
 }
 ORDER = (
-    *("slider", "friction", "contact", "drive", "protocol", "config"),
-    *("analysis", "steady", "linear", "model", "records"),
+    *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
+    *("verdict", "steady", "linear", "model", "core.records"),
+    *("core.errors", "experiments", "motion", "nonlinear", "maps"),
 )
 MODULES = {
     "figures": tuple(name for name in figures.__all__ if name.islower()),

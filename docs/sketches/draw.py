@@ -1,6 +1,6 @@
 """Draws the sketches beside this file: ``python docs/sketches/draw.py [folder] [svg|png]``.
 
-One function for each mechanism of `steadyslip.contact`; geometry and signs are those of its docstrings.
+One function for each mechanism of `steadyslip.laws.contact`; geometry and signs are those of its docstrings.
 Blue: motion. Red: stresses on the block. Black: bodies. Green: angles and lengths.
 """
 

@@ -15,7 +15,7 @@ from importlib import import_module
 
 import lazy_loader
 
-from steadyslip import pictures
+from steadyslip.core import pictures
 
 pictures.figures_from(lambda: import_module("steadyslip.figures"))  # the one place that knows both
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,43 +1,7 @@
 # The public names: read by type checkers, and by __init__.py, which loads them on first use.
 
 from . import figures as figures, testing as testing, units as units
-from .analysis import (
-    Analysis as Analysis,
-    analyze as analyze,
-)
-from .config import (
-    json_schema as json_schema,
-    piece_from_text as piece_from_text,
-    protocol_from_text as protocol_from_text,
-    read_protocol as read_protocol,
-    read_rig as read_rig,
-    rig_from_text as rig_from_text,
-    rig_to_text as rig_to_text,
-    write_rig as write_rig,
-)
-from .contact import (
-    Constant as Constant,
-    ContactLaw as ContactLaw,
-    DilatingLayer as DilatingLayer,
-    InclinedSpring as InclinedSpring,
-    LeadScrew as LeadScrew,
-    Lift as Lift,
-    Linear as Linear,
-    Motion as Motion,
-    PreloadedContact as PreloadedContact,
-    Prescribed as Prescribed,
-    SelfEnergising as SelfEnergising,
-    SliderCrank as SliderCrank,
-    SlopedGuide as SlopedGuide,
-    Triaxial as Triaxial,
-)
-from .drive import (
-    PD as PD,
-    PID as PID,
-    Drive as Drive,
-    Steady as Steady,
-)
-from .errors import (
+from .core.errors import (
     NoSteadySliding as NoSteadySliding,
     NotAvailable as NotAvailable,
     ParameterError as ParameterError,
@@ -46,23 +10,14 @@ from .errors import (
     SteadyslipError as SteadyslipError,
     UnknownNameError as UnknownNameError,
 )
-from .friction import (
-    PRZ as PRZ,
-    Aging as Aging,
-    CoulombStribeck as CoulombStribeck,
-    Evolution as Evolution,
-    FrictionLaw as FrictionLaw,
-    LinkerDieterich as LinkerDieterich,
-    LuGre as LuGre,
-    Nagata as Nagata,
-    NoMemory as NoMemory,
-    NormalMemory as NormalMemory,
-    PrakashClifton as PrakashClifton,
-    RateState as RateState,
-    Slip as Slip,
-    State as State,
+from .core.records import (
+    option as option,
+    parameter as parameter,
+    part as part,
+    parts as parts,
+    samples as samples,
 )
-from .lab import (
+from .experiments import (
     Draws as Draws,
     Estimate as Estimate,
     Fit as Fit,
@@ -89,6 +44,48 @@ from .lab import (
     read_spec as read_spec,
     record_from_arrays as record_from_arrays,
 )
+from .files.specifications import (
+    json_schema as json_schema,
+    piece_from_text as piece_from_text,
+    protocol_from_text as protocol_from_text,
+    read_protocol as read_protocol,
+    read_rig as read_rig,
+    rig_from_text as rig_from_text,
+    rig_to_text as rig_to_text,
+    write_rig as write_rig,
+)
+from .laws.contact import (
+    Constant as Constant,
+    ContactLaw as ContactLaw,
+    DilatingLayer as DilatingLayer,
+    InclinedSpring as InclinedSpring,
+    LeadScrew as LeadScrew,
+    Lift as Lift,
+    Linear as Linear,
+    Motion as Motion,
+    PreloadedContact as PreloadedContact,
+    Prescribed as Prescribed,
+    SelfEnergising as SelfEnergising,
+    SliderCrank as SliderCrank,
+    SlopedGuide as SlopedGuide,
+    Triaxial as Triaxial,
+)
+from .laws.friction import (
+    PRZ as PRZ,
+    Aging as Aging,
+    CoulombStribeck as CoulombStribeck,
+    Evolution as Evolution,
+    FrictionLaw as FrictionLaw,
+    LinkerDieterich as LinkerDieterich,
+    LuGre as LuGre,
+    Nagata as Nagata,
+    NoMemory as NoMemory,
+    NormalMemory as NormalMemory,
+    PrakashClifton as PrakashClifton,
+    RateState as RateState,
+    Slip as Slip,
+    State as State,
+)
 from .linear import (
     Boundary as Boundary,
     Margin as Margin,
@@ -105,6 +102,33 @@ from .linear import (
     stable_stiffness as stable_stiffness,
     state_space as state_space,
     to_control as to_control,
+)
+from .machine.drive import (
+    PD as PD,
+    PID as PID,
+    Drive as Drive,
+    Steady as Steady,
+)
+from .machine.slider import (
+    Slider as Slider,
+)
+from .maps import (
+    Events as Events,
+    Grid as Grid,
+    KickThreshold as KickThreshold,
+    Map as Map,
+    MapResult as MapResult,
+    Measure as Measure,
+    Refined as Refined,
+    Samples as Samples,
+    Sensitivity as Sensitivity,
+    map_from_text as map_from_text,
+    measure as measure,
+    open_map as open_map,
+    read_map as read_map,
+    refine as refine,
+    run_map as run_map,
+    sensitivity as sensitivity,
 )
 from .model import (
     Model as Model,
@@ -159,38 +183,14 @@ from .protocol import (
     VelocityRamp as VelocityRamp,
     VelocityStep as VelocityStep,
 )
-from .records import (
-    option as option,
-    parameter as parameter,
-    part as part,
-    parts as parts,
-    samples as samples,
-)
-from .slider import (
-    Slider as Slider,
-)
 from .steady import (
     SteadySliding as SteadySliding,
     steady_state as steady_state,
     steady_states as steady_states,
 )
-from .sweep import (
-    Events as Events,
-    Grid as Grid,
-    KickThreshold as KickThreshold,
-    Map as Map,
-    MapResult as MapResult,
-    Measure as Measure,
-    Refined as Refined,
-    Samples as Samples,
-    Sensitivity as Sensitivity,
-    map_from_text as map_from_text,
-    measure as measure,
-    open_map as open_map,
-    read_map as read_map,
-    refine as refine,
-    run_map as run_map,
-    sensitivity as sensitivity,
+from .verdict import (
+    Analysis as Analysis,
+    analyze as analyze,
 )
 
 __version__: str

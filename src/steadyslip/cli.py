@@ -25,7 +25,7 @@ RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="rig file (TOML); s
 
 def say(text: str) -> None:
     """Print an answer; that it cannot be written is an error like any other."""
-    from steadyslip.output import answering
+    from steadyslip.files.output import answering
 
     with answering():
         typer.echo(text)
@@ -68,8 +68,8 @@ def analyze(
     ] = None,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
-    from steadyslip.analysis import analyze as run
-    from steadyslip.config import read_rig
+    from steadyslip.files.specifications import read_rig
+    from steadyslip.verdict import analyze as run
 
     if fitted is not None:
         _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, branch)
@@ -94,7 +94,7 @@ def analyze(
 
 
 def _formula(result: Any) -> dict[str, str | None]:
-    from steadyslip.errors import NotAvailable
+    from steadyslip.core.errors import NotAvailable
 
     try:
         return {"formula": str(result.formula().rhs)}
@@ -103,7 +103,7 @@ def _formula(result: Any) -> dict[str, str | None]:
 
 
 def _echo_formula(result: Any) -> None:
-    from steadyslip.errors import NotAvailable
+    from steadyslip.core.errors import NotAvailable
 
     try:
         equation = result.formula()
@@ -123,10 +123,10 @@ def _predicted(
     branch: int,
 ) -> None:
     """The verdict with the friction of a fit: that of the best values, and its probability."""
-    from steadyslip.analysis import analyze as run
-    from steadyslip.config import read_rig
-    from steadyslip.errors import ParameterError, Problem
-    from steadyslip.lab import load_fit, predict
+    from steadyslip.core.errors import ParameterError, Problem
+    from steadyslip.experiments import load_fit, predict
+    from steadyslip.files.specifications import read_rig
+    from steadyslip.verdict import analyze as run
 
     if branch:
         message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
@@ -166,10 +166,10 @@ def fit(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """Which friction do these records show, and how sure is that?"""
-    from steadyslip.errors import ParameterError, Problem
-    from steadyslip.lab import bootstrap as resample, fit_files
-    from steadyslip.lab.commands import ENDINGS, as_json as plain, split_files, write_fit
-    from steadyslip.output import check_output
+    from steadyslip.core.errors import ParameterError, Problem
+    from steadyslip.experiments import bootstrap as resample, fit_files
+    from steadyslip.experiments.commands import ENDINGS, as_json as plain, split_files, write_fit
+    from steadyslip.files.output import check_output
     from steadyslip.report import fit_report
 
     check_output(output or (), ENDINGS)
@@ -231,8 +231,8 @@ def simulate(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """What does this rig do, under the protocol of its file and of the command line?"""
+    from steadyslip.files.output import check_output
     from steadyslip.motion.commands import ENDINGS, run_file, write_history
-    from steadyslip.output import check_output
 
     check_output(output or (), ENDINGS)
     history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol)
@@ -259,8 +259,8 @@ def cycles(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
+    from steadyslip.files.output import check_output
     from steadyslip.nonlinear.commands import ENDINGS, cycles_of_file, write_branch
-    from steadyslip.output import check_output
 
     check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings)
@@ -288,8 +288,8 @@ def threshold(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON list in SI units")] = False,
 ) -> None:
     """How large a kick does steady sliding survive?"""
+    from steadyslip.files.output import FIGURES, check_output
     from steadyslip.nonlinear.commands import thresholds_of_file, write_basin
-    from steadyslip.output import FIGURES, check_output
 
     check_output(output or (), FIGURES)
     found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
@@ -318,8 +318,8 @@ def map_(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
 ) -> None:
     """Any analysis over many rigs, kept on disk; the same command again goes on after an interruption."""
-    from steadyslip.sweep import refine as refined
-    from steadyslip.sweep.commands import STORE, map_file, write_map
+    from steadyslip.maps import refine as refined
+    from steadyslip.maps.commands import STORE, map_file, write_map
 
     figure: dict[str, Any] = {"x": x, "y": y, "show": show, "facet": facet}
     about: dict[str, Any] = {"of": of, "level": level}
@@ -359,8 +359,8 @@ def sensitivity(
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
 ) -> None:
     """Which parameters decide? Sobol indices over the ranges of the file's [map]."""
-    from steadyslip.output import FIGURES, check_output, write_by_ending
-    from steadyslip.sweep.commands import sensitivity_file
+    from steadyslip.files.output import FIGURES, check_output, write_by_ending
+    from steadyslip.maps.commands import sensitivity_file
 
     check_output(output or (), FIGURES)
     found = sensitivity_file(rig, changes or (), of or (), points)
@@ -401,7 +401,7 @@ def schema() -> None:
     """Print the JSON schema of rig files."""
     import json
 
-    from steadyslip.config import json_schema
+    from steadyslip.files.specifications import json_schema
 
     say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
 
@@ -420,8 +420,8 @@ def main() -> None:
 
 def _status(command: Callable[[], object]) -> int:
     """Run, and turn everything that can happen into a status."""
-    from steadyslip.errors import SteadyslipError
-    from steadyslip.output import OutputClosed
+    from steadyslip.core.errors import SteadyslipError
+    from steadyslip.files.output import OutputClosed
 
     status = 0
     try:
@@ -439,7 +439,7 @@ def _status(command: Callable[[], object]) -> int:
     except OSError as error:
         status = _failed(_system_fault(error), 2)
         if error.filename is None:  # the output itself: what is still buffered would fail once more
-            from steadyslip.output import discard_output
+            from steadyslip.files.output import discard_output
 
             discard_output()
     except Exception as error:
@@ -471,7 +471,7 @@ def _failed(message: str, status: int) -> int:
 
 def _flushed(status: int) -> int:
     """What is left in the buffers must go out now: later nobody could say that it did not."""
-    from steadyslip.output import discard_output
+    from steadyslip.files.output import discard_output
 
     try:
         if sys.stdout is not None:

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
-from steadyslip.expressions import array_function
+from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
+from steadyslip.core.expressions import array_function
+from steadyslip.core.quantities import shown, stress_name
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.quantities import shown, stress_name
-from steadyslip.slider import Slider
 from steadyslip.values import Values, model_values
 
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem, QuantityError, UnknownNameError
-from steadyslip.expressions import array_function
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError
+from steadyslip.core.expressions import array_function
+from steadyslip.core.quantities import parse
+from steadyslip.core.records import Parameter, Record, conditions, twin
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
-from steadyslip.quantities import parse
-from steadyslip.records import Parameter, Record, conditions, twin
-from steadyslip.slider import Slider
 
 Vary = Mapping[str, Any]
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-from steadyslip.analysis import Analysis
+from steadyslip.core.pictures import register_figures
+from steadyslip.experiments import Draws, Fit, Prediction, Record
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.lab import corner, fit, prediction, record
@@ -18,11 +19,10 @@ from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
-from steadyslip.lab import Draws, Fit, Prediction, Record
+from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
 from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
-from steadyslip.pictures import register_figures
-from steadyslip.sweep import MapResult, Refined, Sensitivity
+from steadyslip.verdict import Analysis
 
 __all__ = [
     "ANGLES",

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.records import Parameter
 from steadyslip.figures.style import display_unit, labelled
 from steadyslip.linear import boundary
-from steadyslip.records import Parameter
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.values import checked_array
 
 _AROUND = 20.0  # a positive parameter is shown from its value (or edge) divided by this, to it times this

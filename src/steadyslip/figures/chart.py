@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures import regions
 from steadyslip.figures.axis import Axis, axis
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.steady import explain_absence
 from steadyslip.values import model_values
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures import mass
 from steadyslip.figures.style import BLACK, CURVES, LINES, axes_or_new, labelled
 from steadyslip.linear import boundary
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.units import deg
 
 ANGLES = tuple(degrees * deg for degrees in (-45, -30, 0, 30, 45))

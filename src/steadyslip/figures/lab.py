@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem
+from steadyslip.core.quantities import percent
+from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -21,11 +23,9 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
-from steadyslip.lab.predict import probability_text
-from steadyslip.quantities import percent
 
 if TYPE_CHECKING:
-    from steadyslip.lab import Draws, Fit, Prediction, Record
+    from steadyslip.experiments import Draws, Fit, Prediction, Record
 
 MOST_DRAWN = 4000  # points of a record; more would not be seen
 
@@ -133,7 +133,7 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     -------
     ndarray of matplotlib.axes.Axes
     """
-    from steadyslip.lab import Draws, normal_draws
+    from steadyslip.experiments import Draws, normal_draws
 
     draws = result if isinstance(result, Draws) else None
     source = draws.fit if draws is not None else result

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures.style import BLACK, VERMILION, axes_or_new, display_unit, labelled
 from steadyslip.linear import critical_stiffness, eigenvalues, stable_stiffness
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.steady import steady_state
 from steadyslip.values import checked_array, model_values
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from steadyslip.core.quantities import percent, stress_name
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -21,9 +22,8 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
-from steadyslip.quantities import percent, stress_name
-from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.view import FAILING, View
+from steadyslip.maps.view.cut import FAILING, View
+from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
 MANY = 100.0  # ratio from which on an axis or colour scale is logarithmic

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures.map_axes import KINDS, Scale, missing_note, place_axes, shown_name
 from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, labelled
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
-from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.view import View, own_value
+from steadyslip.maps.view.cut import View, own_value
+from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
 

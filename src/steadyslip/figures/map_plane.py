@@ -12,14 +12,14 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from steadyslip.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.quantities import shown
 from steadyslip.figures.chart import absence_reasons
 from steadyslip.figures.map_axes import KINDS, MANY, Scale, entry, missing_note, place_axes, short, shown_name
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, display_unit, labelled
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
-from steadyslip.quantities import shown
-from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.view import View, own_value
+from steadyslip.maps.view.cut import View, own_value
+from steadyslip.maps.view.result import MapResult
 
 Array = np.ndarray
 SAFETY = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import InternalError, ParameterError, Problem
+from steadyslip.core.errors import InternalError, ParameterError, Problem
 from steadyslip.figures.map_axes import KINDS, legend, place_axes, short
 from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new
-from steadyslip.sweep.refine import Refined
-from steadyslip.sweep.sensitivity import Sensitivity
-from steadyslip.sweep.view import View, own_value
+from steadyslip.maps.refine import Refined
+from steadyslip.maps.sensitivity import Sensitivity
+from steadyslip.maps.view.cut import View, own_value
 
 
 def refined(found: Refined, ax: Axes | None = None) -> Axes:

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.errors import ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import resolve
 from steadyslip.figures.map_axes import legend, short, shown_name
 from steadyslip.figures.map_curves import curve, scatter
 from steadyslip.figures.map_plane import colour_scale, plane
 from steadyslip.figures.style import axes_or_new
-from steadyslip.quantities import shown
-from steadyslip.records import resolve
-from steadyslip.sweep.result import MapResult
-from steadyslip.sweep.view import View, axes_of, take
+from steadyslip.maps.view.cut import View, axes_of, take
+from steadyslip.maps.view.result import MapResult
 
 FACETS = 6
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.contact import InclinedSpring
-from steadyslip.errors import NotAvailable
+from steadyslip.core.errors import NotAvailable
+from steadyslip.laws.contact import InclinedSpring
 from steadyslip.linear import critical_stiffness
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.steady import steady_stress
 from steadyslip.values import model_values
 

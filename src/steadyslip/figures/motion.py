@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from steadyslip.compiled.driver import SLIP_EVENT
-from steadyslip.errors import NoSteadySliding, ParameterError, Problem
+from steadyslip.core.errors import NoSteadySliding, ParameterError, Problem
+from steadyslip.core.quantities import shown, stress_name
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -23,9 +23,9 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
+from steadyslip.kernels.driver import SLIP_EVENT
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
-from steadyslip.quantities import shown, stress_name
 from steadyslip.steady import steady_state
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures.map_axes import spaced_by_ratio
 from steadyslip.figures.style import (
     BLACK,

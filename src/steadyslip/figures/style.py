@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from steadyslip.quantities import outside, shown, unit
+from steadyslip.core.quantities import outside, shown, unit
 
 # Okabe & Ito (2008): told apart with every common kind of colour vision
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.records import Parameter
 from steadyslip.linear.search import Boundary, Search
-from steadyslip.records import Parameter
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.values import checked_array, model_values
 
 

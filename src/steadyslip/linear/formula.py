@@ -11,8 +11,8 @@ import sympy as sp
 
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
-from steadyslip.slider import Slider
 
 LONGEST = 4.0
 """Seconds for each of two simplifications; what takes longer is left as it stands."""

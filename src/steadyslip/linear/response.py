@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.errors import NotAvailable
-from steadyslip.expressions import array_function
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import array_function
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import quietly
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
 from steadyslip.values import Values, Vary, model_values
 

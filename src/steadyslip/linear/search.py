@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import NoSteadySliding
+from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.quantities import shown, unit
 from steadyslip.linear.linearise import linearise
 from steadyslip.linear.polynomials import damping_measures, roots
 from steadyslip.linear.response import memory_symbols
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
-from steadyslip.quantities import shown, unit
-from steadyslip.slider import Slider
+from steadyslip.machine.slider import Slider
 from steadyslip.steady import explain_absence, steady_stress
 from steadyslip.values import Values, model_values
 

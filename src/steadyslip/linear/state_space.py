@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.errors import NotAvailable, UnknownNameError
-from steadyslip.expressions import array_function
+from steadyslip.core.errors import NotAvailable, UnknownNameError
+from steadyslip.core.expressions import array_function
 from steadyslip.linear.linearise import linearise
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.slider import Slider
 from steadyslip.steady import explain_absence, steady_stress_roots
 from steadyslip.values import model_values
 

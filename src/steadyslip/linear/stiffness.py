@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.expressions import array_function
+from steadyslip.core.expressions import array_function
 from steadyslip.linear import cubic
 from steadyslip.linear.linearise import characteristic_coefficients, stiffness_split
 from steadyslip.linear.polynomials import StableSet, quietly, roots, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.slider import Slider
 from steadyslip.steady import steady_equation, steady_stress
 from steadyslip.values import Values, Vary, model_values
 

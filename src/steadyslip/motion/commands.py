@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from steadyslip.config import piece_from_text, read_protocol, read_rig
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.progress import progress_text
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import Parameter, checked_number, positive
+from steadyslip.files.output import FIGURES, write_by_ending
+from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
 from steadyslip.motion.result import History
 from steadyslip.motion.single import simulate
-from steadyslip.output import FIGURES, write_by_ending
-from steadyslip.progress import progress_text
 from steadyslip.protocol import Protocol
-from steadyslip.quantities import shown
-from steadyslip.records import Parameter, checked_number, positive
 
 ENDINGS = (".nc", ".csv", *FIGURES)
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.compiled import driver
-from steadyslip.compiled.layout import LOG_COLUMNS, Cursor, Final, Row, Setting
-from steadyslip.compiled.program import STATUSES, TALLY, Program
+from steadyslip.kernels import driver
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Row, Setting
+from steadyslip.kernels.program import STATUSES, TALLY, Program
 from steadyslip.motion.setup import Jobs
 
 LANES = 24  # three vectors of eight doubles, see compiled.kernel

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.compiled.program import LOG_KINDS
+from steadyslip.kernels.program import LOG_KINDS
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.compiled.program import STATUSES, TALLY
-from steadyslip.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.progress import progress_bar
+from steadyslip.core.records import resolve
+from steadyslip.core.results import ReadOnly
+from steadyslip.kernels.program import STATUSES, TALLY
+from steadyslip.machine.slider import Slider
 from steadyslip.motion.engine import (
     ILL_POSED,
     INTERRUPTED,
@@ -25,11 +29,7 @@ from steadyslip.motion.observe import observable_units, observe, out_of_range, s
 from steadyslip.motion.setup import Jobs, Options, prepare
 from steadyslip.motion.single import checked_times
 from steadyslip.motion.status import WORDS
-from steadyslip.progress import progress_bar
 from steadyslip.protocol import Protocol
-from steadyslip.records import resolve
-from steadyslip.results import ReadOnly
-from steadyslip.slider import Slider
 
 REACHED_END = tuple(STATUSES.index(word) for word in ("done", "settled", "periodic"))
 EVENT_UNITS = dict(
@@ -191,7 +191,7 @@ def broadcast_arrays(
 ) -> tuple[dict[str, Any], dict[str, Any], tuple[int, ...], tuple[str, ...], Any]:
     """Flat arrays of equal length by full name, the starting values apart, and the common shape."""
     known = dict.fromkeys(rig.parameters())
-    from steadyslip.records import parameters
+    from steadyslip.core.records import parameters
 
     known |= dict.fromkeys(parameters(plan, "protocol."))
     problems, named = [], {}

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.compiled.program import Program
-from steadyslip.expressions import array_function
+from steadyslip.core.expressions import array_function
+from steadyslip.kernels.program import Program
 from steadyslip.model import Model
 from steadyslip.motion.setup import Jobs
 from steadyslip.protocol import Segments

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import unknown_name
+from steadyslip.core.errors import unknown_name
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import outside, shown, stress_name
+from steadyslip.core.results import ReadOnly
+from steadyslip.machine.slider import Slider
 from steadyslip.motion.events import Event, SlipEvent, slip_events
 from steadyslip.motion.status import remedy
-from steadyslip.pictures import draw
 from steadyslip.protocol import Protocol
-from steadyslip.quantities import outside, shown, stress_name
-from steadyslip.results import ReadOnly
-from steadyslip.slider import Slider
 
 
 @dataclass(frozen=True, eq=False)

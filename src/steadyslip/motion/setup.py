@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.compiled.kernel import Choice
-from steadyslip.compiled.program import Program, program
-from steadyslip.compiled.reduction import TIME, V_LP, P, Q, Reduction, W, reduce_model
-from steadyslip.errors import InternalError, NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.expressions import array_function
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.expressions import array_function
+from steadyslip.core.records import parameters, twin
+from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.program import Program, program
+from steadyslip.kernels.reduction import TIME, V_LP, P, Q, Reduction, W, reduce_model
+from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.protocol import Protocol, Segments, pack
-from steadyslip.records import parameters, twin
-from steadyslip.slider import Slider
 from steadyslip.steady import steady_stress
 from steadyslip.values import Values, check_together, model_values
 
@@ -240,7 +240,7 @@ def _protocol_values(plan: Protocol, given: Mapping[str, Any]) -> dict[str, Any]
 
 def _refuse_singular(rig: Slider, values: Values) -> None:
     """Rates that divide by b = 0 are right in the limit of small motions only."""
-    from steadyslip.friction import RateState
+    from steadyslip.laws.friction import RateState
 
     friction = rig.friction
     if not isinstance(friction, RateState) or not friction._is_scaled() or friction.evolution.name == "slip":

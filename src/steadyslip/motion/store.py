@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.compiled.methods import METHODS
-from steadyslip.compiled.program import LOG_KINDS
-from steadyslip.errors import NotAvailable, SteadyslipError
+from steadyslip.core.errors import NotAvailable, SteadyslipError
+from steadyslip.core.quantities import outside
+from steadyslip.files.sealed import Kind
+from steadyslip.files.tables import Column, Table, write_table
+from steadyslip.kernels.methods import METHODS
+from steadyslip.kernels.program import LOG_KINDS
 from steadyslip.motion.events import Event
 from steadyslip.motion.observe import observable_units
 from steadyslip.motion.status import WORDS
-from steadyslip.quantities import outside
-from steadyslip.sealed import Kind
-from steadyslip.tables import Column, Table, write_table
 
 if TYPE_CHECKING:
     from steadyslip.motion.result import History
@@ -37,7 +37,7 @@ def to_dataset(history: History) -> Any:
     import xarray as xr
 
     from steadyslip import __version__
-    from steadyslip.config import rig_to_text
+    from steadyslip.files.specifications import rig_to_text
 
     variables = {
         name: ("time", values, {"units": history.units[name]}) for name, values in history.data.items() if name != "t"
@@ -85,7 +85,7 @@ def load_history(path: str | PathLike[str]) -> History:
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
     """
-    from steadyslip.config import protocol_from_text, rig_from_text
+    from steadyslip.files.specifications import protocol_from_text, rig_from_text
     from steadyslip.model import build_model
     from steadyslip.motion.result import History
     from steadyslip.protocol import Protocol

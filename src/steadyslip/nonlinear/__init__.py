@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from steadyslip.nonlinear.basin import Basin, basin, orbit
-from steadyslip.nonlinear.brackets import threshold_map
-from steadyslip.nonlinear.branch import Cycle, CycleBranch, SpecialCycle
-from steadyslip.nonlinear.cycles import cycles
-from steadyslip.nonlinear.hopf_curve import HopfCurve, SpecialPoint, hopf_curve
-from steadyslip.nonlinear.onset import Onset, hopf
-from steadyslip.nonlinear.threshold import KickMargin, Threshold, margin_to_kick, threshold
+from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
+from steadyslip.nonlinear.kicks.brackets import threshold_map
+from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold
+from steadyslip.nonlinear.onset.hopf import Onset, hopf
+from steadyslip.nonlinear.onset.hopf_curve import HopfCurve, SpecialPoint, hopf_curve
+from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch, SpecialCycle
+from steadyslip.nonlinear.orbits.cycles import cycles
 
 __all__ = [
     "Basin",

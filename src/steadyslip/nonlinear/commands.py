@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from steadyslip.config import read_rig
-from steadyslip.nonlinear.basin import basin
-from steadyslip.nonlinear.branch import Cycle, CycleBranch
-from steadyslip.nonlinear.cycles import cycles
-from steadyslip.nonlinear.threshold import Threshold, threshold
-from steadyslip.output import FIGURES, write_by_ending, write_dataset
-from steadyslip.progress import progress_text
-from steadyslip.quantities import shown
-from steadyslip.slider import Slider
+from steadyslip.core.progress import progress_text
+from steadyslip.core.quantities import shown
+from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
+from steadyslip.files.specifications import read_rig
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.kicks.basin import basin
+from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
+from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch
+from steadyslip.nonlinear.orbits.cycles import cycles
 
 ENDINGS = (".nc", ".csv", *FIGURES)
 

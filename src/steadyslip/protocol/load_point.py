@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.records import Condition, count, nonnegative, parameter, positive, real, samples
 from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
 from steadyslip.protocol.protocol import Piece
 from steadyslip.protocol.shapes import Harmonic, table_problems
-from steadyslip.records import Condition, count, nonnegative, parameter, positive, real, samples
 
 
 class VelocityStep(Piece, name="velocity-step"):

@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import Record, parameter, parts, positive
 from steadyslip.protocol.curves import Curve, Jump, Wave
-from steadyslip.quantities import shown
-from steadyslip.records import Record, parameter, parts, positive
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
 CHANNELS = 3

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.protocol.curves import Array, Curve, Jump, Wave, chain, column, knots, side_by_side
 from steadyslip.protocol.protocol import CHANNELS, LOAD_POINT, ROUNDING, Protocol
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.errors import Problem
+from steadyslip.core.errors import Problem
+from steadyslip.core.records import Condition, nonnegative, parameter, positive, real, samples
 from steadyslip.protocol.curves import Curve, Wave, column, knots
 from steadyslip.protocol.protocol import Piece
-from steadyslip.records import Condition, nonnegative, parameter, positive, real, samples
 
 
 class StressStep(Piece):

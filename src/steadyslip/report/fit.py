@@ -6,11 +6,11 @@ import html
 import io
 from typing import TYPE_CHECKING, Any
 
-from steadyslip.errors import NotAvailable
+from steadyslip.core.errors import NotAvailable
 
 if TYPE_CHECKING:
-    from steadyslip.lab import Fit
-    from steadyslip.lab.laws import LawComparison
+    from steadyslip.experiments import Fit
+    from steadyslip.experiments.answers.laws import LawComparison
 
 _STYLE = (
     "body{font-family:sans-serif;max-width:60em;margin:2em auto;padding:0 1em;line-height:1.4}"
@@ -33,8 +33,8 @@ def fit_report(fit: Fit, comparison: LawComparison | None = None) -> str:
     str
         HTML that refers to nothing outside itself.
     """
-    from steadyslip.config import rig_to_text
-    from steadyslip.lab.words import warnings
+    from steadyslip.experiments.fitting.words import warnings
+    from steadyslip.files.specifications import rig_to_text
 
     sources = ", ".join(record.source for record in fit.plan.records)
     parts = [f"<h1>Fit to {html.escape(sources)}</h1>", _estimates(fit)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
-from steadyslip.errors import SteadyslipError
+from steadyslip.core.errors import SteadyslipError
 from steadyslip.figures import style
 from steadyslip.reproduce.drawings import FIGURES, PaperFigure
 from steadyslip.reproduce.numbers import PaperTable, Row, paper_table

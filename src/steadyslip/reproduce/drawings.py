@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip import figures
-from steadyslip.contact import Constant
 from steadyslip.figures import style
+from steadyslip.laws.contact import Constant
 from steadyslip.linear import critical_stiffness
+from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
 from steadyslip.protocol import NormalStressStep, VelocityStep
 from steadyslip.reproduce.rig import D_C, V0, paper_rig
-from steadyslip.slider import Slider
 from steadyslip.units import MPa, deg
 
 SIGMA = 5 * MPa

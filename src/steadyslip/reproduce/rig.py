@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from steadyslip.contact import InclinedSpring
-from steadyslip.drive import Steady
-from steadyslip.friction import LinkerDieterich, RateState, Slip
-from steadyslip.slider import Slider
+from steadyslip.laws.contact import InclinedSpring
+from steadyslip.laws.friction import LinkerDieterich, RateState, Slip
+from steadyslip.machine.drive import Steady
+from steadyslip.machine.slider import Slider
 from steadyslip.units import GPa, MPa, deg, m, s, um
 
 D_C = 1 * um

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from steadyslip.contact import ContactLaw
-from steadyslip.friction import FrictionLaw
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.contact import (
     Surroundings,
     check_axis,

@@ -8,11 +8,11 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from steadyslip.contact import ContactLaw, Motion
-from steadyslip.drive import Steady
-from steadyslip.errors import NoSteadySliding
-from steadyslip.friction import FrictionLaw, RateState
-from steadyslip.slider import Slider
+from steadyslip.core.errors import NoSteadySliding
+from steadyslip.laws.contact import ContactLaw, Motion
+from steadyslip.laws.friction import FrictionLaw, RateState
+from steadyslip.machine.drive import Steady
+from steadyslip.machine.slider import Slider
 from steadyslip.steady import steady_states
 from steadyslip.testing.precise import (
     DIGITS,
@@ -154,7 +154,7 @@ def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS)
 
 def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
     """B0...B3 (eq. 12) agree with central differences of the normal stress, at two stiffnesses."""
-    from steadyslip.expressions import array_function
+    from steadyslip.core.expressions import array_function
     from steadyslip.linear.response import contact_coefficients
 
     said = _Statement(contact)

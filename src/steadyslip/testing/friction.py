@@ -8,9 +8,9 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from steadyslip.errors import QuantityError
-from steadyslip.friction import FrictionLaw
-from steadyslip.quantities import unit
+from steadyslip.core.errors import QuantityError
+from steadyslip.core.quantities import unit
+from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import (
     DIGITS,
     TOLERANCE,
@@ -52,10 +52,10 @@ def check_names(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
 
 def check_symbols(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     """Equations depend on their arguments only, and no name of the law collides with one of the Model's."""
-    from steadyslip.contact import Constant
-    from steadyslip.drive import Steady
+    from steadyslip.laws.contact import Constant
+    from steadyslip.machine.drive import Steady
+    from steadyslip.machine.slider import Slider
     from steadyslip.model import build_model
-    from steadyslip.slider import Slider
 
     said = statement(law)
     own = list(said.numbers)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.friction import FrictionLaw
+from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import ContractViolation, eigenvalues, require, shown
 from steadyslip.testing.statement import MIDDLE, Conditions, Statement, statement
 

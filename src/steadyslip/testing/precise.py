@@ -12,8 +12,8 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from steadyslip.errors import SteadyslipError
-from steadyslip.records import Record, parameters, twin
+from steadyslip.core.errors import SteadyslipError
+from steadyslip.core.records import Record, parameters, twin
 
 DIGITS = 50
 #: Allowed error relative to the terms that cancel: far above rounding at fifty digits and above constants
@@ -86,7 +86,7 @@ def precise_function(
     def unusable(error: Exception) -> ContractViolation:
         return ContractViolation(
             f"{law!r}: an equation cannot be evaluated ({str(error).splitlines()[0]}); allowed: elementary functions "
-            "of sympy and steadyslip.expressions.asinh_exp"
+            "of sympy and steadyslip.core.expressions.asinh_exp"
         )
 
     try:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import mpmath
 
-from steadyslip.friction import FrictionLaw
-from steadyslip.records import Record
-from steadyslip.slider import Slider
+from steadyslip.core.records import Record
+from steadyslip.laws.friction import FrictionLaw
+from steadyslip.machine.slider import Slider
 from steadyslip.testing.precise import DIGITS, TOLERANCE, precise_function, require, shown
 from steadyslip.testing.statement import MIDDLE, Conditions, statement
 
@@ -17,11 +17,11 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     The former takes dτ/dv and dτ/dσ in steady sliding from `steady_strength`, the latter everything from
     `strength` and `rates`. They agree up to a common positive factor, with mass, dampings and B0...B3.
     """
-    from steadyslip.contact import Linear
-    from steadyslip.drive import Steady
+    from steadyslip.laws.contact import Linear
     from steadyslip.linear import cubic
     from steadyslip.linear.linearise import characteristic_coefficients
     from steadyslip.linear.response import response
+    from steadyslip.machine.drive import Steady
     from steadyslip.values import model_values
 
     if len(law.memory()) != 1:
@@ -62,8 +62,8 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
 
 def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     """A rig with this law survives being written to a rig file and read back."""
-    from steadyslip.contact import Constant
-    from steadyslip.drive import Steady
+    from steadyslip.laws.contact import Constant
+    from steadyslip.machine.drive import Steady
 
     press = Constant(preload=conditions.normal_stress)
     round_trip(law, Slider(friction=law, contact=press, stiffness=1e9, drive=Steady(conditions.velocity)))
@@ -71,8 +71,8 @@ def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE)
 
 def round_trip(law: Record, rig: Slider) -> None:
     """Write `rig` as text, read it back, and compare."""
-    from steadyslip.config import rig_from_text, rig_to_text
-    from steadyslip.errors import SteadyslipError
+    from steadyslip.core.errors import SteadyslipError
+    from steadyslip.files.specifications import rig_from_text, rig_to_text
 
     text = rig_to_text(rig)
     try:

@@ -11,8 +11,8 @@ import mpmath
 import numpy as np
 import sympy as sp
 
-from steadyslip.expressions import array_function
-from steadyslip.friction import FrictionLaw
+from steadyslip.core.expressions import array_function
+from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import in_symbols, precise_function, stated
 
 

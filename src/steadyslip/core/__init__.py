@@ -1,0 +1,3 @@
+"""What every other part stands on: declared records of parameters, quantities with units, errors, progress, registries.
+
+Knows nothing of friction."""

@@ -1,0 +1,40 @@
+"""Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig."""
+
+from steadyslip.experiments.answers.laws import LawComparison, compare, compare_laws
+from steadyslip.experiments.answers.precision import Precision, best_protocol, precision
+from steadyslip.experiments.answers.predict import Prediction, predict
+from steadyslip.experiments.answers.uncertainty import Draws, Profile, bootstrap, normal_draws, posterior, profile
+from steadyslip.experiments.fitting.fit import fit
+from steadyslip.experiments.fitting.result import Estimate, Fit
+from steadyslip.experiments.fitting.store import load_fit
+from steadyslip.experiments.measured.read import read_record, record_from_arrays
+from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.spec import Spec, fit_files, lab_rig, read_spec
+
+__all__ = [
+    "Draws",
+    "Estimate",
+    "Fit",
+    "LawComparison",
+    "Precision",
+    "Prediction",
+    "Profile",
+    "Record",
+    "Spec",
+    "best_protocol",
+    "bootstrap",
+    "compare",
+    "compare_laws",
+    "fit",
+    "fit_files",
+    "lab_rig",
+    "load_fit",
+    "normal_draws",
+    "posterior",
+    "precision",
+    "predict",
+    "profile",
+    "read_record",
+    "read_spec",
+    "record_from_arrays",
+]

@@ -1,0 +1,225 @@
+"""Design of experiments: how well would a protocol determine each parameter?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import resolve
+from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.fitting.identify import Combination, combinations
+from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.measured.read import record_from_arrays
+from steadyslip.machine.slider import Slider
+from steadyslip.protocol import (
+    NormalStressHarmonic,
+    NormalStressPulse,
+    NormalStressRamp,
+    NormalStressStep,
+    Protocol,
+    VelocityStep,
+)
+from steadyslip.steady import steady_state
+
+Array = np.ndarray
+SAMPLES = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class Precision(ReadOnly):
+    """Errors that a fit to such an experiment would have, to first order (Fisher information).
+
+    Attributes
+    ----------
+    protocol : Protocol
+    errors : dict of str to float
+        Standard deviations, SI units; inf where the experiment does not determine a parameter.
+    relative : dict of str to float
+        The same as shares of the parameters.
+    correlation : ndarray (p, p)
+    unidentified : tuple of Combination
+    noise : float
+    samples : int
+    """
+
+    protocol: Protocol
+    errors: dict[str, float]
+    relative: dict[str, float]
+    correlation: Array = field(repr=False)
+    unidentified: tuple[Combination, ...]
+    noise: float
+    samples: int
+    units: dict[str, str] = field(repr=False)
+
+    def __str__(self) -> str:
+        lines = [f"{self.samples} samples with noise {self.noise:g} in friction would give"]
+        wide = max(map(len, self.errors))
+        for name, error in self.errors.items():
+            if np.isfinite(error):
+                lines.append(
+                    f"  {name:<{wide}}  ± {shown(error, self.units[name], 2)} ({100 * self.relative[name]:.2g} %)"
+                )
+            else:
+                lines.append(f"  {name:<{wide}}  not determined")
+        lines += [f"! {one}" for one in self.unidentified]
+        return "\n".join(lines)
+
+
+def precision(
+    rig: Slider, protocol: Any, *, free: Sequence[str] | None = None, fixed: Sequence[str] = (), noise: float = 2e-4,
+    until: float | None = None, samples: int = SAMPLES, trend: int = 0,
+) -> Precision:  # fmt: skip
+    """What precision would an experiment give?
+
+    Parameters
+    ----------
+    rig : Slider
+        With the values that are expected.
+    protocol : Protocol, Piece or sequence of Piece
+    free, fixed : sequence of str, optional
+        As for `fit`.
+    noise : float
+        Standard deviation of friction, sample by sample, independent.
+    until : float, optional
+        End, s; the protocol's own unless given.
+    samples : int
+        Evenly spaced.
+    trend : int
+        Order of the trend that is fitted along.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    NotAvailable
+        If the motion cannot be followed to the end.
+    """
+    problems = []
+    if not (isinstance(noise, (int, float)) and noise > 0):
+        problems.append(Problem("noise", f"got {noise!r}; allowed: a number > 0"))
+    if not (isinstance(samples, int) and samples >= 20):
+        problems.append(Problem("samples", f"got {samples!r}; allowed: a whole number >= 20"))
+    plan = Protocol.of(protocol)
+    end = plan.until if until is None else until
+    if end is None or not end > 0:
+        problems.append(Problem("until", f"got {end!r}; give the end of the experiment in s, such as until=200"))
+    if problems:
+        raise ParameterError(problems)
+    if end is None:
+        raise InternalError("end is not None")
+    time = np.linspace(0.0, float(end), samples)
+    level = steady_state(rig).normal_stress
+    record = record_from_arrays(time, friction=np.full(samples, 0.5), normal=level, source="planned")
+    whole = make_plan(rig, record, free, fixed=fixed, protocol=plan, trend=trend)
+    space = whole.space()
+    known = rig.parameters()
+    values = [float(known[u.parameter].value or 0.0) if u.parameter in known else 0.0 for u in space.unknowns]
+    z = space.coordinates(np.array(values))
+    seen, jacobian = whole.comparison().model(z[None])
+    if not np.all(np.isfinite(seen)):
+        raise NotAvailable("the motion of this experiment cannot be followed to its end; is the rig stable?")
+    rows = jacobian[0]
+    information = rows @ rows.T
+    covariance, lost = combinations(information, noise**2 * information, space)
+    deviation = np.sqrt(np.diag(covariance))
+    errors = deviation * space.slopes(z)
+    with np.errstate(all="ignore"):
+        relative = np.abs(errors / np.array(values))
+        correlation = covariance / np.outer(deviation, deviation)
+    correlation[~np.isfinite(correlation)] = np.nan
+    names = [u.name for u in space.unknowns]
+    return Precision(
+        plan, dict(zip(names, map(float, errors), strict=True)), dict(zip(names, map(float, relative), strict=True)),
+        correlation, lost, float(noise), samples, {u.name: u.unit for u in space.unknowns},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Experiments by how well they determine one parameter, the best first.
+
+    Attributes
+    ----------
+    parameter : str
+    found : dict of str to Precision
+    """
+
+    parameter: str
+    found: dict[str, Precision]
+
+    @property
+    def best(self) -> str:
+        """Label of the experiment with the smallest error."""
+        return next(iter(self.found))
+
+    def __str__(self) -> str:
+        wide = max(map(len, self.found))
+        lines = [f"{self.parameter}, the best experiment first"]
+        for label, one in self.found.items():
+            error = one.errors[self.parameter]
+            text = f"± {shown(error, one.units[self.parameter], 2)}" if np.isfinite(error) else "not determined"
+            lines.append(f"  {label:<{wide}}  {text}")
+        return "\n".join(lines)
+
+
+def best_protocol(
+    rig: Slider, candidates: Mapping[str, Any] | None = None, parameter: str = "alpha", **options: Any
+) -> Ranking:
+    """Which experiment determines a parameter best?
+
+    Parameters
+    ----------
+    rig : Slider
+    candidates : mapping of str to Protocol, optional
+        By label; changes of the normal stress of several shapes, and the same with a step of the rate, unless given.
+    parameter : str
+    **options
+        As for `precision`.
+
+    Raises
+    ------
+    ParameterError
+        If the parameter is not free.
+    """
+    chosen = normal_stress_protocols(rig) if candidates is None else candidates
+    found = {label: precision(rig, protocol, **options) for label, protocol in chosen.items()}
+    known = dict.fromkeys(next(iter(found.values())).errors)
+    try:
+        name = resolve(parameter, known)
+    except UnknownNameError as error:
+        raise ParameterError([Problem("parameter", f"{error} (free parameters)")]) from error
+    order = sorted(found, key=lambda label: found[label].errors[name])
+    return Ranking(name, {label: found[label] for label in order})
+
+
+def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Protocol]:
+    """Changes of the normal stress by a share of it, in several shapes and over times that suit the rig."""
+    level = steady_state(rig).normal_stress
+    size = share * level
+    unit = _slip_time(rig)
+    rest, end = 10 * unit, 80 * unit
+    step = NormalStressStep(at=rest, by=size)
+    faster = VelocityStep(at=0.5 * end, to=3 * rig.drive.velocity)
+    shapes: dict[str, Any] = {
+        "step": [step],
+        "pulse": [NormalStressPulse(at=rest, by=size, duration=20 * unit)],
+        "ramp": [NormalStressRamp(at=rest, by=size, duration=5 * unit)],
+        "harmonic": [NormalStressHarmonic(amplitude=size, period=8 * unit, at=rest)],
+        "large step": [NormalStressStep(at=rest, by=4 * size)],
+        "step and velocity step": [step, faster],
+        "harmonic and velocity step": [NormalStressHarmonic(amplitude=size, period=8 * unit, at=rest), faster],
+    }
+    return {label: Protocol(pieces=tuple(pieces), until=end) for label, pieces in shapes.items()}
+
+
+def _slip_time(rig: Slider) -> float:
+    """Time to slide one slip distance, s."""
+    distances = [a.value for name, a in rig.parameters().items() if name.endswith(".d_c") and a.value]
+    if not distances:
+        raise NotAvailable("this friction law has no slip distance to scale experiments with; give candidates")
+    return max(distances) / rig.drive.velocity

@@ -1,0 +1,285 @@
+"""From a fit to the question: will this machine, or this fault, slide steadily, given what the records say?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import percent, shown
+from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.laws.friction import RateState
+from steadyslip.laws.friction.normal_memory import NoMemory
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
+from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.kicks.brackets import threshold_map
+from steadyslip.values import model_values
+
+Array = np.ndarray
+COUNT = 4000
+KICKED = 200  # draws of which a threshold is found
+LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)
+CLEAR = 0.95  # probability from which on a verdict is called clear
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction(ReadOnly):
+    """What the records say about a rig.
+
+    Attributes
+    ----------
+    rig : Slider
+        With the fit's best friction.
+    draws : Draws
+    stable : ndarray of bool (m,)
+        Of every draw.
+    exists : ndarray of bool (m,)
+        Whether there is steady sliding at all.
+    critical_stiffness : ndarray (m,)
+        Pa/m; NaN where there is no edge.
+    safety : ndarray (m,)
+        Stiffness over critical stiffness.
+    growth_rate : ndarray (m,)
+        1/s.
+    thresholds : dict of str to ndarray
+        By kind of kick, sizes as in `Threshold`, of the first draws.
+    shares : dict of str to float
+        Share of the spread of the critical stiffness (of the growth rate, where there is none) that goes away once a
+        parameter, or b − a, is known exactly.
+    """
+
+    rig: Slider
+    draws: Draws
+    stable: Array = field(repr=False)
+    exists: Array = field(repr=False)
+    critical_stiffness: Array = field(repr=False)
+    safety: Array = field(repr=False)
+    growth_rate: Array = field(repr=False)
+    thresholds: dict[str, Array] = field(repr=False)
+    shares: dict[str, float]
+
+    @property
+    def probability_stable(self) -> float:
+        """That steady sliding exists and is stable."""
+        return float(np.mean(self.stable))
+
+    @property
+    def dominant(self) -> str | None:
+        """Parameter whose uncertainty matters most."""
+        return next(iter(self.shares), None)
+
+    def quantiles(self, values: Array) -> tuple[float, ...]:
+        """At 2.5, 16, 50, 84 and 97.5 %, where there are values at all."""
+        finite = values[np.isfinite(values)]
+        return tuple(float(q) for q in np.quantile(finite, LEVELS)) if len(finite) else (float("nan"),) * len(LEVELS)
+
+    def __str__(self) -> str:
+        p = self.probability_stable
+        clear = "Stable" if p >= CLEAR else "Unstable" if p <= 1 - CLEAR else "Not decided by the records"
+        lines = [f"{clear}: steady sliding is stable with probability {probability_text(p, len(self.stable))}"]
+        absent = 1 - float(np.mean(self.exists))
+        if absent:
+            lines.append(f"no steady sliding       in {probability_text(absent, len(self.stable))} of the draws")
+        if np.any(np.isfinite(self.critical_stiffness)):
+            lines.append("critical stiffness      " + _range(self.quantiles(self.critical_stiffness), "Pa/m"))
+            lines.append("stiffness over critical " + _range(self.quantiles(self.safety), "1"))
+            without = float(np.mean(~np.isfinite(self.critical_stiffness)))
+            if without:
+                lines.append(f"no critical stiffness   in {probability_text(without, len(self.stable))} of the draws")
+        for kick, sizes in self.thresholds.items():
+            lines.append(f"{kick + ' kick':<24}" + _kick_range(sizes))
+            if doubt := self.undecided[kick]:
+                lines.append(f"{'':<24}undecided in {percent(doubt)} of the draws")
+        if self.shares:
+            found = ", ".join(f"{name} {share:.0%}" for name, share in self.shares.items() if share >= 0.005)
+            lines.append(f"spread comes from       {found}")
+        lines.append(f"from {len(self.stable)} draws, {self.draws.kind}")
+        return "\n".join(lines)
+
+    @property
+    def undecided(self) -> dict[str, float]:
+        """By kind of kick, share of the draws that slide steadily but whose threshold is undecided."""
+        return {
+            kick: float(np.mean(np.isnan(sizes) & self.exists[: len(sizes)])) for kick, sizes in self.thresholds.items()
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units; what does not exist is None."""
+
+        def plain(values: Array) -> list[float | None]:
+            return [x if np.isfinite(x) else None for x in self.quantiles(values)]
+
+        return {
+            "probability_stable": self.probability_stable,
+            "probability_steady": float(np.mean(self.exists)),
+            "levels": list(LEVELS),
+            "critical_stiffness": plain(self.critical_stiffness),
+            "safety": plain(self.safety),
+            "growth_rate": plain(self.growth_rate),
+            "thresholds": {
+                kick: [None if not np.isfinite(q) else float(q) for q in _kick_quantiles(sizes)]
+                for kick, sizes in self.thresholds.items()
+            },
+            "thresholds_undecided": self.undecided,
+            "shares": self.shares,
+            "dominant": self.dominant,
+            "draws": len(self.stable),
+            "kind": self.draws.kind,
+        }
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the distribution of the critical stiffness, and the rig's own.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
+
+
+def predict(
+    rig: Slider, fit: Fit | Draws, *, kick: str | Sequence[str] = (), transfer: Sequence[str] = (), record: int = 0,
+    count: int = COUNT, seed: int = 0,
+) -> Prediction:  # fmt: skip
+    """Carry the uncertainty of a fit to a rig.
+
+    Parameters
+    ----------
+    rig : Slider
+        The machine or fault in question. Its friction is replaced by the fitted one; its memory of normal stress is
+        kept where the fit has none.
+    fit : Fit or Draws
+        Draws from `bootstrap` or `posterior`, or a fit, whose covariance is drawn from.
+    kick : str or sequence of str, optional
+        Kinds of kick whose thresholds to find, as for `steadyslip.threshold`.
+    transfer : sequence of str, optional
+        Further fitted parameters that hold for the rig, such as ``slider.stiffness`` for the machine of the records.
+    record : int, optional
+        Which record's parameters to take, where records have their own.
+    count : int, optional
+        Draws from the covariance.
+    seed : int, optional
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown.
+    NotAvailable
+        If the fit does not determine what is needed.
+    """
+    target, draws, vary = transferred(rig, fit, transfer, record, count, seed)
+    return _predicted(target, draws, vary, (kick,) if isinstance(kick, str) else tuple(kick))
+
+
+def transferred(
+    rig: Slider, fit: Fit | Draws, transfer: Sequence[str] = (), record: int = 0, count: int = COUNT, seed: int = 0
+) -> tuple[Slider, Draws, dict[str, Array]]:
+    """The rig with a fit's best friction, the draws, and the rig's parameters in each of them; see `predict`."""
+    draws = normal_draws(fit, count, seed) if isinstance(fit, Fit) else fit
+    source = draws.fit
+    target = with_fitted_friction(rig, source, record)
+    known = target.parameters()
+    wanted = {name for name in known if name.startswith("friction.")} | {target.resolve(name) for name in transfer}
+    vary, problems = {}, []
+    for one in source.space.unknowns:
+        if one.record in (None, record) and one.parameter in wanted:
+            vary[one.parameter] = draws.values[one.name]
+    for name in transfer:
+        if target.resolve(name) not in vary:
+            problems.append(Problem("transfer", f"{name!r} was not fitted; fitted: {', '.join(source.names)}"))
+    if problems:
+        raise ParameterError(problems)
+    if not vary:
+        raise NotAvailable("none of the fitted parameters belongs to this rig's friction")
+    best = {name: source.values[_name_of(source, name, record)] for name in vary if not name.startswith("friction.")}
+    target = target.with_values(best)
+    return target, draws, vary
+
+
+def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tuple[str, ...]) -> Prediction:
+    with np.errstate(all="ignore"):
+        states = np.broadcast_to(np.asarray(status(model_values(target, vary))), (len(draws),))
+        critical, safety, growth = (
+            np.broadcast_to(np.asarray(number(target, vary), dtype=float), (len(draws),))
+            for number in (critical_stiffness, safety_factor, growth_rate)
+        )
+    few = {name: values[:KICKED] for name, values in vary.items()}
+    thresholds = {kick: np.asarray(threshold_map(target, few, kick, precision=1e-3, progress=False)) for kick in kicks}
+    exists = (states != ABSENT) & (states != UNKNOWN)
+    shares = _shares(vary | _difference(target, vary), critical, growth)
+    return Prediction(target, draws, states == STABLE, exists, critical, safety, growth, thresholds, shares)
+
+
+def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
+    """The rig with the friction that a fit found."""
+    friction = fit.rig(record).friction
+    own = rig.friction
+    if isinstance(friction, RateState) and isinstance(own, RateState) and isinstance(friction.normal_memory, NoMemory):
+        friction = replace(friction, normal_memory=own.normal_memory)
+    return replace(rig, friction=friction)
+
+
+def _name_of(fit: Fit, parameter: str, record: int) -> str:
+    return next(u.name for u in fit.space.unknowns if u.parameter == parameter and u.record in (None, record))
+
+
+def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
+    """b − a, which decides where b and a do not by themselves."""
+    known = {n: a.value for n, a in rig.parameters().items() if n == "friction.a" or n.rpartition(".")[2] == "b"}
+    if "friction.a" not in known or len(known) < 2 or not set(known) & set(vary):
+        return {}
+    values = {name: np.asarray(vary.get(name, value), dtype=float) for name, value in known.items()}
+    direct = values.pop("friction.a")
+    return {"friction.b − friction.a": np.sum(np.broadcast_arrays(*values.values()), axis=0) - direct}
+
+
+def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str, float]:
+    """Squared correlation of the result with every parameter: the largest first."""
+    result = critical if np.mean(np.isfinite(critical)) > 0.5 else growth
+    good = np.isfinite(result)
+    if good.sum() < 10 or not np.std(result[good]) > 0:
+        return {}
+    y = result[good] - result[good].mean()
+    found = {}
+    for name, values in vary.items():
+        x = values[good] - values[good].mean()
+        spread = float(np.sum(x * x))
+        found[name] = float(np.sum(x * y) ** 2 / (spread * np.sum(y * y))) if spread > 0 else 0.0
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+
+
+def probability_text(share: float, count: int) -> str:
+    """A probability, no finer than the number of draws tells."""
+    if share >= 1:
+        return f"more than {100 * (1 - 3 / count):.4g} %"
+    if share <= 0:
+        return f"less than {300 / count:.2g} %"
+    return percent(share)
+
+
+def _range(quantiles: tuple[float, ...], unit: str) -> str:
+    low, _, middle, _, high = (shown(q, unit) for q in quantiles)
+    return f"{middle}   95 %: {low} to {high}"
+
+
+def _kick_quantiles(sizes: Array) -> tuple[float, ...]:
+    known = np.sort(sizes[~np.isnan(sizes)])
+    if not len(known):
+        return (float("nan"),) * len(LEVELS)
+    return tuple(float(known[min(int(level * len(known)), len(known) - 1)]) for level in LEVELS)
+
+
+def _kick_range(sizes: Array) -> str:
+    low, _, middle, _, high = ("none fails" if np.isinf(q) else f"{q:.4g}" for q in _kick_quantiles(sizes))
+    return f"size {middle}   95 %: {low} to {high}"

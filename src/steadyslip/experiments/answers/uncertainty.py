@@ -1,0 +1,318 @@
+"""How sure a fit is, beyond its covariance: profiles, bootstrap, posterior samples; all on the compiled model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown, shown_error, shown_range
+from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.numerics.least_squares import minimise
+
+Array = np.ndarray
+TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
+KINDS = ("auto", "block", "residual")
+WARM = 1e-6  # reduction still to be had, as a share of the sum, at which a refit is done: far below its scatter
+LONGEST_BLOCK = 0.1  # of a record
+
+
+@dataclass(frozen=True, eq=False)
+class Draws(ReadOnly):
+    """Sets of parameters that a fit allows.
+
+    Attributes
+    ----------
+    fit : Fit
+    kind : str
+        ``bootstrap``, ``posterior`` or ``normal``.
+    values : dict of str to ndarray (m,)
+        SI units, by name.
+    details : dict of str to float
+        How they came about: block length and share of refits that converged, or acceptance and autocorrelation time.
+    """
+
+    fit: Fit
+    kind: str
+    values: dict[str, Array] = field(repr=False)
+    details: dict[str, float]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.values.values())))
+
+    def __getitem__(self, name: str) -> Array:
+        return self.values[self.fit.names[self.fit.index(name)]]
+
+    def error(self, name: str) -> float:
+        """Standard deviation, SI units."""
+        return float(np.std(self[name], ddof=1))
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Quantiles that leave the same probability on both sides."""
+        low, high = np.quantile(self[name], [0.5 - level / 2, 0.5 + level / 2])
+        return float(low), float(high)
+
+    def __str__(self) -> str:
+        details = ", ".join(f"{name} {value:.4g}" for name, value in self.details.items())
+        lines = [f"{len(self)} draws, {self.kind} ({details})"]
+        for one in self.fit.estimates:
+            low, high = self.interval(one.name)
+            middle = shown_error(float(np.mean(self[one.name])), self.error(one.name), one.unit)
+            lines.append(f"  {one.name}  {middle}   95 %: {shown_range(low, high, one.unit)}")
+        return "\n".join(lines)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the parameters against each other."""
+        return draw(self, ax=ax)
+
+
+def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
+    """Draws from the covariance of a fit, in its coordinates.
+
+    Raises
+    ------
+    NotAvailable
+        If a parameter is not determined.
+    """
+    lost = [e.name for e in fit.estimates if not e.determined]
+    if lost:
+        raise NotAvailable(f"the fit does not determine {', '.join(lost)}; fix one of each combination that it names")
+    generator = np.random.default_rng(seed)
+    z = generator.multivariate_normal(fit.coordinates, fit.covariance, size=count, method="eigh")
+    return _draws(fit, "normal", np.clip(z, fit.space.low, fit.space.high), {"seed": float(seed)})
+
+
+def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float]) -> Draws:
+    values = fit.space.values(z)
+    return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details)
+
+
+def bootstrap(
+    fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
+    threads: int | None = None,
+) -> Draws:  # fmt: skip
+    """Refit the model plus resampled residuals, many times, each from the fit's own minimum.
+
+    Parameters
+    ----------
+    fit : Fit
+    count : int
+        Refits.
+    kind : str
+        ``block``: residuals in blocks, which keeps their correlation; ``residual``: one by one; ``auto``: blocks where
+        the fit takes residuals as correlated.
+    block : int, optional
+        Samples in a block; three times as many as are worth one independent sample unless given.
+    seed : int
+    threads : int, optional
+
+    Returns
+    -------
+    Draws
+    """
+    if kind not in KINDS:
+        raise ParameterError([Problem("kind", unknown_name("choice", kind, KINDS))])
+    if not (isinstance(count, int) and count >= 2):
+        raise ParameterError([Problem("count", f"got {count!r}; allowed: a whole number >= 2")])
+    generator = np.random.default_rng(seed)
+    comparison = fit.plan.comparison(threads)
+    lengths = [_block(fit, i, kind, block) for i in range(len(comparison.parts))]
+    ends, converged = [], []
+    for start in range(0, count, TOGETHER):
+        many = min(TOGETHER, count - start)
+        data = np.empty((many, comparison.size))
+        for i, where in enumerate(comparison.slices):
+            r = fit.residuals[where]
+            centred = (r - r.mean()) * np.sqrt(fit.samples / max(fit.degrees, 1))
+            data[:, where] = fit.model[where] + _resampled(centred, lengths[i], many, generator)
+        found = minimise(
+            lambda z, lanes, d=data: comparison.residuals(z, d[lanes]),  # type: ignore[misc]
+            np.tile(fit.coordinates, (many, 1)), fit.bounds[0], fit.bounds[1], most=30, tolerance=WARM,
+        )  # fmt: skip
+        ends.append(found.coordinates[np.isfinite(found.ssq)])
+        converged.append(found.converged)
+    share = float(np.mean(np.concatenate(converged)))
+    return _draws(fit, "bootstrap", np.concatenate(ends), {"block": float(max(lengths)), "converged": share})
+
+
+def _block(fit: Fit, record: int, kind: str, block: int | None) -> int:
+    noise = fit.noise[record]
+    size = len(fit.part(fit.residuals, record))
+    if kind == "residual" or (kind == "auto" and not noise.correlated):
+        return 1
+    usual = max(int(np.ceil(3 * noise.inflation)), int(np.ceil(size ** (1 / 3))))
+    return max(1, min(block or usual, int(LONGEST_BLOCK * size)))
+
+
+def _resampled(residuals: Array, block: int, many: int, generator: np.random.Generator) -> Array:
+    """Blocks of residuals from random places, end joined to beginning."""
+    size = len(residuals)
+    starts = generator.integers(0, size, size=(many, -(-size // block)))
+    places = (starts[:, :, None] + np.arange(block)).reshape(many, -1)[:, :size] % size
+    return np.asarray(residuals[places])
+
+
+@dataclass(frozen=True, eq=False)
+class Profile(ReadOnly):
+    """Least sum of squares with one parameter held at each of several values.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+    values : ndarray (m,)
+    ssq : ndarray (m,)
+    rise : ndarray (m,)
+        Rise above the minimum in units in which 1 is one standard deviation squared.
+    """
+
+    name: str
+    unit: str
+    values: Array
+    ssq: Array = field(repr=False)
+    rise: Array
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Where the rise is below that of a probability; infinite where the profile does not rise so far."""
+        from scipy.stats import chi2
+
+        limit = float(chi2.ppf(level, 1))
+        best = int(np.argmin(self.rise))
+        ends = []
+        for side in (slice(best, None, -1), slice(best, None, 1)):
+            rise, values = self.rise[side], self.values[side]
+            beyond = np.flatnonzero(rise > limit)
+            if not len(beyond):
+                ends.append(-np.inf if side.step == -1 else np.inf)
+                continue
+            i = int(beyond[0])
+            share = (limit - rise[i - 1]) / (rise[i] - rise[i - 1]) if i else 0.0
+            ends.append(float(values[i - 1] + share * (values[i] - values[i - 1])) if i else float(values[0]))
+        return ends[0], ends[1]
+
+    def __str__(self) -> str:
+        low, high = self.interval()
+        ends = " to ".join("beyond the profile" if not np.isfinite(x) else shown(x, self.unit) for x in (low, high))
+        return f"{self.name}, 95 % by its profile: {ends}"
+
+
+def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
+    """Profile of a parameter: all others fitted anew at each value, side by side.
+
+    Parameters
+    ----------
+    fit : Fit
+    name : str
+    reach : float
+        How far to go, in standard deviations; two e-folds or natural sizes where the parameter is not determined.
+    count : int
+        Values on the way.
+    threads : int, optional
+    """
+    i = fit.index(name)
+    variance = float(fit.covariance[i, i])
+    width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
+    z = np.tile(fit.coordinates, (count, 1))
+    z[:, i] = fit.coordinates[i] + width * np.linspace(-1, 1, count)
+    if np.isfinite(variance):  # along the valley, as far as it is straight
+        slope = fit.covariance[:, i] / variance
+        slope[~np.isfinite(slope)] = 0.0
+        z = fit.coordinates + (z[:, i : i + 1] - fit.coordinates[i]) * slope
+    low, high = fit.bounds
+    z = np.clip(z, low, high)
+    held = np.zeros_like(z, dtype=bool)
+    held[:, i] = True
+    comparison = fit.plan.comparison(threads)
+    found = minimise(lambda x, _: comparison.residuals(x), z, low, high, held=held)
+    rise = (found.ssq - fit.ssq) / _unit_of_rise(fit, i)
+    keep = np.isfinite(found.ssq)
+    order = np.argsort(z[keep, i])
+    one = fit.space.unknowns[i]
+    return Profile(one.name, one.unit, one.value(z[keep, i][order]), found.ssq[keep][order], rise[keep][order])
+
+
+def _unit_of_rise(fit: Fit, i: int) -> float:
+    """Rise of the sum of squares one standard deviation from the minimum; more where residuals are correlated."""
+    _, jacobian = fit.comparison.residuals(fit.coordinates[None])
+    information = jacobian[0] @ jacobian[0].T
+    naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])
+    plain = fit.ssq / max(fit.degrees, 1)
+    variance = float(fit.covariance[i, i])
+    return variance / naive if np.isfinite(variance) and naive > 0 else plain
+
+
+def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, threads: int | None = None) -> Draws:
+    """Sample the posterior with emcee.
+
+    The likelihood is that of the sum of squares. Where residuals are correlated, the coordinates are stretched about
+    the minimum so that its curvature there agrees with the fit's covariance (Ribatet, Cooley & Davison 2012); its
+    shape further out remains that of the sum of squares. Priors are flat in the logarithm of parameters that must be
+    positive, else in the parameter, within what the records can show.
+
+    Parameters
+    ----------
+    fit : Fit
+    steps : int
+        Of every walker; the first third is left out.
+    walkers : int
+    seed : int
+    threads : int, optional
+
+    Raises
+    ------
+    NotAvailable
+        If emcee is not installed.
+    """
+    try:
+        import emcee
+    except ImportError as error:
+        raise NotAvailable("posterior sampling needs the package emcee; install steadyslip[lab]") from error
+    comparison = fit.plan.comparison(threads)
+    low, high = fit.bounds
+    stretch = _stretch(fit)
+    variance = fit.ssq / max(fit.degrees, 1)
+
+    def log_probability(z: Array) -> Array:
+        inside = np.all((z >= low) & (z <= high), axis=1)
+        found = np.full(len(z), -np.inf)
+        if np.any(inside):
+            moved = fit.coordinates + (z[inside] - fit.coordinates) @ stretch.T
+            found[inside] = -0.5 * comparison.misfit(np.clip(moved, low - 1, high + 1)) / variance
+        return found
+
+    size = len(fit.space)
+    walkers = max(walkers, 2 * size + 2)
+    generator = np.random.default_rng(seed)
+    width = np.sqrt(np.minimum(np.diag(fit.covariance), 0.25))
+    begin = np.clip(fit.coordinates + 0.5 * width * generator.standard_normal((walkers, size)), low, high)
+    sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True)
+    sampler._random = np.random.RandomState(seed)
+    sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
+    time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+    kept = sampler.get_chain(discard=steps // 3, thin=max(1, int(time / 2)), flat=True)
+    details = {
+        "acceptance": float(np.mean(sampler.acceptance_fraction)),
+        "autocorrelation": time,
+        "steps": float(steps),
+    }
+    return _draws(fit, "posterior", kept, details)
+
+
+def _stretch(fit: Fit) -> Array:
+    """The map of coordinates about the minimum that gives the sum of squares the curvature of the covariance."""
+    size = len(fit.space)
+    if not fit.correlated:
+        return np.eye(size)
+    _, jacobian = fit.comparison.residuals(fit.coordinates[None])
+    information = jacobian[0] @ jacobian[0].T / (fit.ssq / max(fit.degrees, 1))
+    known = np.isfinite(np.diag(fit.covariance))
+    stretch: Array = np.eye(size) / np.sqrt(np.mean([noise.inflation for noise in fit.noise]))
+    inner = np.ix_(known, known)
+    root = np.linalg.cholesky(information[inner])
+    wanted = np.linalg.cholesky(np.linalg.inv(fit.covariance[inner]))
+    stretch[inner] = np.linalg.solve(root.T, wanted.T)
+    return stretch

@@ -1,0 +1,63 @@
+"""What the command line does with fits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.answers.laws import LawComparison
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.files.output import FIGURES, write_by_ending
+
+ENDINGS = (".nc", ".html", ".json", *FIGURES)
+
+
+def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
+    """Records, and the file of the fit: the one that ends in .toml.
+
+    Raises
+    ------
+    NotAvailable
+        If there is no record, or more than one file of the fit.
+    """
+    specs = [path for path in files if path.suffix.lower() == ".toml"]
+    records = [path for path in files if path not in specs]
+    if not records:
+        raise NotAvailable("no record given; write steadyslip fit RECORD... [SPEC.toml]")
+    if len(specs) > 1:
+        raise NotAvailable(f"got {len(specs)} files that end in .toml; allowed: one, which says how to fit")
+    return records, specs[0] if specs else None
+
+
+def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, page: Any) -> None:
+    """Write a fit by the ending of the name; `page` makes the HTML.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+
+    def as_text(target: Path) -> None:
+        target.write_text(json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+    def as_page(target: Path) -> None:
+        target.write_text(page(fit, comparison), encoding="utf-8")
+
+    write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
+
+
+def as_json(fit: Fit, comparison: LawComparison | None) -> dict[str, Any]:
+    """Plain data of a fit, and of the laws it was compared with."""
+    data = fit.to_dict()
+    if comparison is not None:
+        data["comparison"] = {
+            label: {"ssq": one.ssq, "aic": comparison.criteria[label][0], "bic": comparison.criteria[label][1],
+                    "weight": comparison.weights[label],
+                    "parameters": {e.name: e.value for e in one.estimates}}
+            for label, one in comparison.fits.items()
+        }  # fmt: skip
+    return data

@@ -1,0 +1,171 @@
+"""Commanded loading as tables for the kernels, for any times and durations of its changes."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from steadyslip.experiments.fitting.forward import Table
+from steadyslip.experiments.loading.loading import Change, Course, Loading
+
+Array = np.ndarray
+STRAIGHT = 5e-4  # of the range of a curve: what straight lines may miss of it
+MOST_CUTS = 30  # of one interval between samples
+BRIEFEST = 1e-9  # of the record: a ramp shorter than that is a step
+_COLUMN = {"load": 0, "stress": 2}
+
+
+class CommandedInputs:
+    """The loading of one record, to be run through with any of the times that it leaves open.
+
+    Parameters
+    ----------
+    loading : Loading
+    time : ndarray (n,)
+        Of the samples, s.
+    pressed : bool
+        Whether its normal stress drives the model.
+    """
+
+    def __init__(self, loading: Loading, time: Array, pressed: bool) -> None:
+        self.loading, self.time = loading, time
+        self.courses: dict[str, Course] = {}
+        if loading.load is not None:
+            self.courses["load"] = loading.load
+        if pressed and loading.stress is not None:
+            self.courses["stress"] = loading.stress
+        self.changes = [one for one in loading.changes if one[0] in self.courses]
+        self.base = {"load": 0.0, "stress": 0.0}
+        if "stress" in self.courses:
+            self.base["stress"] = float(self.courses["stress"].at(time[:1])[0])
+        self.nodes = np.union1d(time, self._cuts())
+        self.sample = np.full(len(self.nodes), -1)
+        self.sample[np.searchsorted(self.nodes, time)] = np.arange(len(time))
+
+    def _cuts(self) -> Array:
+        """Further times, where samples are too far apart for a curve to be straight between them."""
+        found = [np.empty(0)]
+        spacing = np.diff(self.time)
+        for course in self.courses.values():
+            if course.curve is None:
+                continue
+            ends = course.curve(self.time)
+            misses = np.zeros(len(spacing))
+            for share in (0.25, 0.5, 0.75):
+                straight = ends[:-1] + share * np.diff(ends)
+                misses = np.maximum(misses, np.abs(course.curve(self.time[:-1] + share * spacing) - straight))
+            least = STRAIGHT * max(float(np.ptp(ends)), 1e-300)
+            pieces = np.minimum(np.ceil(np.sqrt(misses / least)), MOST_CUTS).astype(int)
+            for i in np.flatnonzero(pieces > 1):
+                found.append(np.linspace(self.time[i], self.time[i + 1], pieces[i] + 1)[1:-1])
+        return np.concatenate(found)
+
+    @cached_property
+    def free(self) -> list[tuple[int, str]]:
+        """What the free times are: the place of a change, and ``at`` or ``duration``."""
+        found = []
+        for i, (_, _, change) in enumerate(self.changes):
+            found += [(i, "at")] if change.free else []
+            found += [(i, "duration")] if change.stretches else []
+        return found
+
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+        """The table for free times (jobs, free), s; see `MeasuredInputs.table`."""
+        if not self.free:
+            return self._once
+        return self._table(times, first, directions)
+
+    @cached_property
+    def _once(self) -> Table:
+        return self._table(np.empty((1, 0)), 0, 0)
+
+    def _table(self, times: Array, first: int, directions: int) -> Table:
+        jobs = len(times)
+        begins = np.array([[change.time for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
+        lengths = np.array([[change.duration for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
+        for k, (i, what) in enumerate(self.free):
+            (begins if what == "at" else lengths)[:, i] = times[:, k]
+        ramps = [i for i, (_, _, change) in enumerate(self.changes) if change.duration > 0]
+        low, high = float(self.time[0]), float(self.time[-1])
+        events = np.hstack([begins, (begins + lengths)[:, ramps]])
+        inside = (events > low) & (events < high)
+        nodes = np.hstack([np.clip(events, low, high), np.tile(self.nodes, (jobs, 1))])
+        order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
+        nodes = np.take_along_axis(nodes, order, axis=1)
+        count = events.shape[1]
+        place = np.concatenate([np.full(count, -1), self.sample])
+        samples = place[order]
+        rows = np.zeros((jobs, nodes.shape[1] - 1, 9))
+        rows[:, :, 0], rows[:, :, 1] = nodes[:, :-1] - low, nodes[:, 1:] - low
+        self._fill(rows, nodes, begins, lengths)
+        table = Table(rows, np.ascontiguousarray(samples), len(self.time))
+        if not directions or not self.free:
+            return table
+        moves = np.zeros((jobs, directions, count))
+        for k, (i, what) in enumerate(self.free):
+            if what == "at":
+                moves[:, first + k, i] = 1.0
+            if i in ramps:
+                moves[:, first + k, len(self.changes) + ramps.index(i)] = 1.0
+        moves *= inside[:, None, :]
+        event = order[:, :-1]
+        rates = np.zeros((jobs, directions, event.shape[1]))
+        job, row = np.nonzero(event < count)
+        rates[job, :, row] = moves[job, :, event[job, row]]
+        changing = self._input_rates(nodes, begins, lengths, first, directions)
+        return Table(rows, table.samples, table.count, rates, changing)
+
+    def _fill(self, rows: Array, nodes: Array, begins: Array, lengths: Array) -> None:
+        """Values and slopes of the inputs on every row."""
+        middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
+        for channel, course in self.courses.items():
+            before = np.full(middle.shape, course.first - self.base[channel])
+            after = before.copy()
+            for i, (own, _, change) in enumerate(self.changes):
+                if own != channel:
+                    continue
+                begin, length = begins[:, i : i + 1], lengths[:, i : i + 1]
+                height = change.after - change.before
+                if change.duration > 0:
+                    length = np.maximum(length, BRIEFEST * np.ptp(self.time))
+                    before += height * np.clip((nodes[:, :-1] - begin) / length, 0.0, 1.0)
+                    after += height * np.clip((nodes[:, 1:] - begin) / length, 0.0, 1.0)
+                else:
+                    gone = height * (middle > begin)
+                    before += gone
+                    after += gone
+            if course.curve is not None:
+                curve = course.curve(nodes.ravel()).reshape(nodes.shape)
+                before, after = before + curve[:, :-1], after + curve[:, 1:]
+            spacing = nodes[:, 1:] - nodes[:, :-1]
+            column = _COLUMN[channel]
+            rows[:, :, 3 + column] = before
+            rows[:, :, 6 + column] = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
+
+    def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
+        """How inputs at given times change with the times of a ramp."""
+        if not any(self.changes[i][2].duration > 0 for i, _ in self.free):
+            return np.zeros((1, 0, 0, 3))
+        middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
+        rates = np.zeros((len(nodes), directions, middle.shape[1], 3))
+        for k, (i, what) in enumerate(self.free):
+            channel, _, change = self.changes[i]
+            if not change.duration > 0:
+                continue
+            begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], BRIEFEST * np.ptp(self.time))
+            share = (middle - begin) / length
+            slope = -(change.after - change.before) / length * (1.0 if what == "at" else share)
+            rates[:, first + k, :, _COLUMN[channel]] = np.where((share > 0) & (share < 1), slope, 0.0)
+        return rates
+
+
+def windows(changes: list[tuple[str, int, Change]]) -> list[tuple[float, float, float]]:
+    """For each free time in turn: value to begin with, least and largest, s."""
+    found = []
+    for _, _, change in changes:
+        if change.free:
+            found.append((change.time, change.earliest, change.latest))
+        if change.stretches:
+            found.append((change.duration, change.shortest, change.longest))
+    return found

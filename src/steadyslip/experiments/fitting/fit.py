@@ -1,0 +1,294 @@
+"""Fits a rig to records: nobody has to guess, and what the records cannot tell is said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.identify import combinations, prior_information
+from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan, with_loading
+from steadyslip.experiments.fitting.result import Fit, Search
+from steadyslip.experiments.fitting.starts import STARTS, search_bounds, starting_points
+from steadyslip.experiments.fitting.unknowns import Space
+from steadyslip.experiments.loading.loading import shifted
+from steadyslip.experiments.measured.record import Record, transient_rows
+from steadyslip.experiments.numerics.least_squares import SAME, Minima, minimise
+from steadyslip.experiments.numerics.noise import DETECTED, describe, lag_one, white
+from steadyslip.machine.slider import Slider
+
+Array = np.ndarray
+THIN = 400  # samples on which many starts are tried
+HOPE = 2.0  # times the best rough sum of squares: finalists beyond have no chance
+ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
+FINALISTS = 8  # of them that go on with all samples: one vector of lanes
+INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
+
+ERRORS = ("auto", "correlated", "independent")
+
+
+def fit(
+    rig: Slider,
+    records: Record | Sequence[Record],
+    free: Sequence[str] | None = None,
+    *,
+    fixed: Sequence[str] = (),
+    separate: Sequence[str] = (),
+    drive: str = "commanded",
+    protocol: Any = None,
+    trend: int = 0,
+    trend_axis: str = "displacement",
+    offset: bool = False,
+    loss: str = "linear",
+    width: float | None = None,
+    weights: Any = None,
+    errors: str = "auto",
+    starts: int = STARTS,
+    threads: int | None = None,
+) -> Fit:
+    """Fit a rig to one or several records of experiments.
+
+    The model is driven by the loading that was commanded, as found in the record: rates of the load point by robust
+    straight lines, their changes at times that are fitted along, normal stress constant or smooth between its changes.
+    It starts from steady sliding at the first sample. Starting values come from the records.
+
+    Parameters
+    ----------
+    rig : Slider
+        Its laws, and the values of what is not free; values of what is free do not matter. Drive velocity and (with a
+        constant contact) normal stress are those of each record.
+    records : Record or sequence of Record
+        Fitted together.
+    free : sequence of str, optional
+        Parameters to fit. Unless given, all of the friction law and the stiffness. The level of friction,
+        ``friction.mu_ref``, is free in any case unless it is fixed. With a protocol, times of its pieces too
+        (``protocol.pieces.1.at``).
+    fixed : sequence of str, optional
+        Parameters that keep the rig's value.
+    separate : sequence of str, optional
+        Free parameters that every record has to itself; all others are shared.
+    drive : str, optional
+        ``commanded``: constant rates with steps and ramps between them, as found in the displacement, or a smooth
+        curve where it is not made of straight lines; ``smoothed``: a smooth curve in any case; ``measured``: load
+        point and normal stress exactly as measured at the samples, their noise included.
+    protocol : Protocol, Piece or sequence of Piece, optional
+        What moves the load point, on the records' clock, instead of the measured displacement.
+    trend : int, optional
+        Order of a polynomial that is added to the model's friction, every record's own.
+    trend_axis : str, optional
+        What it is a polynomial of: ``displacement`` of the load point, or ``time``.
+    offset : bool, optional
+        Add a constant to friction as well, beside mu_ref.
+    loss : str, optional
+        ``linear`` (least squares), or ``soft-l1``, ``huber``, ``cauchy``, in which outliers weigh less.
+    width : float, optional
+        Residual at which that begins; 1.345 standard deviations of most residuals unless given.
+    weights : array_like, optional
+        One over each sample's standard deviation, up to a factor; one array for each record.
+    errors : str, optional
+        ``auto``: correlation of the residuals is taken into account where it stands out; ``correlated``: always;
+        ``independent``: never.
+    starts : int, optional
+        Points to start from.
+    threads : int, optional
+        All cores unless given.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    NotAvailable
+        If the model cannot follow the records from any start.
+    """
+    plan = make_plan(
+        rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
+        trend_axis=trend_axis, offset=offset, loss=loss, width=width, weights=weights,
+    )  # fmt: skip
+    if errors not in ERRORS:
+        raise ParameterError([Problem("errors", unknown_name("choice", errors, ERRORS))])
+    if not (isinstance(starts, int) and starts >= 1):
+        raise ParameterError([Problem("starts", f"got {starts!r}; allowed: a whole number >= 1")])
+    if plan.loss != "linear" and plan.width is None:
+        first, _, _ = _searched(replace(plan, loss="linear"), starts, threads)
+        comparison = replace(plan, loss="linear").comparison(threads)
+        plan = check_width(plan, comparison.residuals(first.coordinates[:1])[0][0])
+    found, search, bounds = _searched(plan, starts, threads)
+    return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
+
+
+def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Search, tuple[Array, Array]]:
+    """The best minimum: from several starts on few samples, the best of those on all.
+
+    A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
+    then more, as long as hardly any lead to the best minimum.
+    """
+    space, whole = plan.space(), plan.comparison(threads)
+    quick = replace(_thinned(plan), rtol=1e-5).comparison(threads)
+    low, high = search_bounds(whole.parts, space)
+    rough = Minima(np.empty((0, len(space))), np.empty(0), np.empty(0, dtype=bool), np.empty(0, dtype=int))
+    for upto in (-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts):
+        begin = starting_points(whole.parts, space, upto - len(rough.ssq), len(rough.ssq))
+        rough = rough + minimise(
+            lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH
+        )
+        if not np.any(np.isfinite(rough.ssq)):
+            continue
+        arrived = int(np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)))
+        if arrived < ENOUGH or (upto < starts and arrived < upto / 3):
+            continue
+        found = _polished(whole, rough, low, high)
+        if upto >= starts or not _leaves_structure(whole, found.coordinates[0]):
+            break
+    else:
+        if not np.any(np.isfinite(rough.ssq)):
+            raise NotAvailable(
+                "the model cannot follow these records from any start; are law and drive those of the experiment?"
+            )
+        found = _polished(whole, rough, low, high)
+    if not np.isfinite(found.ssq[0]):
+        raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
+    worse = np.concatenate([found.ssq / found.ssq[0], rough.ssq[rough.converged] / np.min(rough.ssq)])
+    others = sorted({float(f"{x:.3g}") for x in worse if np.isfinite(x) and x > 1 + SAME})
+    search = Search(len(rough.ssq), arrived, tuple(others), int(found.iterations[0]), bool(found.converged[0]))
+    found.coordinates = _ordered(found.coordinates, space)
+    return found, search, (low, high)
+
+
+def _polished(whole: Comparison, rough: Minima, low: Array, high: Array) -> Minima:
+    """The best of rough minima brought to their end, the best first."""
+    chosen = _distinct(rough, FINALISTS)
+    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1)
+    begin = _released(whole.space, found.coordinates[int(np.argmin(found.ssq))], low, high)
+    if len(begin):
+        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=300)
+    order = np.argsort(found.ssq, kind="stable")
+    return Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
+
+
+def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
+    """The same point with times that ran to the end of their windows put back inside, (0 or more, p).
+
+    Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
+    """
+    times = np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
+    ended = times & ((coordinates <= low) | (coordinates >= high))
+    if not np.any(ended):
+        return np.empty((0, len(coordinates)))
+    share = np.array(INSIDE)[:, None]
+    return np.where(ended, low + share * np.where(ended, high - low, 0.0), coordinates)
+
+
+def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
+    """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
+    r = whole.residuals(coordinates[None])[0][0]
+    return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
+
+
+def _ordered(coordinates: Array, space: Space) -> Array:
+    """States by rising slip distance, so that equal minima look equal."""
+    members: dict[tuple[str, str], dict[str, int]] = {}
+    for i, one in enumerate(space.unknowns):
+        if one.parameter.startswith("friction.states."):
+            _, _, number, last = one.parameter.split(".")
+            members.setdefault((str(one.record), number), {})[last] = i
+    found = coordinates.copy()
+    for label in dict.fromkeys(record for record, _ in members):
+        states = [places for (record, _), places in members.items() if record == label]
+        if len(states) < 2 or any(set(s) != set(states[0]) or "d_c" not in s for s in states):
+            continue
+        ranks = np.argsort(coordinates[:, [s["d_c"] for s in states]], axis=1)
+        for last in states[0]:
+            columns = [s[last] for s in states]
+            found[:, columns] = np.take_along_axis(coordinates[:, columns], ranks, axis=1)
+    return found
+
+
+def _thinned(plan: Plan) -> Plan:
+    """The same plan on few samples of every record."""
+    count = max(THIN // len(plan.records), 100)
+    rows = []
+    for record, sharp in zip(plan.records, plan.sharp, strict=True):
+        few = transient_rows(record, count) if len(record) > count else np.arange(len(record))
+        rows.append(np.union1d(few, sharp.rows(record.time)))
+    thin = tuple(r.taken(k, "thinned") for r, k in zip(plan.records, rows, strict=True))
+    weights = None if plan.weights is None else tuple(w[k] for w, k in zip(plan.weights, rows, strict=True))
+    return replace(plan, records=thin, weights=weights)
+
+
+def _distinct(rough: Minima, most: int) -> Array:
+    """The best of many ends, each once; repeated best ones if there are few."""
+    order = [i for i in np.argsort(rough.ssq, kind="stable") if np.isfinite(rough.ssq[i])]
+    chosen: list[int] = []
+    for i in order:
+        near = [np.max(np.abs(rough.coordinates[i] - rough.coordinates[k])) < 0.02 for k in chosen]
+        if not any(near):
+            chosen.append(int(i))
+        if len(chosen) == most or rough.ssq[i] > HOPE * rough.ssq[order[0]]:
+            break
+    return np.array(chosen)
+
+
+def driven_as_measured(fit: Fit) -> dict[str, float] | None:
+    """Where the search ends if the measured columns drive the model instead, from the fit's own minimum."""
+    noisy = [c for loading in fit.plan.loading for c in (loading.load,) if c is not None and np.any(c.errors > 0)]
+    if not noisy or any(course.curve is not None for course in noisy):
+        return None
+    plan = with_loading(replace(fit.plan, drive="measured"))
+    space = plan.space()
+    z = space.coordinates(np.array([fit.values.get(u.name, 0.5 * (u.low + u.high)) for u in space.unknowns]))
+    own = dict(zip(fit.names, zip(*fit.bounds, strict=True), strict=True))
+    low, high = (np.array([own.get(u.name, u.bounds)[side] for u in space.unknowns]) for side in (0, 1))
+    comparison = plan.comparison()
+    found = minimise(lambda x, _: comparison.residuals(x), z[None], low, high, most=30, tolerance=1e-4)
+    if not np.isfinite(found.ssq[0]):
+        return None
+    return dict(zip((u.name for u in space.unknowns), map(float, space.values(found.coordinates[0])), strict=True))
+
+
+def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:
+    """What the uncertainty of rates and normal stresses, read off the records, adds to that of the data."""
+    found = np.zeros((len(z), len(z)))
+    seen: Array | None = None
+    for i, loading in enumerate(plan.loading if plan.follows else ()):
+        for moved in shifted(loading, plan.pressed):
+            if seen is None:
+                seen = comparison.model(z[None])[0][0]
+            others = tuple(moved if k == i else own for k, own in enumerate(plan.loading))
+            model = replace(plan, loading=others).comparison().model(z[None])[0][0]
+            push = rows @ ((model - seen) * comparison.weights)
+            if np.all(np.isfinite(push)):
+                found += np.outer(push, push)
+    return found
+
+
+def finished(
+    plan: Plan, comparison: Comparison, z: Array, search: Search, errors: str, bounds: tuple[Array, Array]
+) -> Fit:
+    """Errors and everything else that belongs to a minimum."""
+    from steadyslip import __version__
+
+    r, jacobian = comparison.residuals(z[None])
+    residuals, rows = r[0], jacobian[0]
+    free = len(z)
+    information, spread = rows @ rows.T, np.zeros((free, free))
+    noises = []
+    for where in comparison.slices:
+        own = residuals[where]
+        share = free * len(own) // comparison.size
+        noise = white(own, share) if errors == "independent" else describe(own, share, errors == "correlated")
+        noises.append(noise)
+        spread += noise.spread(rows[:, where])
+    spread += _from_levels(plan, comparison, z, rows)
+    known = prior_information(comparison.space)
+    scale = np.trace(spread) / max(np.trace(information), 1e-300)  # variance of the data, as information counts it
+    covariance, lost = combinations(information + scale * known, spread + scale**2 * known, comparison.space)
+    ssq = float(residuals @ residuals)
+    return Fit(plan, z, ssq, search, tuple(noises), covariance, lost, bounds, __version__)

@@ -1,0 +1,208 @@
+"""The compiled model of an experiment: parameters in, what the record should show and its derivatives out."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from steadyslip.kernels.experiment import LANES, experiment_program
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.engine import run_many
+from steadyslip.motion.setup import automatic_method, natural_scales
+from steadyslip.steady import steady_stress
+from steadyslip.values import Values, model_values
+
+Array = np.ndarray
+LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
+MOST_STEPS = 40  # per row of the table and lane, on average, before a trial is given up
+SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
+_STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Inputs of an experiment, as the kernels take them.
+
+    Attributes
+    ----------
+    segments : ndarray (jobs or 1, k, 9)
+        Start, end, jump of the load point, values and slopes of load-point velocity, disturbance and added normal
+        stress.
+    samples : ndarray of int (jobs or 1, k + 1)
+        Which sample lies at the start of each row, and at the end; -1 for none.
+    count : int
+        Number of samples.
+    node_rates : ndarray (jobs or 1, directions or 0, k)
+        How the start of each row moves in each direction.
+    input_rates : ndarray (jobs or 1, directions or 0, k, 3)
+        How the inputs at given times change in it.
+    """
+
+    segments: Array
+    samples: Array
+    count: int
+    node_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
+    input_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0, 3)))
+
+    def part(self, rows: Array | slice) -> Table:
+        """That of some jobs."""
+
+        def own(array: Array) -> Array:
+            return array if len(array) == 1 else np.ascontiguousarray(array[rows])
+
+        return Table(own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates))
+
+    def along(self, part: slice, size: int) -> Table:
+        """That of some directions, filled up to as many as a kernel has."""
+        rates = [
+            _padded(array[:, part], size) if array.shape[1] else array for array in (self.node_rates, self.input_rates)
+        ]
+        return Table(self.segments, self.samples, self.count, *rates)
+
+
+def _padded(array: Array, size: int) -> Array:
+    """Further directions in which nothing changes, up to a number of them."""
+    if array.shape[1] == size:
+        return np.ascontiguousarray(array)
+    missing = np.zeros((array.shape[0], size - array.shape[1], *array.shape[2:]))
+    return np.concatenate([array, missing], axis=1)
+
+
+class Forward:
+    """Runs an experiment for many sets of parameters at once.
+
+    Parameters
+    ----------
+    rig : Slider
+    names : sequence of str
+        Full dotted names of the parameters that vary.
+    rtol : float
+        Error allowed per step.
+    shifts : int
+        How many free times of the table there are besides.
+    threads : int, optional
+    sensitive : bool
+        Whether derivatives are wanted.
+    """
+
+    def __init__(
+        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, threads: int | None = None,
+        sensitive: bool = True,
+    ) -> None:  # fmt: skip
+        self.rig, self.names, self.rtol, self.shifts, self.threads = rig, tuple(names), rtol, shifts, threads
+        own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
+        self._base = model_values(rig, own)
+        self.model = self._base.model
+        reduction = experiment_program(self.model, 0, "tsit5").reduction
+        self.directions = len(names) + shifts if sensitive else 0
+        self.size = next((n for n in (0, *SIZES) if n >= self.directions), SIZES[-1])
+        self.program = experiment_program(self.model, self.size, automatic_method(reduction))
+
+    def values(self, parameters: Array) -> Values:
+        """The model's parameters for rows of the free ones, (jobs, names)."""
+        varied = {name: parameters[:, i] for i, name in enumerate(self.names)}
+        if self.rig.axial_stiffness is not None:  # k follows from other parameters
+            return model_values(self.rig, varied)
+        named = self._base.named() | varied
+        return replace(self._base, arguments=tuple(named.values()), shape=(len(parameters),))
+
+    def _chain(self, parameters: Array, values: Values) -> Array:
+        """How the model's parameters change with the free ones."""
+        order = {name: i for i, name in enumerate(self.model.parameters)}
+        chain = np.zeros((len(parameters), self.directions, len(order)))
+        if not self.directions:
+            return chain
+        for i, name in enumerate(self.names):
+            if name in order:
+                chain[:, i, order[name]] = 1.0
+        if self.rig.axial_stiffness is not None and "slider.stiffness" not in self.names:
+            for i, name in enumerate(self.names):
+                if name == "slider.axial_stiffness" or name.startswith("contact."):
+                    chain[:, i, order["slider.stiffness"]] = self._stiffness_slope(parameters, i)
+        return chain
+
+    def _stiffness_slope(self, parameters: Array, i: int) -> Array:
+        step = _STEP * (np.abs(parameters[:, i]) + 1e-3)
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = parameters.copy()
+            moved[:, i] += sign * step
+            ends.append(np.asarray(self.values(moved).named()["slider.stiffness"], dtype=float))
+        slope: Array = (ends[0] - ends[1]) / (2 * step)
+        return slope
+
+    def run(self, table: Table, parameters: Array, units: Array) -> Array:
+        """The friction coefficient that would be observed.
+
+        Parameters
+        ----------
+        table : Table
+            Its shifts as many as given to the constructor.
+        parameters : ndarray (jobs, names)
+        units : ndarray (jobs, names)
+            Change of each parameter that its derivative refers to.
+
+        Returns
+        -------
+        ndarray (jobs, 1 + directions, samples)
+            Friction, then its derivatives; NaN from where a motion cannot be continued, or where there is no
+            steady sliding to start from.
+        """
+        values = self.values(parameters)
+        sigma = np.broadcast_to(np.asarray(steady_stress(values), dtype=float), (len(parameters),))
+        chain = self._chain(parameters, values)
+        if not self.directions:
+            return self._run(table, values, sigma, chain)
+        chain[:, : len(self.names)] *= units[:, :, None]
+        parts = [slice(k, k + self.size) for k in range(0, self.directions, self.size)]
+        found = [
+            self._run(table.along(part, self.size), values, sigma, _padded(chain[:, part], self.size)) for part in parts
+        ]
+        return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
+
+    def _run(self, table: Table, values: Values, sigma: Array, chain: Array) -> Array:
+        """One pass, with as many directions as the kernel has."""
+        jobs = len(sigma)
+        constants, start = self.program.arrays(values.arguments, sigma, chain)
+        settings = self._settings(table, values, sigma, jobs)
+        good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
+        seen = np.full((jobs, 1 + chain.shape[1], table.count), np.nan)
+        steps = self.steps = np.zeros((jobs, 2))
+        if not np.all(good):
+            constants, start, settings, table = constants[good], start[good], settings[good], table.part(good)
+        found, taken = (seen, steps) if np.all(good) else (seen[good], steps[good])
+
+        def work(first: int, last: int, _: threading.Event) -> None:
+            part = slice(first, last)
+            own = table.part(part)
+            self.program.through_table(
+                constants[part], start[part], settings[part], own.segments, own.samples, own.node_rates,
+                own.input_rates, found[part], taken[part],
+            )  # fmt: skip
+
+        if len(found) <= LANES:
+            work(0, len(found), threading.Event())
+        else:
+            run_many(work, len(found), self.threads, LANES, lanes=LANES)
+        if found is not seen:
+            seen[good] = found
+        return seen
+
+    def _settings(self, table: Table, values: Values, sigma: Array, jobs: int) -> Array:
+        """rtol, guess of the unknown and its scale, limit of steps, absolute tolerances."""
+        reduction = self.program.reduction
+        scales, unknown = natural_scales(reduction, values.arguments, sigma)
+        size = len(reduction.names)
+        settings = np.empty((jobs, 4 + size * (1 + self.size)))
+        settings[:, 0] = self.rtol
+        settings[:, 1] = 0.0
+        settings[:, 2] = unknown
+        settings[:, 3] = MOST_STEPS * table.samples.shape[1] + 1000
+        for i, name in enumerate(reduction.names):
+            settings[:, 4 + i] = self.rtol * scales[name]
+            if self.size:
+                settings[:, 4 + size + i :: size] = (LOOSE * np.asarray(scales[name]) * np.ones(jobs))[:, None]
+        return settings

@@ -1,0 +1,330 @@
+"""What drives an experiment, as tables for the kernels: measured histories exactly at samples, or a protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import InternalError
+from steadyslip.core.records import parameters, twin
+from steadyslip.experiments.fitting.forward import Table
+from steadyslip.experiments.loading.pressing import LEAST_STRESS
+from steadyslip.experiments.measured.record import Record
+from steadyslip.protocol import Protocol, Segments, pack
+
+Array = np.ndarray
+LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
+PER_PERIOD = 200  # rows per period of a sine wave, on which it becomes straight: 1e-4 of its amplitude
+MOST_JUMPS = 20
+STRAIGHT = 5e-4  # of the range of the normal stress: what straight lines may miss of a smooth curve
+_SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
+
+
+@dataclass(frozen=True)
+class Sharp:
+    """Changes that happen at once, between two samples of a record.
+
+    Attributes
+    ----------
+    jumps : tuple of (float, float)
+        Times of the samples between which the normal stress, or a measured rate, jumped.
+    kinks : tuple of (float, float, float)
+        Times of the samples between which the displacement has a kink, and of the kink itself.
+    """
+
+    jumps: tuple[tuple[float, float], ...] = ()
+    kinks: tuple[tuple[float, float, float], ...] = ()
+
+    def rows(self, time: Array) -> Array:
+        """Samples around all of them, which a thinned record must keep."""
+        places = [int(np.searchsorted(time, change[0])) for change in (*self.jumps, *self.kinks)]
+        around = [np.arange(i - 3, i + 5) for i in places]
+        return np.unique(np.clip(np.concatenate([np.empty(0, dtype=int), *around]), 0, len(time) - 1))
+
+
+def sharp_changes(record: Record) -> Sharp:
+    """Find the changes of a record that straight lines between samples would smear.
+
+    A change counts if it stands out of those before and after it. When exactly a displacement bends follows from the
+    lines on both sides; when a stress jumps does not, and is left to the fit.
+    """
+    jumps: set[int] = set()
+    if record.normal is not None:
+        jumps |= set(_jumps(record.time, record.normal, LEAST_STRESS))
+    kinks: list[tuple[int, float]] = []
+    if record.integrated and record.velocity is not None:
+        jumps |= set(_jumps(record.time, record.velocity, LEAST_RATE))
+    elif record.displacement is not None:
+        kinks = _kinks(record.time, record.displacement)
+    t = record.time
+    return Sharp(
+        tuple((float(t[i]), float(t[i + 1])) for i in sorted(jumps)[:MOST_JUMPS]),
+        tuple((float(t[i]), float(t[i + 1]), moment) for i, moment in kinks if i not in jumps),
+    )
+
+
+def _jumps(time: Array, values: Array, least: float) -> Array:
+    """Places where a change from one sample to the next stands alone; `least` is a share of the values."""
+    size, spacing = np.abs(np.diff(values)), np.diff(time)
+    if len(size) < 5:
+        return np.empty(0, dtype=int)
+    usual = 1.4826 * float(np.median(size))
+    padded = np.pad(size / spacing, 2)
+    rates = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)  # of the two on both sides
+    alone = size > 8 * rates * spacing
+    return np.flatnonzero(alone & (size > least * float(np.max(np.abs(values)))) & (size > 20 * usual))
+
+
+def _kinks(time: Array, displacement: Array) -> list[tuple[int, float]]:
+    """Intervals within which two straight lines meet, and where."""
+    slopes = np.diff(displacement) / np.diff(time)
+    if len(slopes) < 7:
+        return []
+    before, after = np.full(len(slopes), np.nan), np.full(len(slopes), np.nan)
+    unlike = np.full(len(slopes), np.inf)
+    before[2:], after[:-2] = 0.5 * (slopes[1:-1] + slopes[:-2]), 0.5 * (slopes[1:-1] + slopes[2:])
+    unlike[2:-2] = np.abs(slopes[1:-3] - slopes[:-4]) + np.abs(slopes[4:] - slopes[3:-1])
+    change = np.abs(after - before)
+    with np.errstate(all="ignore"):
+        share = (slopes - after) / (before - after)  # of the interval that lies before the kink
+        clear = (change > 20 * unlike) & (change > 1e-3 * np.max(np.abs(slopes))) & (share > 1e-6) & (share < 1 - 1e-6)
+    return [(int(i), float(time[i] + share[i] * (time[i + 1] - time[i]))) for i in np.flatnonzero(clear)]
+
+
+def _through(time: Array, values: Array, jumping: set[float]) -> Any:
+    """A smooth curve through samples: local cubics; straight where something jumps."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    slopes = np.gradient(values, time)
+    for first in jumping:
+        i = int(np.searchsorted(time, first))
+        slopes[max(i - 1, 0) : i + 3] = 0.0
+    return CubicHermiteSpline(time, values, slopes)
+
+
+def _curved(time: Array, values: Array, jumping: set[float]) -> tuple[Array, Array]:
+    """Intervals on which a straight line would miss a smooth curve, and times that cut them finely enough.
+
+    The curve has to stand out of the noise: a sample is missed by the cubic through its neighbours by less than the
+    straight line misses the curve.
+    """
+    if len(time) < 8:
+        return np.empty(0, dtype=int), np.empty(0)
+    spacing = np.diff(time)
+    middle = 0.5 * (time[1:] + time[:-1])
+    misses = np.abs(_through(time, values, jumping)(middle) - 0.5 * (values[1:] + values[:-1]))
+    even, odd = np.arange(0, len(time), 2), np.arange(1, len(time) - 1, 2)
+    noise = float(np.median(np.abs(_through(time[even], values[even], set())(time[odd]) - values[odd])))
+    least = max(STRAIGHT * float(np.ptp(values)), 3 * noise)
+    for first in jumping:
+        i = int(np.searchsorted(time, first))
+        misses[max(i - 3, 0) : i + 4] = 0.0
+    places = np.flatnonzero(misses > least)
+    pieces = np.ceil(np.sqrt(misses[places] / least)).astype(int)
+    places, pieces = places[pieces > 1], np.minimum(pieces[pieces > 1], 20)
+    cuts = np.repeat(places, pieces - 1)
+    number = np.concatenate([np.arange(1, n) for n in pieces]) if len(pieces) else np.empty(0)
+    return cuts, time[cuts] + spacing[cuts] * number / np.repeat(pieces, pieces - 1)
+
+
+class MeasuredInputs:
+    """A record's own load point and normal stress between its samples, and what happens at once.
+
+    The load point moves along straight lines, the normal stress too unless it is clearly curved.
+
+    Parameters
+    ----------
+    record : Record
+    sharp : Sharp
+    pressed : ndarray (n,), optional
+        Change of the normal stress at the samples, Pa.
+    """
+
+    def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None) -> None:
+        time = record.time
+        self.origin, self.count = float(time[0]), len(time)
+        jumping, bending = {first for first, _ in sharp.jumps}, {first for first, _, _ in sharp.kinks}
+        curved, bent = _curved(time, pressed, jumping) if pressed is not None else (np.empty(0, dtype=int), np.empty(0))
+        moments = [*(float(np.mean(j)) for j in sharp.jumps), *(k[2] for k in sharp.kinks), *bent]
+        cuts = [*(int(np.searchsorted(time, j[0])) for j in sharp.jumps),
+                *(int(np.searchsorted(time, k[0])) for k in sharp.kinks), *curved]  # fmt: skip
+        order = np.argsort(moments, kind="stable")
+        places = np.array(cuts, dtype=int)[order]
+        nodes = np.insert(time, places + 1, np.array(moments, dtype=float)[order]) - self.origin
+        self.samples = np.insert(np.arange(len(time)), places + 1, -1)[None]
+        old = np.maximum.accumulate(np.where(self.samples[0] >= 0, self.samples[0], 0))[:-1]  # interval of each row
+        rows = np.zeros((1, len(nodes) - 1, 9))
+        rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
+        self._measured(rows[0], record, old, pressed, jumping)
+        halves = np.flatnonzero(self.samples[0][:-1] < 0)  # second parts of cut intervals
+        self.moving = np.array([row for row in halves if float(time[old[row]]) in jumping], dtype=int)
+        for row in halves:
+            first = float(time[old[row]])
+            if first in jumping or first in bending:
+                self._cut(rows[0], int(row), record, int(old[row]), first in jumping, pressed)
+        self.rows = rows
+
+    def _measured(self, rows: Array, record: Record, old: Array, pressed: Array | None, jumping: set[float]) -> None:
+        spacing = np.diff(record.time)
+        if record.displacement is not None:
+            rows[:, 3] = (np.diff(record.displacement) / spacing)[old]
+        if record.integrated and record.velocity is not None:  # the rate itself is the straight line
+            slope = (np.diff(record.velocity) / spacing)[old]
+            rows[:, 3] = record.velocity[old] + slope * (rows[:, 0] - (record.time[old] - self.origin))
+            rows[:, 6] = slope
+        if pressed is not None:
+            curve = _through(record.time, pressed, jumping)
+            before, after = curve(rows[:, 0] + self.origin), curve(rows[:, 1] + self.origin)
+            ends = np.append(self.samples[0][1:], 0)[: len(rows)] >= 0
+            before = np.where(self.samples[0][:-1] >= 0, pressed[old], before)
+            after = np.where(ends, pressed[old + 1], after)
+            rows[:, 5], rows[:, 8] = before, (after - before) / (rows[:, 1] - rows[:, 0])
+
+    def _cut(self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None) -> None:
+        """Two rows in place of one interval: levels where something jumps, two slopes where the displacement bends."""
+        if not jumps:
+            early, late = rows[row - 1, 1] - rows[row - 1, 0], rows[row, 1] - rows[row, 0]
+            if record.displacement is None:
+                raise InternalError("record.displacement is not None")
+            rate = (record.displacement[i] - record.displacement[i - 2]) / (record.time[i] - record.time[i - 2])
+            gone = record.displacement[i + 1] - record.displacement[i]
+            rows[row - 1, 3], rows[row, 3] = rate, (gone - rate * early) / late
+            return
+        if pressed is not None:
+            rows[row - 1, 5], rows[row, 5] = pressed[i], pressed[i + 1]
+            rows[row - 1 : row + 1, 8] = 0.0
+        if record.integrated and record.velocity is not None:
+            rows[row - 1, 3], rows[row, 3] = record.velocity[i], record.velocity[i + 1]
+            rows[row - 1 : row + 1, 6] = 0.0
+
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+        """The table for the times of the jumps.
+
+        Parameters
+        ----------
+        times : ndarray (jobs, jumps)
+            On the record's clock, s.
+        first : int
+            Direction of the first of them.
+        directions : int
+            How many directions there are; none are wanted if zero.
+        """
+        if not len(self.moving):
+            return Table(self.rows, self.samples, self.count)
+        rows = np.repeat(self.rows, len(times), axis=0)
+        rows[:, self.moving, 0] = rows[:, self.moving - 1, 1] = times - self.origin
+        if not directions:
+            return Table(rows, self.samples, self.count)
+        rates = np.zeros((1, directions, rows.shape[1]))
+        for k, row in enumerate(self.moving):
+            rates[0, first + k, row] = 1.0
+        return Table(rows, self.samples, self.count, rates)
+
+
+class ProtocolInputs:
+    """Tables of a protocol at a record's samples, for any values of its free times.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        Its times are on the record's clock.
+    velocity : float
+        Of the drive, m/s.
+    time : ndarray
+        Of the samples, s.
+    free : sequence of str
+        Names of free times, ``protocol.pieces.1.at``.
+    pressed : ndarray (n,), optional
+        Measured change of normal stress at the samples, Pa.
+    """
+
+    def __init__(
+        self, protocol: Protocol, velocity: float, time: Array, free: Sequence[str] = (), pressed: Array | None = None
+    ) -> None:
+        self.protocol, self.velocity, self.time, self.pressed = protocol, velocity, time, pressed
+        self.free = tuple(free)
+        self._plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
+
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+        """Tables for the free times (jobs, free); see `MeasuredInputs.table`."""
+        if not self.free:
+            return self._once
+        segments = self._packed(times)
+        moved = []
+        for k in range(len(self.free)) if directions else ():
+            shift = _SHIFT * np.eye(len(self.free))[k]
+            moved.append((first + k, self._packed(times + shift), self._packed(times - shift)))
+        return self._table(segments, moved, directions, len(times))
+
+    @cached_property
+    def _once(self) -> Table:
+        return self._table(pack(self.protocol, self.velocity, float(self.time[-1])), [], 0, 1)
+
+    def _packed(self, times: Array) -> Segments:
+        values = {name: times[:, i] for i, name in enumerate(self.free)}
+        return pack(twin(self.protocol, self._plain | values, "protocol."), self.velocity, float(self.time[-1]))
+
+    def _table(
+        self, segments: Segments, moved: Sequence[tuple[int, Segments, Segments]], directions: int, jobs: int
+    ) -> Table:
+        first, last = float(self.time[0]), float(self.time[-1])
+        starts = np.broadcast_to(segments.start, (jobs, segments.start.shape[1]))
+        extra = _wave_nodes(segments, first, last)
+        nodes = np.hstack([np.clip(starts, first, last), np.tile(np.append(self.time, extra), (jobs, 1))])
+        order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
+        ends = np.take_along_axis(nodes, order, axis=1)
+        begins = order < starts.shape[1]
+        own = np.maximum.accumulate(np.where(begins, order, 0), axis=1)[:, :-1]
+        samples = order - starts.shape[1]
+        samples = np.where((samples >= 0) & (samples < len(self.time)), samples, -1)
+        rows = np.zeros((jobs, ends.shape[1] - 1, 9))
+        rows[:, :, 0], rows[:, :, 1] = ends[:, :-1], ends[:, 1:]
+        inside = begins & (np.take_along_axis(np.hstack([starts, nodes[:, starts.shape[1] :]]), order, 1) >= first)
+        rows[:, :, 2] = np.where(inside[:, :-1], _of(segments.jump, own, jobs), 0.0)
+        before = _at(segments, own, rows[:, :, 0], jobs)
+        after = _at(segments, own, rows[:, :, 1], jobs)
+        if self.pressed is not None:
+            before[:, :, 2] += np.interp(rows[:, :, 0], self.time, self.pressed)
+            after[:, :, 2] += np.interp(rows[:, :, 1], self.time, self.pressed)
+        spacing = (rows[:, :, 1] - rows[:, :, 0])[:, :, None]
+        rows[:, :, 3:6] = before
+        rows[:, :, 6:9] = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
+        table = Table(rows, np.ascontiguousarray(samples), len(self.time))
+        if not moved:
+            return table
+        node_rates = np.zeros((jobs, directions, rows.shape[1]))
+        input_rates = np.zeros((jobs, directions, rows.shape[1], 3))
+        middle = 0.5 * (rows[:, :, 0] + rows[:, :, 1])
+        for direction, plus, minus in moved:
+            shift = (plus.start - minus.start) / (2 * _SHIFT)
+            node_rates[:, direction] = np.where(inside[:, :-1], _of(shift, own, jobs), 0.0)
+            change = _at(plus, own, middle, jobs) - _at(minus, own, middle, jobs)
+            input_rates[:, direction] = change / (2 * _SHIFT)
+        return Table(rows, table.samples, table.count, node_rates, input_rates)
+
+
+def _of(array: Array, own: Array, jobs: int) -> Array:
+    return np.take_along_axis(np.broadcast_to(array, (jobs, *array.shape[1:])), own, axis=1)
+
+
+def _at(segments: Segments, own: Array, times: Array, jobs: int) -> Array:
+    """Inputs of the segments `own` at given times, (jobs, rows, 3)."""
+    since = (times - _of(segments.start, own, jobs))[:, :, None]
+    lane = np.arange(jobs)[:, None] if len(segments.start) > 1 else np.zeros((jobs, 1), dtype=int)
+    found: Array = segments.value[lane, own] + segments.slope[lane, own] * since
+    if segments.amplitude.shape[-1]:
+        angle = segments.angular_frequency[lane, own] * since[..., None] + segments.phase[lane, own]
+        found = found + np.sum(segments.amplitude[lane, own] * np.sin(angle), axis=-1)
+    return found
+
+
+def _wave_nodes(segments: Segments, first: float, last: float) -> Array:
+    """Further rows, so that sine waves are nearly straight on each."""
+    fastest = float(segments.angular_frequency.max(initial=0.0))
+    if not fastest:
+        return np.empty(0)
+    return np.arange(first, last, 2 * np.pi / fastest / PER_PERIOD)[1:]

@@ -1,0 +1,341 @@
+"""What a fit compares: rig, records, what drives the model, what is free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import Address, parameters, resolve
+from steadyslip.experiments.fitting.commanded import CommandedInputs
+from steadyslip.experiments.fitting.comparison import (
+    LOSSES,
+    Comparison,
+    Part,
+    jump_unknowns,
+    step_unknowns,
+    trend_rows,
+    trend_unknowns,
+)
+from steadyslip.experiments.fitting.forward import Forward
+from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
+from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
+from steadyslip.experiments.loading.kinks import smooth_load
+from steadyslip.experiments.loading.loading import Loading
+from steadyslip.experiments.measured.record import Record
+from steadyslip.laws.contact import Constant
+from steadyslip.laws.contact.basic import Prescribed
+from steadyslip.machine.slider import Slider
+from steadyslip.protocol import Protocol
+from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
+
+Array = np.ndarray
+AXES = ("displacement", "time")
+DRIVES = ("commanded", "smoothed", "measured", "protocol")
+NEVER_FREE = ("drive.velocity", "slider.area", "friction.v_ref")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything about a fit but its result.
+
+    Attributes
+    ----------
+    rig : Slider
+        Laws, and the values of what is not free.
+    records : tuple of Record
+    free : tuple of str
+        Full names of the free parameters of the rig, and of free times ``protocol.pieces.1.at``.
+    separate : tuple of str
+        Those of them that every record has to itself.
+    drive : str
+        What moves the load point: the ``commanded`` loading found in the record, its displacement ``smoothed`` or as
+        ``measured``, or the ``protocol``.
+    protocol : Protocol or None
+        On the records' clock.
+    trend : int
+        Order of a polynomial that is added to friction.
+    trend_axis : str
+        ``displacement`` or ``time``.
+    offset : bool
+        Whether a constant is added to friction, besides mu_ref.
+    loss : str
+    width : float or None
+        Residual from which on outliers weigh less.
+    weights : tuple of ndarray or None
+    rtol : float
+        Error allowed per step of the model.
+    sharp : tuple of Sharp
+        What happens at once in each record that drives the model as measured.
+    loading : tuple of Loading
+        What was commanded in each record, as found in its columns.
+    """
+
+    rig: Slider
+    records: tuple[Record, ...]
+    free: tuple[str, ...]
+    separate: tuple[str, ...] = ()
+    drive: str = "commanded"
+    protocol: Protocol | None = None
+    trend: int = 0
+    trend_axis: str = "displacement"
+    offset: bool = False
+    loss: str = "linear"
+    width: float | None = None
+    weights: tuple[Array, ...] | None = field(default=None, repr=False)
+    rtol: float = 1e-7
+    sharp: tuple[Sharp, ...] = field(default=(), repr=False)
+    loading: tuple[Loading, ...] = field(default=(), repr=False)
+
+    @property
+    def follows(self) -> bool:
+        """Whether the model follows a loading that was found, not a column sample by sample."""
+        return self.protocol is None and self.drive != "measured"
+
+    @property
+    def pressed(self) -> bool:
+        """Whether the normal stress is imposed, so that the record's own drives the model."""
+        return isinstance(self.rig.contact, (Constant, Prescribed))
+
+    def space(self) -> Space:
+        """The unknowns: shared ones, separate ones record by record, trends."""
+        several = len(self.records) > 1
+        found: list[Unknown] = []
+        for name in self.free:
+            for record in range(len(self.records)) if name in self.separate and several else [None]:
+                found.append(self._unknown(name, record))
+        for i in range(len(self.records)):
+            label = i if several else None
+            if self.follows:
+                found += step_unknowns(label, self.loading[i], self.pressed)
+            else:
+                found += jump_unknowns(label, self.sharp[i])
+            found += trend_unknowns(i if several else None, self.trend, self.offset)
+        return Space(tuple(found))
+
+    def _unknown(self, name: str, record: int | None) -> Unknown:
+        if name.startswith("protocol."):
+            if self.protocol is None:
+                raise InternalError("self.protocol is not None")
+            address = parameters(self.protocol, "protocol.")[name]
+            return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
+        return unknown(self.rig.parameters()[name], record)
+
+    def comparison(self, threads: int | None = None) -> Comparison:
+        """Records against the model."""
+        space = self.space()
+        parts = tuple(self._part(i, record, space, threads) for i, record in enumerate(self.records))
+        return Comparison(parts, space, self.loss, self.width or 1.0)
+
+    def _part(self, i: int, record: Record, space: Space, threads: int | None) -> Part:
+        rig, pressed = self.driven(record, i)
+        places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
+        for place, one in enumerate(space.unknowns):
+            if one.record in (None, i):
+                kinds = {"protocol": "time", "jump": "time", "step": "time", "trend": "trend", "offset": "trend"}
+                places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
+        names = [space.unknowns[place].parameter for place in places["rig"]]
+        times = [space.unknowns[place].parameter for place in places["time"]]
+        forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads)
+        inputs: Any
+        moved: Array | None = None
+        if self.follows:
+            inputs = CommandedInputs(self.loading[i], record.time, self.pressed and record.normal is not None)
+            load = self.loading[i].load
+            moved = None if load is None else load.integral(record.time)
+        elif self.protocol is None:
+            inputs = MeasuredInputs(record, self.sharp[i], pressed)
+        else:
+            own_stress = any(piece.channel == NORMAL_STRESS for piece in self.protocol.pieces)
+            inputs = ProtocolInputs(
+                self.protocol, rig.drive.velocity, record.time, times, None if own_stress else pressed
+            )
+        weights = np.ones(len(record)) if self.weights is None else self.weights[i]
+        return Part(
+            record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
+            tuple(places["trend"]), trend_rows(record, self.trend, self.offset, self.trend_axis, moved),
+        )  # fmt: skip
+
+    def driven(self, record: Record, i: int) -> tuple[Slider, Array | None]:
+        """The rig as a record drives it, and the measured change of normal stress (Pa) where that is imposed."""
+        rig = self.rig
+        if self.protocol is None:
+            load = self.loading[i].load if self.follows else None
+            rate = record.initial_rate if load is None else float(load.at(record.time[:1])[0])
+            if rate is None:
+                raise InternalError("rate is not None")
+            rig = rig.with_values({"drive.velocity": rate})
+        if not self.pressed or record.normal is None:
+            return rig, None
+        stress = None if self.drive == "measured" else self.loading[i].stress
+        if stress is not None and not self.follows:  # of a protocol that leaves the normal stress to the record
+            pressed = stress.at(record.time)
+            rig = replace(rig, contact=Constant(steady_normal_stress=float(pressed[0])))
+            return rig, (record.normal if stress.changes else pressed) - pressed[0]
+        if stress is not None:
+            return replace(rig, contact=Constant(steady_normal_stress=float(stress.at(record.time[:1])[0]))), None
+        rig = replace(rig, contact=Constant(steady_normal_stress=float(record.normal[0])))
+        return rig, record.normal - record.normal[0]
+
+
+def make_plan(
+    rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
+    separate: Sequence[str] = (), protocol: Any = None, **options: Any,
+) -> Plan:  # fmt: skip
+    """A plan from what a user gives; see `steadyslip.fit`.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    """
+    if not isinstance(rig, Slider):
+        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig or lab_rig gives")])
+    many = (records,) if isinstance(records, Record) else tuple(records)
+    if not many or not all(isinstance(record, Record) for record in many):
+        raise ParameterError(
+            [Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
+        )
+    plan_protocol = None if protocol is None else Protocol.of(protocol)
+    problems: list[Problem] = []
+    known = _can_be_free(rig, plan_protocol)
+    names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
+    if free is not None and "friction.mu_ref" in known and "friction.mu_ref" not in names:
+        names = [*names, "friction.mu_ref"]
+    held = _resolved("fixed", fixed, rig.parameters(), problems)
+    names = [name for name in dict.fromkeys(names) if name not in held]
+    apart = _resolved("separate", separate, dict.fromkeys(names), problems)
+    problems += _bad_options(options)
+    if not names and not problems:
+        problems.append(
+            Problem("free", "nothing is free; name parameters such as friction.a, friction.b, friction.d_c")
+        )
+    weights = options.get("weights")
+    if weights is not None and not problems:
+        options["weights"] = _checked_weights(weights, many, problems)
+    if problems:
+        raise ParameterError(problems)
+    if plan_protocol is not None:
+        options["drive"] = "protocol"
+    plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
+    _check_records(plan)
+    return with_loading(plan)
+
+
+def with_loading(plan: Plan) -> Plan:
+    """The plan knowing what drives the model in its records, which thinned ones no longer tell."""
+    if plan.drive == "measured":
+        drivers = (record if plan.pressed else replace(record, normal=None) for record in plan.records)
+        return replace(plan, sharp=tuple(sharp_changes(driver) for driver in drivers), loading=())
+    found = []
+    for record in plan.records:
+        loading = record.loading
+        if plan.drive == "smoothed" and record.displacement is not None:
+            loading = replace(loading, load=smooth_load(record.time, record.displacement))
+        found.append(loading)
+    return replace(plan, sharp=tuple(Sharp() for _ in plan.records), loading=tuple(found))
+
+
+def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
+    found = {
+        name: a for name, a in rig.parameters().items()
+        if a.value is not None and name not in NEVER_FREE and not a.role.gauge
+    }  # fmt: skip
+    if protocol is not None:
+        found |= {n: a for n, a in parameters(protocol, "protocol.").items() if n.endswith(".at")}
+    return found
+
+
+def _default_free(rig: Slider) -> list[str]:
+    """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
+    found = [name for name in _can_be_free(rig, None) if name.startswith("friction.")]
+    return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
+
+
+def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
+    if isinstance(names, str):
+        names = [names]
+    found = []
+    for name in names:
+        try:
+            found.append(resolve(name, known))
+        except (UnknownNameError, AttributeError) as error:
+            message = (
+                str(error) if isinstance(error, UnknownNameError) else f"got {name!r}; allowed: names of parameters"
+            )
+            problems.append(Problem(what, message))
+    return found
+
+
+def _bad_options(options: dict[str, Any]) -> list[Problem]:
+    problems = []
+    choices = {"trend_axis": AXES, "drive": DRIVES[:3], "loss": LOSSES}
+    for name, allowed in choices.items():
+        if options.get(name, allowed[0]) not in allowed:
+            problems.append(Problem(name, unknown_name("choice", options[name], allowed)))
+    trend = options.get("trend", 0)
+    if not (isinstance(trend, int) and not isinstance(trend, bool) and 0 <= trend <= 6):
+        problems.append(Problem("trend", f"got {trend!r}; allowed: a whole number from 0 (none) to 6"))
+    if not isinstance(options.get("offset", False), bool):
+        problems.append(Problem("offset", f"got {options['offset']!r}; allowed: true or false"))
+    width = options.get("width")
+    if width is not None and not (isinstance(width, (int, float)) and width > 0):
+        problems.append(Problem("width", f"got {width!r}; allowed: a number > 0, in units of what is fitted"))
+    return problems
+
+
+def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[Problem]) -> tuple[Array, ...] | None:
+    rows = [weights] if len(records) == 1 and np.ndim(weights[0]) == 0 else list(weights)
+    found = []
+    for i, record in enumerate(records):
+        row = np.asarray(rows[i], dtype=float) if i < len(rows) else np.empty(0)
+        if row.shape != (len(record),) or not np.all((row >= 0) & np.isfinite(row)):
+            problems.append(Problem("weights", f"allowed: {len(record)} finite numbers >= 0 for record {i + 1}"))
+            return None
+        found.append(row)
+    return tuple(found)
+
+
+def _check_records(plan: Plan) -> None:
+    problems = []
+    drives = plan.protocol is not None and any(piece.channel == LOAD_POINT for piece in plan.protocol.pieces)
+    given = float(plan.rig.drive.velocity)
+    for i, record in enumerate(plan.records, start=1):
+        where = "record" if len(plan.records) == 1 else f"record {i}"
+        if plan.protocol is None and record.displacement is None:
+            problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or rate; "
+                                    "name it, or give the protocol of the experiment"))  # fmt: skip
+        elif plan.protocol is None and not (record.initial_rate or 0.0) > 0:
+            problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
+                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding, so cut it "
+                                    "with between=(start, end)"))  # fmt: skip
+        rate = record.initial_rate or 0.0
+        if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
+            message = f"got {shown(given, 'm/s')}, but {record.source} begins at {shown(rate, 'm/s')}; make them agree"
+            problems.append(Problem("drive.velocity", message))
+        if plan.protocol is not None and not drives and record.displacement is not None:
+            problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "
+                                    "away, or give it a velocity-step, hold or velocity-table"))  # fmt: skip
+        if plan.protocol is not None and record.time[0] < 0:
+            problems.append(
+                Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
+            )
+        needed = len(plan.free) + plan.trend + plan.offset
+        if len(record) <= needed:
+            problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))
+    if problems:
+        raise ParameterError(problems)
+
+
+def check_width(plan: Plan, residuals: Array) -> Plan:
+    """The plan with a width for its loss: 1.345 standard deviations of most residuals, unless given."""
+    if plan.loss == "linear" or plan.width is not None:
+        return plan
+    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
+    if not spread > 0:
+        raise NotAvailable("residuals have no width; use loss='linear'")
+    return replace(plan, width=1.345 * spread)

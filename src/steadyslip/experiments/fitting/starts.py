@@ -1,0 +1,247 @@
+"""Where a fit starts, from the record itself: nobody has to guess.
+
+The direct effect is at least the first response to a step of the rate, the drop to the new steady friction gives
+a − b, the steepest rise of friction with displacement is at most the stiffness over normal stress, and the slip
+distance lies between a sample's and the whole record's. Many combinations are tried side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.core.errors import InternalError
+from steadyslip.experiments.fitting.commanded import CommandedInputs, windows
+from steadyslip.experiments.fitting.comparison import Part
+from steadyslip.experiments.fitting.inputs import ProtocolInputs
+from steadyslip.experiments.fitting.unknowns import Space, Unknown
+from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.measured.steps import Step
+from steadyslip.steady import steady_state
+
+Array = np.ndarray
+STARTS = 48
+NEARBY = 0.5  # share of the window of a time over which starts are spread
+STIFFEST = 100.0  # k d_c/(aσ) of a start: beyond, a record shows no more of the stiffness
+_DIRECT = (0.004, 0.01, 0.025)  # values of a where no step of the rate tells
+
+
+@dataclass(frozen=True)
+class Features:
+    """What a record tells before anything is fitted.
+
+    Attributes
+    ----------
+    friction : float
+        At the beginning.
+    direct : float or None
+        First response to the largest step of the rate, per e-fold.
+    drop : float or None
+        Change of steady friction per e-fold, a − b.
+    slope : float
+        Steepest rise of friction with displacement of the load point, 1/m.
+    least_slope : float
+        Range of friction over the whole displacement, 1/m.
+    shortest, longest : float
+        Slip distances that could show, m.
+    """
+
+    friction: float
+    direct: float | None
+    drop: float | None
+    slope: float
+    least_slope: float
+    shortest: float
+    longest: float
+
+
+def features(record: Record, rate: float) -> Features:
+    """Read the features off a record; `rate` is the load-point rate at its start, m/s."""
+    time, mu = record.time, record.friction
+    moved = _moved(record, rate)
+    first = max(5, len(mu) // 50)
+    level = float(np.median(mu[:first]))
+    steps = [s for s in record.steps if s.kind == "velocity step"]
+    steps.sort(key=lambda s: -abs(np.log(s.after / s.before)))
+    slope = max((_steepest(record, moved, s) for s in record.steps), default=_steepest_anywhere(moved, mu))
+    total = max(float(moved[-1]), 1e-12)
+    spacing = float(np.median(np.diff(time))) * max(rate, *(s.after for s in steps), 0.0) if steps else total / len(mu)
+    shortest = max(min(0.5 * spacing, total / 50), total * 1e-5)
+    direct = drop = None
+    if steps:
+        direct, drop = _response(record, moved, steps[0])
+    return Features(level, direct, drop, slope, float(np.ptp(mu)) / total, shortest, total / 2)
+
+
+def _moved(record: Record, rate: float) -> Array:
+    """How far the load point has moved, as its steps say: without the noise of a measured displacement."""
+    time = record.time
+    changes = [(s.time, s.duration, s.after) for s in record.steps if not s.kind.startswith("normal")]
+    knots, rates = [float(time[0])], [rate]
+    for moment, duration, after in changes:
+        knots += [moment, moment + max(duration, 1e-9 * (time[-1] - time[0]))]
+        rates += [rates[-1], after]
+    knots.append(float(time[-1]) + 1.0)
+    rates.append(rates[-1])
+    along = np.interp(time, knots, rates)
+    return np.concatenate([[0.0], np.cumsum(0.5 * (along[1:] + along[:-1]) * np.diff(time))])
+
+
+def _response(record: Record, moved: Array, step: Step) -> tuple[float, float]:
+    """Peak and steady change of friction per e-fold, without the trend before the step."""
+    time, mu = record.time, record.friction
+    fold = float(np.log(step.after / step.before))
+    others = [s.time for s in record.steps if s.time > step.time + step.duration]
+    end = min(others, default=float(time[-1]))
+    earlier = [s.time + s.duration for s in record.steps if s.time < step.time]
+    begin = max(earlier, default=float(time[0]))
+    before = (time < step.time) & (time > step.time - 0.5 * (step.time - begin))
+    after = (time >= step.time) & (time <= end)
+    late = after & (moved > moved[after][0] + 0.7 * (moved[after][-1] - moved[after][0]))
+    level = float(np.mean(mu[before])) if np.any(before) else float(mu[0])
+    noise = float(np.std(mu[before])) if np.sum(before) > 5 else 0.0
+    deviation = (mu[after] - level) * np.sign(fold)
+    soon = deviation[: max(5, int(0.3 * len(deviation)))]
+    peak = max(float(np.max(_smoothed(soon))) - noise, 1e-4)
+    return peak / abs(fold), (float(np.mean(mu[late])) - level) / fold if np.any(late) else 0.0
+
+
+def _smoothed(values: Array, width: int = 3) -> Array:
+    if len(values) < width:
+        return values
+    return np.convolve(values, np.ones(width) / width, mode="valid")
+
+
+def _steepest(record: Record, moved: Array, step: Step) -> float:
+    """Rise of friction with displacement right after a step; without the jump of friction at one of normal stress."""
+    begin = max(int(np.searchsorted(record.time, step.time)) - 1, 0)
+    if step.unit == "Pa":
+        begin = int(np.searchsorted(record.time, step.time + step.duration, side="right")) + 1
+    part = slice(begin, begin + 200)
+    if len(record.time[part]) < 3:
+        return 0.0
+    return _steepest_anywhere(moved[part], record.friction[part])
+
+
+def _steepest_anywhere(moved: Array, mu: Array) -> float:
+    """Largest slope that stands out of the noise."""
+    noise = 1.4826 * float(np.median(np.abs(np.diff(mu)))) / np.sqrt(2) if len(mu) > 3 else 0.0
+    best = 0.0
+    for width in (2, 3, 5, 9, 17, 33, 65):
+        if len(mu) <= width:
+            break
+        rise = np.abs(mu[width:] - mu[:-width]) - 5 * noise
+        gone = moved[width:] - moved[:-width]
+        moving = gone > 3e-4 * (moved[-1] - moved[0])
+        best = max(best, float(np.max(rise[moving] / gone[moving], initial=0.0)))
+    return max(best, float(np.ptp(mu)) / max(float(np.ptp(moved)), 1e-12))
+
+
+def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, already: int = 0) -> Array:
+    """Coordinates to start from, (count, p): a design over what the records leave open, continued after `already`."""
+    from scipy.stats import qmc
+
+    found = [features(part.record, part.rig.drive.velocity) for part in parts]
+    grid = qmc.Halton(6, rng=12345).random(already + count)[already:]
+    shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
+    d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
+    directs = [f.direct for f in found if f.direct is not None]
+    drops = [f.drop for f in found if f.drop is not None]
+    if directs:
+        a = np.clip(max(directs), 5e-4, 0.2) * 4.0 ** grid[:, 1]
+        b = a - (float(np.median(drops)) if drops else 0.0)
+    else:
+        a = np.array(_DIRECT)[(grid[:, 1] * len(_DIRECT)).astype(int)]
+        b = a * (0.7 + 0.8 * grid[:, 2])
+    steepness = max(f.slope for f in found) * 10.0 ** (1.2 * grid[:, 3] - 0.1)
+    steepness = np.minimum(steepness, STIFFEST * a / d_c)
+    alpha = 0.1 + 0.5 * grid[:, 4]
+    alike = np.argsort(steepness / a)  # lanes of one vector wait for the stiffest of them
+    d_c, a, b, steepness, alpha, grid = (x[alike] for x in (d_c, a, b, steepness, alpha, grid))
+    values = np.zeros((count, len(space)))
+    for i, unknown in enumerate(space.unknowns):
+        part = parts[unknown.record or 0]
+        own = found[unknown.record or 0]
+        values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, grid[:, 5]))
+    return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
+
+
+def search_bounds(parts: Sequence[Part], space: Space) -> tuple[Array, Array]:
+    """Bounds of the coordinates: of the parameters themselves, and of what records can show.
+
+    A slip distance far below what passes between samples, or far above the whole record, changes nothing any more.
+    """
+    low, high = space.low.copy(), space.high.copy()
+    found = [features(part.record, part.rig.drive.velocity) for part in parts]
+    for i, unknown in enumerate(space.unknowns):
+        own = found if unknown.record is None else [found[unknown.record]]
+        last = unknown.parameter.rpartition(".")[2]
+        if last in ("d_c", "slip_distance"):
+            ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
+        elif last == "a":
+            ends = 1e-5, 1.0
+        elif last in ("stiffness", "axial_stiffness", "kp"):
+            stress = max(_stress(part) for part in parts)
+            ends = min(f.least_slope for f in own) * stress * 1e-2, max(f.slope for f in own) * stress * 1e3
+        else:
+            continue
+        low[i] = max(low[i], float(unknown.coordinate(ends[0])))
+        high[i] = min(high[i], float(unknown.coordinate(ends[1])))
+    return low, high
+
+
+def _start(unknown: Unknown, part: Part, own: Features, design: tuple[Array, ...]) -> Array:
+    """Starting values of one parameter."""
+    name = unknown.parameter
+    d_c, a, b, steepness, alpha, spare = design
+    rig = part.rig
+    last = name.rpartition(".")[2]
+    if name == "friction.a":
+        return a
+    if name == "friction.mu_ref":
+        reference = rig.parameters()["friction.v_ref"].value or 1.0
+        return np.asarray(own.friction - (a - b) * np.log(rig.drive.velocity / reference))
+    if last == "b":
+        if ".states." in name:  # the first state takes up what the others leave
+            member = int(name.split(".")[2])
+            return b * (0.35 + 0.5 * spare) if member == 1 else b * (0.65 - 0.5 * spare)
+        return b
+    if last in ("d_c", "slip_distance"):
+        member = int(name.split(".")[2]) if ".states." in name else 1
+        return d_c * (3.0 + 30.0 * spare) ** (member - 1)
+    if last == "alpha":
+        return alpha
+    if last in ("stiffness", "axial_stiffness", "kp"):
+        return steepness * _stress(part)
+    if name.startswith(("trend.", "offset")):
+        return np.zeros_like(a)
+    if name.startswith("step."):
+        return _near(unknown, part, spare)
+    if name.startswith("jump."):
+        return unknown.low + (unknown.high - unknown.low) * spare
+    present = float(rig.parameters()[name].value or 0.0) if name in rig.parameters() else None
+    if present is None:
+        return np.full_like(a, _time_of(name, part))
+    return present * 10.0 ** (2 * spare - 1) if present else 0.02 * (spare - 0.5)
+
+
+def _near(unknown: Unknown, part: Part, spare: Array) -> Array:
+    """Starting values of a time that the record leaves open: as it has it, or anywhere between two samples."""
+    if not isinstance(part.inputs, CommandedInputs):
+        raise InternalError("times of changes are free in commanded loading only")
+    begin = {(low, high): value for value, low, high in windows(part.inputs.changes)}[(unknown.low, unknown.high)]
+    return np.asarray(begin + NEARBY * (spare - 0.5) * (unknown.high - unknown.low))
+
+
+def _stress(part: Part) -> float:
+    """Normal stress to begin with, Pa."""
+    return float(part.record.normal[0]) if part.record.normal is not None else steady_state(part.rig).normal_stress
+
+
+def _time_of(name: str, part: Part) -> float:
+    """A free time of the protocol: as the protocol has it."""
+    if not isinstance(part.inputs, ProtocolInputs):
+        raise InternalError("isinstance(part.inputs, ProtocolInputs)")
+    return float(part.inputs._plain[name] or 0.0)

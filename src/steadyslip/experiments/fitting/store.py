@@ -1,0 +1,199 @@
+"""Fits as netCDF files: everything that is needed to go on with one, records included; opening executes nothing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, SteadyslipError
+from steadyslip.experiments.fitting.identify import Combination
+from steadyslip.experiments.fitting.plan import DRIVES, Plan, make_plan
+from steadyslip.experiments.fitting.result import Fit, Search
+from steadyslip.experiments.measured.columns import ROLES
+from steadyslip.experiments.measured.record import Record, whole_record
+from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.files.sealed import Kind
+from steadyslip.files.tables import Column, Table, write_table
+
+FIT = Kind("fit", 2, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+_ATTRIBUTES = {
+    "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
+    "steadyslip": str,
+}  # fmt: skip
+_OPTIONS = {
+    "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "loss": str,
+    "width": {float, None}, "rtol": float,
+}  # fmt: skip
+_FORMS = {
+    "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
+    "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool},
+    "unidentified": [{"weights": {str: float}, "deviation": float}],
+    "noise": [(float, bool, float)],
+    "records": [(str, [str], bool)],
+}
+"""What the attributes hold as JSON; see `steadyslip.files.tables.fits_form`."""
+
+
+def to_dataset(fit: Fit) -> Any:
+    """The fit as an xarray.Dataset."""
+    import xarray as xr
+
+    from steadyslip.files.specifications import rig_to_text
+
+    names = list(fit.names)
+    variables: dict[str, Any] = {
+        "coordinates": ("parameter", fit.coordinates, {"long_name": "place of the minimum, logarithms where positive"}),
+        "value": ("parameter", np.array(list(fit.values.values())), {}),
+        "error": ("parameter", np.array(list(fit.errors.values())), {}),
+        "unit": ("parameter", np.array([one.unit for one in fit.space.unknowns], dtype=object), {}),
+        "covariance": (("parameter", "other"), fit.covariance, {"long_name": "of the coordinates"}),
+        "bound": (("parameter", "side"), np.array(fit.bounds).T, {}),
+    }
+    for i, (record, noise) in enumerate(zip(fit.plan.records, fit.noise, strict=True), start=1):
+        dim = f"sample_{i}"
+        for name, unit in ROLES.items():
+            if (column := getattr(record, name)) is not None:
+                variables[f"{name}_{i}"] = (dim, np.asarray(column), {"units": unit})
+        if fit.plan.weights is not None:
+            variables[f"weight_{i}"] = (dim, fit.plan.weights[i - 1], {})
+        variables[f"model_{i}"] = (dim, fit.part(fit.model, i - 1), {"units": "1"})
+        variables[f"noise_coefficients_{i}"] = (f"order_{i}", noise.coefficients, {})
+        variables[f"noise_covariance_{i}"] = (f"lag_{i}", noise.covariance, {})
+    options = {name: getattr(fit.plan, name) for name in _OPTIONS}
+    options["weighted"] = fit.plan.weights is not None
+    options["columns"] = [[n for n in ROLES if getattr(r, n) is not None] for r in fit.plan.records]
+    attributes = {
+        "rig": rig_to_text(fit.plan.rig, fit.plan.protocol),
+        "options": json.dumps(options),
+        "ssq": fit.ssq,
+        "search": json.dumps(vars(fit.search)),
+        "unidentified": json.dumps([vars(one) for one in fit.unidentified]),
+        "noise": json.dumps([[n.lag1, n.correlated, n.innovation] for n in fit.noise]),
+        "records": json.dumps([[r.source, list(r.notes), r.integrated] for r in fit.plan.records]),
+        "steadyslip": fit.version,
+    }
+    return xr.Dataset(variables, coords={"parameter": names, "other": names}, attrs=attributes)
+
+
+def save(fit: Fit, path: str | PathLike[str]) -> None:
+    """Write a fit; a file of that name is replaced only once the new one is whole.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    write_table(path, FIT, to_dataset(fit))
+
+
+def load_fit(path: str | PathLike[str]) -> Fit:
+    """Read a fit that `Fit.save` wrote.
+
+    Nothing in the file is executed; damage is found, whatever it is.
+
+    Raises
+    ------
+    NotAvailable
+        If the file is not one of ours, is damaged, or cannot be read.
+    """
+    table = Table(path, FIT, _ATTRIBUTES)
+    stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
+    described, noises = stored["records"], stored["noise"]
+    weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")
+    if not 0 < len(described) == len(noises) == len(present):
+        raise table.fault(f"it has {len(described)} records, {len(present)} sets of columns and {len(noises)} noises")
+    found = table.columns(_columns(present, weighted))
+    records = tuple(_record(table, found, i, *about) for i, about in enumerate(described, start=1))
+    weights = [found[f"weight_{i}"] for i in range(1, len(records) + 1)] if weighted else None
+    plan = _plan(table, records, stored["options"], weights)
+    names = [one.name for one in plan.space().unknowns]
+    if not (names == found["parameter"] == found["other"]):
+        raise table.fault(f"its parameters are {', '.join(found['parameter']):.200}; expected {', '.join(names)}")
+    if table.sizes["side"] != 2:
+        raise table.fault("its bounds have no two sides")
+    search = stored["search"]
+    fit = Fit(
+        plan=plan,
+        coordinates=found["coordinates"],
+        ssq=table.attributes["ssq"],
+        search=Search(**search | {"others": tuple(search["others"])}),
+        noise=tuple(
+            Noise(lag1, correlated, found[f"noise_coefficients_{i}"], innovation, found[f"noise_covariance_{i}"])
+            for i, (lag1, correlated, innovation) in enumerate(noises, start=1)
+        ),
+        covariance=found["covariance"],
+        unidentified=tuple(Combination(**one) for one in stored["unidentified"]),
+        bounds=(found["bound"][:, 0].copy(), found["bound"][:, 1].copy()),
+        version=table.attributes["steadyslip"],
+    )
+    _check(table, fit)
+    return fit
+
+
+def _columns(present: list[list[str]], weighted: bool) -> dict[str, Column]:
+    """What a fit to records with these columns must hold."""
+    along = ("parameter",)
+    found = {name: Column(along) for name in ("coordinates", "value", "error")}
+    found |= {"parameter": Column(along, text=True), "other": Column(("other",), text=True)}
+    found |= {"unit": Column(along, text=True), "covariance": Column(("parameter", "other"))}
+    found["bound"] = Column(("parameter", "side"))
+    for i, names in enumerate(present, start=1):
+        samples = (f"sample_{i}",)
+        found |= {f"{name}_{i}": Column(samples, ROLES.get(name, "")) for name in names}
+        found[f"model_{i}"] = Column(samples, "1")
+        if weighted:
+            found[f"weight_{i}"] = Column(samples)
+        found[f"noise_coefficients_{i}"] = Column((f"order_{i}",))
+        found[f"noise_covariance_{i}"] = Column((f"lag_{i}",))
+    return found
+
+
+def _record(table: Table, found: dict[str, Any], i: int, source: str, notes: list[str], integrated: bool) -> Record:
+    columns = {name: found.get(f"{name}_{i}") for name in ROLES}
+    if columns["time"] is None or columns["friction"] is None:
+        raise table.fault(f"record {i} has no time or no friction")
+    try:
+        return whole_record(source=source, notes=tuple(notes), integrated=integrated, **columns)
+    except ParameterError as error:
+        raise table.fault(str(error)) from error
+
+
+def _plan(table: Table, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
+    """The plan, checked as if a user gave it."""
+    from steadyslip.files.specifications import protocol_from_text, rig_from_text
+
+    text, source = table.attributes["rig"], str(table.path)
+    free, rtol, drive = options.pop("free"), options.pop("rtol"), options.pop("drive")
+    commanded = drive == "protocol"
+    try:
+        plan = make_plan(
+            rig_from_text(text, source), records, free,
+            fixed=[] if "friction.mu_ref" in free else ["friction.mu_ref"],
+            protocol=protocol_from_text(text, source) if commanded else None,
+            drive=DRIVES[0] if commanded else drive, weights=weights, **options,
+        )  # fmt: skip
+    except SteadyslipError as error:
+        raise table.fault(f"its rig or options are refused: {error}") from error
+    if not 0 < rtol < 1 or list(plan.free) != free:
+        raise table.fault(f"rtol is {rtol!r}, free parameters are {', '.join(free):.200}")
+    return replace(plan, rtol=rtol)
+
+
+def _check(table: Table, fit: Fit) -> None:
+    """Numbers that no fit has."""
+    bad = {
+        "coordinates": not np.all(np.isfinite(fit.coordinates)),
+        "ssq": not 0 <= fit.ssq < np.inf,
+        "covariance": not np.all(np.diag(fit.covariance) >= 0),
+        "bound": not np.all(fit.bounds[0] <= fit.bounds[1]),
+        "noise": not all(
+            len(one.covariance) and one.covariance[0] >= 0 and np.all(np.isfinite(one.covariance))
+            and np.all(np.isfinite(one.coefficients)) for one in fit.noise
+        ),
+    }  # fmt: skip
+    if wrong := [name for name, is_so in bad.items() if is_so]:
+        raise table.fault(f"no fit has its {wrong[0]}")

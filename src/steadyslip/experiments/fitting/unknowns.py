@@ -1,0 +1,96 @@
+"""The free parameters of a fit, in coordinates in which they may take any value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.records import Address
+
+Array = np.ndarray
+NATURAL = {"b": 0.01, "mu_ref": 0.01, "alpha": 0.2, "direct_share": 0.2}
+"""Changes that matter, of parameters that may be zero or of either sign."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One free parameter.
+
+    Attributes
+    ----------
+    name : str
+        Full dotted name, with ``@2`` behind it where it belongs to the second record alone.
+    parameter : str
+        Full dotted name in the rig or the protocol.
+    unit : str
+    record : int or None
+        The record it belongs to; None if all share it.
+    logarithmic : bool
+        Whether its coordinate is its logarithm.
+    size : float
+        Change of a plain parameter that is one unit of its coordinate.
+    low, high : float
+        What the parameter may be.
+    """
+
+    name: str
+    parameter: str
+    unit: str
+    record: int | None
+    logarithmic: bool
+    size: float
+    low: float
+    high: float
+
+    def coordinate(self, value: Any) -> Any:
+        return np.log(value) if self.logarithmic else np.asarray(value) / self.size
+
+    def value(self, coordinate: Any) -> Any:
+        return np.exp(coordinate) if self.logarithmic else np.asarray(coordinate) * self.size
+
+    def slope(self, coordinate: Any) -> Any:
+        """Change of the parameter per unit of its coordinate."""
+        return np.exp(coordinate) if self.logarithmic else np.full(np.shape(coordinate), self.size)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Of the coordinate."""
+        with np.errstate(divide="ignore"):
+            return float(self.coordinate(self.low)), float(self.coordinate(self.high))
+
+
+def unknown(address: Address, record: int | None, scale: float | None = None) -> Unknown:
+    """The free parameter at an address: logarithmic if it must be positive and has no natural zero."""
+    name, domain = address.name, address.role.domain
+    own = f"{name}@{record + 1}" if record is not None else name
+    last = name.rpartition(".")[2]
+    positive = domain.low == 0 and not domain.low_allowed and last != "mu_ref"
+    nonnegative = domain.low == 0 and domain.low_allowed and address.role.unit != "1"
+    size = scale or NATURAL.get(last, abs(address.value or 0.0) or 1.0)
+    logarithmic = (positive or nonnegative) and scale is None
+    low = max(domain.low, 1e-6) if last == "mu_ref" else domain.low
+    return Unknown(own, name, address.role.unit, record, logarithmic, size, low, domain.high)
+
+
+class Space:
+    """All free parameters together."""
+
+    def __init__(self, unknowns: tuple[Unknown, ...]) -> None:
+        self.unknowns = unknowns
+        bounds = [u.bounds for u in unknowns]
+        self.low = np.array([low for low, _ in bounds])
+        self.high = np.array([high for _, high in bounds])
+
+    def __len__(self) -> int:
+        return len(self.unknowns)
+
+    def values(self, coordinates: Array) -> Array:
+        return np.stack([u.value(coordinates[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
+
+    def coordinates(self, values: Array) -> Array:
+        return np.stack([u.coordinate(values[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
+
+    def slopes(self, coordinates: Array) -> Array:
+        return np.stack([u.slope(coordinates[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)

@@ -1,0 +1,221 @@
+"""A fit in words and as plain data."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.core.quantities import shown
+from steadyslip.experiments.numerics.splitting import displacement_noise
+from steadyslip.steady import steady_state
+from steadyslip.values import model_values
+
+if TYPE_CHECKING:
+    from steadyslip.experiments.fitting.result import Fit
+
+WIDTH = 100
+VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
+
+
+def words(fit: Fit) -> str:
+    """Estimates, how good the fit is, and what to beware of."""
+    names = short_names(fit.names)
+    wide = max(len(name) for name in names)
+    rows = []
+    for name, one in zip(names, fit.estimates, strict=True):
+        interval = f"   95 %: {one.range()}" if one.determined else ""
+        per_stress = _over_stress(fit, one)
+        if per_stress is None or not _stress_assumed(fit):
+            rows.append(f"  {name:<{wide}}  {one.shown()}{interval}")
+        if per_stress is not None:
+            rows.append(f"  {'k/σ':<{wide}}  {per_stress}")
+    sources = ", ".join(record.source for record in fit.plan.records)
+    friction = type(fit.plan.rig.friction).__name__
+    lines = [f"{friction} friction fitted to {fit.samples} samples of {sources}", *rows, "", *_quality(fit)]
+    for warning in warnings(fit):
+        lines += textwrap.wrap(f"! {warning}", WIDTH, subsequent_indent="  ")
+    return "\n".join(lines)
+
+
+def _stress_assumed(fit: Fit) -> bool:
+    """Whether the normal stress is the rig's own, because no record has a column of it."""
+    return fit.plan.pressed and all(record.normal is None for record in fit.plan.records)
+
+
+def _over_stress(fit: Fit, one: Any) -> str | None:
+    """Stiffness over normal stress: what friction itself tells, whatever the stress; None of other parameters."""
+    bare, _, record = one.name.partition("@")
+    if bare not in ("slider.stiffness", "slider.axial_stiffness"):
+        return None
+    stress = steady_state(fit.rig(int(record) - 1 if record else 0)).normal_stress
+    value, error, low, high = (1e-6 * x / stress for x in (one.value, one.error, one.low, one.high))
+    if not one.determined:
+        return f"{value:.4g} /um (not determined)"
+    return f"{value:.4g} ± {error:.2g} /um   95 %: {low:.4g} to {high:.4g} /um"
+
+
+def short_names(names: tuple[str, ...]) -> list[str]:
+    """Dotted names without middle parts, where that stays unique."""
+    found = []
+    for name in names:
+        first, *_, last = name.split(".")
+        brief = f"{first}.{last}" if first not in ("protocol", "step") and ".states." not in name else name
+        found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
+    return found
+
+
+def _quality(fit: Fit) -> list[str]:
+    search = fit.search
+    lag = max((noise.lag1 for noise in fit.noise), key=abs)
+    independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
+    reached = f"{search.arrived} of {search.starts} starts lead here"
+    if search.others:
+        reached += f"; {len(search.others)} other minima, the next {search.others[0]:.4g} times as bad"
+    return [
+        f"residuals       rms {fit.rms:.3g}, sum of squares {fit.ssq:.6g}, lag-1 autocorrelation {lag:.2g}",
+        f"errors          one standard deviation, {independent}",
+        f"minimum         {reached}",
+        *textwrap.wrap(f"driven by       {drive_line(fit)}", WIDTH, subsequent_indent=" " * 16),
+    ]
+
+
+def warnings(fit: Fit) -> list[str]:
+    """What a reader must know before using the numbers."""
+    found = [str(one) for one in fit.unidentified]
+    if not fit.search.converged:
+        found.append("the search had not come to its end; treat the numbers as a rough fit")
+    close = [ratio for ratio in fit.search.others if ratio < 1.05]
+    if close:
+        found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
+    found += list(fit.at_bounds) + _vague_jumps(fit) + _untold_ramps(fit)
+    if fit.plan.drive == "measured":
+        found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
+    return found
+
+
+def _vague_jumps(fit: Fit) -> list[str]:
+    """Jumps whose time matters and is hardly known: errors of what they tell are then not Gaussian."""
+    found = []
+    for i, one in enumerate(fit.space.unknowns):
+        if _between_samples(fit, one) and float(fit.covariance[i, i]) > VAGUE**2:
+            found.append(
+                f"when exactly the drive or the normal stress jumped between {one.low:.7g} and {one.high:.7g} s is "
+                f"hardly determined ({one.name}); errors of what the jump tells, such as alpha from one of normal "
+                "stress, are not Gaussian: take profile or bootstrap"
+            )
+    return found
+
+
+def _between_samples(fit: Fit, one: Any) -> bool:
+    """Whether an unknown is the time of a sudden change that lies between two neighbouring samples."""
+    if one.parameter.startswith("jump."):
+        return True
+    if not one.parameter.startswith("step."):
+        return False
+    changes = [c for c in fit.plan.loading[one.record or 0].changes if fit.plan.pressed or c[0] == "load"]
+    channel, _, change = changes[int(one.parameter.split(".")[1]) - 1]
+    return channel == "stress" and change.duration == 0
+
+
+def _untold_ramps(fit: Fit) -> list[str]:
+    """Changes of the rate that may be steps or ramps: the record does not tell, and the direct effect depends on it."""
+    found = []
+    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+        for channel, _, change in loading.changes:
+            if channel == "load" and change.duration == 0 and change.longest > 0 and change.free:
+                found.append(
+                    f"{record.source}: the change of rate at {change.time:.7g} s is taken as a step; a ramp of up to "
+                    f"{shown(change.longest, 's')} would fit the displacement as well, and make a larger"
+                )
+    return found
+
+
+def drive_line(fit: Fit) -> str:
+    """What drives the model, and what that did to a, b and k."""
+    plan = fit.plan
+    if plan.protocol is not None:
+        return "the protocol that was given"
+    if plan.drive == "measured":
+        return "load point and normal stress as measured, noise included"
+    loads = [loading.load for loading in plan.loading if loading.load is not None]
+    if any(course.curve is not None for course in loads):
+        return "a smooth curve through the measured displacement"
+    count = sum(len(course.changes) for course in loads)
+    free = sum(one.parameter.startswith("step.") for one in fit.space.unknowns)
+    text = f"commanded loading found in the record, {count} change{'' if count == 1 else 's'} of rate"
+    text += f", {free} of {'its' if count == 1 else 'their'} times and durations fitted" if free else ""
+    slips, glitches = sum(c.slips for c in loads), sum(c.glitches for c in loads)
+    if slips or glitches:
+        text += f"; {slips} slips and {glitches} glitches of the sensor left out"
+    other = fit.as_measured
+    if other is None:
+        return text
+    shares = [
+        f"{label} {other[name] / fit.values[name] - 1:+.0%}"
+        for label, name in (("a", "friction.a"), ("b", "friction.b"), ("k", "slider.stiffness"))
+        if name in other and fit.values.get(name)
+    ]
+    return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
+
+
+def _noisy_drive(fit: Fit, part: Any) -> str | None:
+    """Whether the noise of the measured displacement moves the model about as much as the data scatter."""
+    record = part.record
+    if record.integrated or record.displacement is None:
+        return None
+    noise = displacement_noise(record.time, record.displacement)
+    rig = fit.rig(0)
+    stiffness = float(model_values(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
+    if record.normal is None:
+        return None
+    moved = noise * stiffness / float(record.normal[0])
+    if moved < 0.3 * fit.rms:
+        return None
+    return (
+        f"{record.source}: the load point is measured to {shown(noise, 'm')} only, which moves the model by "
+        f"{moved:.2g} "
+        "in friction; that makes the stiffness come out too low; leave drive at 'commanded'"
+    )
+
+
+def as_dict(fit: Fit) -> dict[str, Any]:
+    """SI units; what does not exist is None."""
+    return {
+        "version": fit.version,
+        "records": [record.source for record in fit.plan.records],
+        "samples": fit.samples,
+        "parameters": {
+            e.name: {
+                "value": e.value,
+                "error": e.error if e.determined else None,
+                "low": e.low if np.isfinite(e.low) and e.determined else None,
+                "high": e.high if np.isfinite(e.high) and e.determined else None,
+                "unit": e.unit,
+                "determined": e.determined,
+            }
+            for e in fit.estimates
+        },
+        "correlation": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.correlation],
+        "driven_by": drive_line(fit),
+        "ssq": fit.ssq,
+        "rms": fit.rms,
+        "lag1": [noise.lag1 for noise in fit.noise],
+        "correlated": fit.correlated,
+        "aic": fit.aic,
+        "bic": fit.bic,
+        "search": {
+            "starts": fit.search.starts,
+            "arrived": fit.search.arrived,
+            "other_minima": list(fit.search.others),
+            "iterations": fit.search.iterations,
+            "converged": fit.search.converged,
+        },
+        "unidentified": [
+            {"weights": one.weights, "deviation": one.deviation if np.isfinite(one.deviation) else None}
+            for one in fit.unidentified
+        ],
+        "warnings": warnings(fit),
+        "notes": {record.source: list(record.notes) for record in fit.plan.records},
+    }

@@ -1,0 +1,1 @@
+"""What was commanded in an experiment, found in what was measured. Knows arrays, not laws."""

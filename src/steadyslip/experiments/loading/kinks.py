@@ -1,0 +1,177 @@
+"""From a measured displacement to the rates that were commanded, and when, and how fast, they changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from steadyslip.experiments.loading.loading import Change, Course
+from steadyslip.experiments.loading.runs import Run, straight_runs
+from steadyslip.experiments.numerics.noise import describe
+from steadyslip.experiments.numerics.smoothing import smoothing_curve
+from steadyslip.experiments.numerics.splitting import displacement_noise
+
+Array = np.ndarray
+RAMP = 40.0  # how much better a ramp must fit a displacement than a step, in units of its noise
+OUTLYING = 9.0  # squared deviation, in those units, from which on a sample weighs less
+AT_REST = 1e-3  # of the highest rate: a hold
+MOST_CHANGES = 40  # beyond, and
+MOST_BETWEEN = 0.35  # share of the record that lies between runs: there is no piecewise-linear loading
+EXACT = 1e-2  # of a sampling interval: times known so well are not fitted
+
+
+def load_course(time: Array, displacement: Array, blurred: bool = False) -> Course:
+    """The load point's rate from a displacement: straight runs, else a smooth curve.
+
+    A displacement that was integrated from a rate is `blurred`: it does not tell when, within a sampling interval, the
+    rate changed.
+    """
+    runs = straight_runs(time, displacement)
+    between = sum(time[b.first] - time[a.last - 1] for a, b in pairwise(runs))
+    if len(runs) - 1 > MOST_CHANGES or between > MOST_BETWEEN * (time[-1] - time[0]):
+        return smooth_load(time, displacement)
+    strays, errors, inflation = zip(*(_errors(run, time, displacement) for run in runs), strict=True)
+    rates = np.array([run.rate for run in runs])
+    top = float(np.max(np.abs(rates)))
+    rest = np.abs(rates) <= np.maximum(AT_REST * top, np.minimum(4 * np.array(errors), 0.02 * top))
+    rest &= len(runs) > 1
+    rates = np.where(rest, 0.0, rates)
+    changes = []
+    for k in range(1, len(runs)):
+        scale, worth = max(strays[k - 1 : k + 1]), max(inflation[k - 1 : k + 1])
+        kink = _Kink(time, displacement, runs[k - 1], runs[k], (errors[k - 1], errors[k]), scale, worth)
+        changes.append(kink.change(float(rates[k - 1]), float(rates[k]), blurred))
+    return Course(
+        float(rates[0]), tuple(_in_order(changes)), np.where(rest, 0.0, errors), None, float(np.median(strays)),
+        sum(max(run.groups) for run in runs),
+        sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs),
+    )  # fmt: skip
+
+
+def smooth_load(time: Array, displacement: Array) -> Course:
+    """The load point's rate from a smoothing curve through its displacement."""
+    spline = smoothing_curve(time, displacement, displacement_noise(time, displacement))
+    strays = displacement - spline(time)
+    return Course(0.0, curve=spline.derivative(), strays=1.4826 * float(np.median(np.abs(strays))))
+
+
+def _errors(run: Run, time: Array, displacement: Array) -> tuple[float, float, float]:
+    """How far a run strays from its line, the error of its rate, and how many samples are worth one."""
+    rows = run.rows
+    own = np.repeat(run.groups, [j - i for i, j in run.members])
+    t = time[rows] - time[0]
+    r = displacement[rows] - run.levels[own] - run.rate * t
+    scale = 1.4826 * float(np.median(np.abs(r)))
+    count = np.bincount(own)
+    u = t - (np.bincount(own, t) / count)[own]
+    size = float(np.sum(u * u))
+    if not (scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300) and size > 0):
+        return scale, 0.0, 1.0
+    noise = describe(np.clip(r, -4 * scale, 4 * scale))
+    variance = float(noise.spread((u / size)[None])[0, 0])
+    return scale, float(np.sqrt(max(variance, 0.0))), max(noise.inflation, 1.0)
+
+
+class _Kink:
+    """Where the lines of two runs meet, and whether what lies between is a ramp."""
+
+    def __init__(
+        self, time: Array, displacement: Array, before: Run, after: Run, errors: tuple[float, float],
+        strays: float, inflation: float,
+    ) -> None:  # fmt: skip
+        self.strays, self.inflation = strays, inflation
+        self.origin = float(time[0])
+        self.zone = float(time[before.last - 1]), float(time[after.first])
+        self.spacing = float(np.median(np.diff(time[max(before.last - 3, 0) : after.first + 3])))
+        self.adjacent = before.last == after.first
+        self.rates = before.rate, after.rate
+        self.levels = float(before.levels[-1]), float(after.levels[0])
+        difference = after.rate - before.rate
+        self.meet = self.origin + (self.levels[0] - self.levels[1]) / difference
+        near = [[m for m, g in zip(run.members, run.groups, strict=True) if g == edge]
+                for run, edge in ((before, before.groups[-1]), (after, 0))]  # fmt: skip
+        variance = 0.0
+        for members, error in zip(near, errors, strict=True):
+            count = sum(j - i for i, j in members) / inflation
+            middle = 0.5 * (time[members[0][0]] + time[members[-1][1] - 1])
+            variance += strays**2 / max(count, 1.0) + (error * (self.meet - middle)) ** 2
+        self.deviation = float(np.sqrt(variance)) / abs(difference)
+        self.reach = 2 * min(self.zone[0] - float(time[before.first]), float(time[after.last - 1]) - self.zone[1])
+        self.reach += self.zone[1] - self.zone[0]
+        rows = slice(*np.searchsorted(time, [self.meet - self.reach, self.meet + self.reach]))
+        self.time, self.displacement = time[rows], displacement[rows]
+
+    def change(self, before: float, after: float, blurred: bool) -> Change:
+        """The change that fits the displacement."""
+        slack = 6 * self.deviation + 2 * self.spacing
+        own = 6 * self.deviation + 3 * self.strays / abs(self.rates[1] - self.rates[0])
+        if not self.zone[0] - slack <= self.meet <= self.zone[1] + slack:
+            return self._vague(before, after, own + slack)
+        at_once = self.adjacent and self.zone[0] <= self.meet <= self.zone[1]
+        if not blurred and own < EXACT * self.spacing and (at_once or self._ramp()[0]):
+            duration, _, _ = self._ramp()
+            start = self.meet - 0.5 * duration
+            return Change(start, duration, before, after, start, start, duration, duration)
+        duration, shortest, longest = self._ramp()
+        half = own + self.spacing + 0.5 * max(longest - shortest, 0.0) * (duration > 0)
+        half = max(half, 0.5 * (self.zone[1] - self.zone[0]) - 0.5 * duration)
+        start = self.meet - 0.5 * duration
+        return Change(start, duration, before, after, start - half, start + half, shortest, longest)
+
+    def _vague(self, before: float, after: float, slack: float) -> Change:
+        """The change where lines do not meet between the runs: a glitch hides it, or the sensor slipped meanwhile."""
+        first, last = self.zone
+        length = last - first
+        hidden = first - 2 * length - slack <= self.meet <= last + 2 * length + slack
+        middle = self.meet if hidden else 0.5 * (first + last)
+        slack += 0.25 * length
+        low, high = min(first, middle) - slack, max(last, middle) + slack
+        return Change(middle, 0.0, before, after, low, high, 0.0, length)
+
+    def _ramp(self) -> tuple[float, float, float]:
+        """Duration that fits best, zero for a step, and the range of durations that fit nearly as well."""
+        if len(self.time) < 8 or not self.reach > 0:
+            return 0.0, 0.0, 0.0
+        grid = np.concatenate([[0.0], np.geomspace(0.2 * self.spacing, self.reach, 60)])
+        misfits = np.array([self._misfit(d) for d in grid]) / self.inflation
+        best = max(int(np.argmin(misfits)), 1)
+        low, high = float(grid[best - 1]), float(grid[min(best + 1, len(grid) - 1)])
+        fine = minimize_scalar(self._misfit, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
+        duration, least = float(fine.x), float(fine.fun) / self.inflation
+        inside = np.abs(self.time - self.meet) <= 0.5 * duration
+        unlike = self._misfit(duration, inside) > 0.5 * OUTLYING * max(int(np.sum(inside)), 1)
+        if misfits[0] - least <= RAMP or unlike:
+            beyond = int(np.argmax(misfits > misfits[0] + OUTLYING))
+            return 0.0, 0.0, float(grid[beyond - 1]) if beyond else float(grid[-1])
+        near = np.flatnonzero(misfits <= least + OUTLYING)
+        ends = (grid[near[0]], grid[near[-1]]) if len(near) else (low, high)
+        return duration, 0.5 * min(float(ends[0]), duration), 1.5 * max(float(ends[1]), duration)
+
+    def _misfit(self, duration: float, rows: Array | slice = slice(None)) -> float:
+        """Squared deviation from a ramp between the two lines, in units of the noise; that of glitches weighs less."""
+        t = self.time - self.origin
+        lines = [level + rate * t for level, rate in zip(self.levels, self.rates, strict=True)]
+        since = self.time - (self.meet - 0.5 * duration)
+        bend = lines[0] + 0.5 * (self.rates[1] - self.rates[0]) * since**2 / max(duration, 1e-300)
+        model = np.where(since <= 0, lines[0], np.where(since >= duration, lines[1], bend))
+        scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
+        squares = ((self.displacement - model)[rows] / scale) ** 2
+        return float(OUTLYING * np.sum(np.log1p(squares / OUTLYING)))
+
+
+def _in_order(changes: list[Change]) -> list[Change]:
+    """Changes that cannot overlap: between neighbours, the window of one ends where that of the next begins."""
+    for i in range(len(changes) - 1):
+        one, other = changes[i : i + 2]
+        middle = 0.5 * (one.time + one.duration + other.time)
+        taken = one.longest if one.stretches else one.duration
+        if one.free and one.latest + taken > middle:
+            longest = min(one.longest, max(middle - one.time, one.duration))
+            latest = max(middle - (longest if one.stretches else one.duration), one.time)
+            changes[i] = replace(one, latest=latest, longest=longest)
+        if other.free and other.earliest < middle:
+            changes[i + 1] = replace(other, earliest=min(middle, other.time))
+    return changes

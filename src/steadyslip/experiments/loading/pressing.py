@@ -1,0 +1,200 @@
+"""Finds what the normal stress did: constant or smooth, with steps and short straight ramps where it changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.experiments.loading.loading import Change, Course, Curve
+from steadyslip.experiments.numerics.smoothing import smoothing_curve
+from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
+
+Array = np.ndarray
+LEAST_STRESS = 2e-3  # change of normal stress, as a share, that counts as one
+APART = 6.0  # standard deviations from a level: on the way to another
+SUDDEN = 0.7  # share of the difference of two levels that lies between a few samples on both sides,
+NEAR = 3  # of them
+BINS = 40  # of a span between changes, whose means
+UNEVEN = 3.0  # times the variance that noise would give them say that it is not constant
+OSCILLATION = 8  # alternating changes that are one oscillation
+
+
+@dataclass(frozen=True)
+class Wave:
+    """An oscillation: when it begins, s, its period, s, mean and amplitude, Pa."""
+
+    time: float
+    period: float
+    mean: float
+    amplitude: float
+
+
+def stress_course(time: Array, normal: Array) -> Course:
+    """The normal stress that was commanded."""
+    noise = level_noise(normal)
+    if oscillation(time, normal) is not None:
+        return Course(float(np.mean(normal)), curve=_Spans([_span(time, normal, float(np.mean(normal)), noise)]))
+    if len(time) < 2 * FEWEST:
+        return Course(float(np.mean(normal)), strays=noise)
+    places = _transitions(time, normal, split(time, normal, noise, linear=False))
+    for _ in range(2):  # the ends of slow ramps, lost in the noise at first, belong to them once their line is known
+        ends = [0, *(place for pair in places for place in pair), len(time)]
+        spans = [slice(i, j) for i, j in zip(ends[::2], ends[1::2], strict=True)]
+        levels = [float(np.mean(normal[span])) for span in spans]
+        changes = tuple(
+            _change(time, normal, last - 1, first, levels[k : k + 2], noise) for k, (last, first) in enumerate(places)
+        )
+        places = [_whole(time, pair, change) for pair, change in zip(places, changes, strict=True)]
+    curves = []
+    for span, level in zip(spans, levels, strict=True):
+        if _uneven(normal[span], noise):
+            curves.append(_span(time[span], normal[span], level, noise))
+    errors = np.array([noise / np.sqrt(span.stop - span.start) for span in spans])
+    errors[noise <= 2e-7 * abs(levels[0])] = 0.0
+    return Course(levels[0], changes, errors, _Spans(curves) if curves else None, noise)
+
+
+def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """For every change: the sample behind the last before it, and the first after it."""
+    levels = np.array([float(np.median(normal[i:j])) for i, j in ranges])
+    lengths = np.array([time[j - 1] - time[i] for i, j in ranges])
+    noise = level_noise(normal)
+    found: list[tuple[int, int]] = []
+    first = 0
+    while first < len(ranges) - 1:
+        last = first + 1
+        while last < len(ranges) - 1 and _is_passing(levels, lengths, first, last):
+            last += 1
+        apart = abs(levels[first] - levels[last])
+        if apart > LEAST_STRESS * max(abs(levels[first]), abs(levels[last])) and apart > APART * noise:
+            pair = _between(normal, ranges[first], ranges[last], levels[first], levels[last], noise)
+            if (
+                _sudden(normal, pair, apart)
+                and _straight(time, normal, pair, noise)
+                and (not found or pair[0] > found[-1][1])
+            ):
+                found.append(pair)
+        first = last
+    return found
+
+
+def _is_passing(levels: Array, lengths: Array, first: int, middle: int) -> bool:
+    """Whether a range lies on the way from the one before to the next: between them in value, and short."""
+    low, high = sorted((levels[first], levels[middle + 1]))
+    between = low < levels[middle] < high
+    return bool(between and lengths[middle] < 0.2 * max(lengths[first], lengths[middle + 1]))
+
+
+def _between(
+    normal: Array, one: tuple[int, int], other: tuple[int, int], before: float, after: float, noise: float
+) -> tuple[int, int]:
+    """Samples that belong to neither level lie between the two returned places."""
+    i, j = max(one[1] - FEWEST, one[0] + 1), min(other[0] + FEWEST, other[1] - 1)
+    part = normal[i:j]
+    away, there = np.abs(part - before) > APART * noise, np.abs(part - after) <= APART * noise
+    last = i + (int(np.argmax(away)) if np.any(away) else 0)
+    late = np.flatnonzero(~there)
+    first = max(i + (int(late[-1]) + 1 if len(late) else 0), last)
+    return last, first
+
+
+def _sudden(normal: Array, pair: tuple[int, int], apart: float) -> bool:
+    """Whether a stress that two levels describe changed between them, not slowly all along, which is a smooth curve."""
+    last, first = pair
+    before, after = normal[max(last - NEAR, 0) : last], normal[first : first + NEAR]
+    return bool(len(before) and len(after) and abs(np.mean(after) - np.mean(before)) > SUDDEN * apart)
+
+
+def _straight(time: Array, normal: Array, pair: tuple[int, int], noise: float) -> bool:
+    """Whether what lies between two levels is a straight ramp to within the noise; few samples do not tell."""
+    inner = slice(*pair)
+    t, s = time[inner], normal[inner]
+    if len(t) < FEWEST:
+        return True
+    slope, level = np.polyfit(t - t[0], s, 1)
+    return bool(np.std(s - level - slope * (t - t[0])) < UNEVEN * noise)
+
+
+def _whole(time: Array, pair: tuple[int, int], change: Change) -> tuple[int, int]:
+    """All samples of a ramp that is longer than a few of them."""
+    last, first = pair
+    if first - last < FEWEST:
+        return pair
+    begin, end = np.searchsorted(time, [change.time, change.time + change.duration])
+    return max(min(last, int(begin)), 1), min(max(first, int(end)), len(time) - 1)
+
+
+def _change(time: Array, normal: Array, last: int, first: int, levels: list[float], noise: float) -> Change:
+    """A step between two samples, or a straight ramp through those in between."""
+    before, after = levels
+    early, late = float(time[last]), float(time[first])
+    if first == last + 1:
+        return Change(0.5 * (early + late), 0.0, before, after, early, late, 0.0, 0.0)
+    t, s = time[last + 1 : first], normal[last + 1 : first]
+    if len(t) == 1:
+        share = float(np.clip((s[0] - before) / (after - before), 0.05, 0.95))
+        begin = 0.5 * (early + float(t[0]))
+        length = min((float(t[0]) - begin) / share, late - begin)
+        return Change(begin, length, before, after, early, float(t[0]), 0.2 * length, late - early)
+    slope, at_zero = np.polyfit(t - early, s, 1)
+    begin, end = early + (before - at_zero) / slope, early + (after - at_zero) / slope
+    if len(t) < FEWEST:
+        begin, end = float(np.clip(begin, early, t[0])), float(np.clip(end, t[-1], late))
+    unsure = APART * noise / abs(slope)
+    if unsure < 1e-2 * float(np.median(np.diff(time))):
+        return Change(begin, end - begin, before, after, begin, begin, end - begin, end - begin)
+    low, high = begin - unsure, begin + unsure
+    return Change(begin, end - begin, before, after, low, high, 0.5 * (end - begin), end - begin + 2 * unsure)
+
+
+def _uneven(values: Array, noise: float) -> bool:
+    """Whether a stress between two changes is not constant."""
+    if len(values) < 2 * FEWEST:
+        return False
+    size = max(len(values) // BINS, 1)
+    means = values[: len(values) // size * size].reshape(-1, size).mean(axis=1)
+    return bool(np.var(means) > UNEVEN * noise**2 / size)
+
+
+def _span(time: Array, normal: Array, level: float, noise: float) -> tuple[float, float, Curve]:
+    curve = smoothing_curve(time, normal - level, noise)
+    return float(time[0]), float(time[-1]), curve
+
+
+class _Spans:
+    """Curves, each on a span of its own; what lies between joins their ends, what lies outside is level."""
+
+    def __init__(self, spans: list[tuple[float, float, Curve]]) -> None:
+        self.spans = spans
+
+    def __call__(self, time: Array) -> Array:
+        ends = np.array([t for first, last, _ in self.spans for t in (first, last)])
+        values = np.concatenate([curve(np.array([first, last])) for first, last, curve in self.spans])
+        found: Array = np.interp(time, ends, values)
+        for first, last, curve in self.spans:
+            inside = (time >= first) & (time <= last)
+            found[inside] = curve(np.asarray(time)[inside])
+        return found
+
+
+def oscillation(time: Array, normal: Array) -> Wave | None:
+    """A normal stress that keeps crossing its mean at regular intervals."""
+    mean, noise = float(np.mean(normal)), level_noise(normal)
+    if len(normal) < 2 * FEWEST or float(np.std(normal)) < LEAST_STRESS / 4 * abs(mean):
+        return None
+    smooth = np.convolve(normal - mean, np.ones(3) / 3, mode="same")
+    band = max(4 * noise, 0.3 * float(np.std(normal)))
+    signs = np.where(smooth > band, 1, np.where(smooth < -band, -1, 0))
+    places = np.flatnonzero(signs)
+    turns = places[1:][np.diff(signs[places]) != 0]
+    if len(turns) < OSCILLATION:
+        return None
+    gaps = np.diff(time[turns])
+    typical = float(np.median(gaps))
+    like = np.abs(gaps - typical) < 0.35 * typical
+    if np.mean(like) < 0.8:
+        return None
+    first = max(int(np.flatnonzero(np.abs(normal - mean) > band)[0]) - 1, 0)
+    inside = normal[turns[0] : turns[-1]]
+    return Wave(float(time[first]), 2 * float(np.mean(gaps[like])), mean, float(np.sqrt(2) * np.std(inside)))

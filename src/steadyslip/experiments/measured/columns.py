@@ -1,0 +1,282 @@
+"""Which column of a table is what, and in which unit: from names, or as the user says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from steadyslip.core.errors import Problem, QuantityError, unknown_name
+from steadyslip.core.quantities import described, example, unit
+
+ROLES = {
+    "time": "s",
+    "displacement": "m",
+    "velocity": "m/s",
+    "friction": "1",
+    "shear": "Pa",
+    "normal": "Pa",
+}
+"""What columns may be, with SI units; displacement and velocity are those of the load point."""
+
+_WORDS = {
+    "s": ("sec", "secs", "second", "seconds"),
+    "min": ("minutes", "minute"),
+    "h": ("hr", "hrs", "hours"),
+    "um": ("micron", "microns", "mic", "micrometer", "micrometers", "micrometre", "micrometres"),
+    "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
+    "um/s": ("microns/s", "micron/s", "microns/sec", "um/sec", "umps"),
+    "mm/s": ("mm/sec",),
+    "1": ("-", "none", "unitless", "dimensionless", "adim", "ratio"),
+}
+_SPELLINGS = {word: name for name, words in _WORDS.items() for word in words}
+_SUFFIXES = ("s", "ms", "min", "h", "m", "cm", "mm", "um", "nm", "Pa", "kPa", "MPa", "GPa", "N", "kN", "mN", "uN")
+_TIMES = {"time", "times", "elapsed", "elapsedtime", "uhrzeit", "datetime", "date", "datum"}
+_FRICTION = re.compile(r"friction|^reib(ungs?)?(wert|zahl|koeff|beiwert|$)")
+_DISPLACED = re.compile(r"disp|position|slip|ram|verschieb|vorschub|weg$|déplacement")
+_ACROSS = re.compile(r"normalweg|vertikal|normalversch")
+_SHEAR = re.compile(r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement")
+_BRACKETS = re.compile(r"^(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*$")
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a role's numbers are.
+
+    Attributes
+    ----------
+    role : str
+    name : str
+        As in the file.
+    unit : str
+    factor : float
+        To SI; of forces, still to be divided by an area.
+    force : bool
+    place : int
+        Which column, from 0; names may occur twice.
+    """
+
+    role: str
+    name: str
+    unit: str
+    factor: float
+    force: bool = False
+    place: int = 0
+
+
+def split_name(name: str) -> tuple[str, str | None]:
+    """The bare name of a column and the unit written in it, if any.
+
+    >>> split_name("Normal_stress(MPa)"), split_name("lp_disp_um"), split_name("Friction")
+    (('Normal_stress', 'MPa'), ('lp_disp', 'um'), ('Friction', None))
+    """
+    name = name.strip().strip("\"'").strip()
+    if match := _BRACKETS.match(name):
+        found = _known_unit(match[2])
+        if found is not None and match[1]:
+            return match[1].strip(), found
+    for separator in (",", "_", " "):
+        head, _, tail = name.rpartition(separator)
+        tail = tail.strip()
+        plain = tail in _SUFFIXES or tail.lower() in _SPELLINGS or ("/" in tail and _known_unit(tail) is not None)
+        if head and plain:
+            return head.strip(), _known_unit(tail)
+    return name, None
+
+
+def _known_unit(text: str) -> str | None:
+    """A unit in this package's spelling, None if it is none."""
+    text = text.strip()
+    spelled = _SPELLINGS.get(text.lower(), text)
+    if not spelled:
+        return None
+    try:
+        unit(spelled)
+    except QuantityError:
+        return None
+    return spelled
+
+
+def _guessed_role(name: str, has_unit: str | None) -> str | None:
+    """The role that a bare name, and its unit, suggest."""
+    plain = re.sub(r"[^a-zµμστäöüßéè]+", " ", name.lower().replace("_", " ")).strip()
+    words = set(plain.split())
+    dimension = None if has_unit is None else unit(has_unit)[1]
+    if dimension == unit("m/s")[1]:
+        return "velocity"
+    joined = plain.replace(" ", "")
+    if joined in ("t", "timestamp", "temps") or words & _TIMES:
+        return "time"
+    if re.search(r"zeit", joined) and dimension in (None, unit("s")[1]):
+        return "time"
+    stress = dimension in (unit("Pa")[1], unit("N")[1])
+    if joined in ("mu", "µ", "μ", "f", "cof") or words & {"frict", "frottement"} or _FRICTION.search(joined):
+        return "shear" if stress else "friction"
+    if words & {"velocity", "vel", "rate", "speed", "vlp", "v", "vitesse"} or re.search(r"velocity|geschw", joined):
+        return "velocity"
+    displaced = _DISPLACED.search(joined) or words & {"lp", "lpd", "d", "weg", "hub"}
+    across = words & {"normal", "vertical", "horizontal normal"} or _ACROSS.search(joined)
+    if displaced and not (stress or across):
+        return "displacement"
+    if re.search(r"normal|sigma|σ", joined) or words & {"sn", "fn", "effective", "nor", "norm"}:
+        return None if dimension == unit("m")[1] or displaced else "normal"
+    if _SHEAR.search(joined) or words & {"ft", "fs", "shr"}:
+        return "shear"
+    return None
+
+
+def assigned(
+    names: Sequence[str], given: Mapping[str, Any], file_units: Sequence[str | None]
+) -> tuple[dict[str, Column], list[Problem], list[str]]:
+    """Find a column for every role.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Columns of the file.
+    given : mapping of str to Any
+        By role: a column's name or number (from 1), a unit, or a pair of both.
+    file_units : sequence of str or None
+        Units that the file states apart from the names.
+
+    Returns
+    -------
+    columns : dict of str to Column
+    problems : list of Problem
+    notes : list of str
+    """
+    bare = [split_name(name) for name in names]
+    units = [own or other for (_, own), other in zip(bare, file_units, strict=True)]
+    problems: list[Problem] = []
+    notes: list[str] = []
+    chosen: dict[str, tuple[int, str | None]] = {}
+    for role, value in given.items():
+        place, stated, fault = _as_given(role, value, names, [head for head, _ in bare])
+        if fault:
+            problems.append(Problem(role, fault))
+        if place is not None:
+            chosen[role] = (place, stated)
+        elif stated is not None:
+            chosen[role] = (-1, stated)
+    taken = {place for place, _ in chosen.values()}
+    guesses: dict[str, list[int]] = {}
+    for i, (head, _) in enumerate(bare):
+        guess = _guessed_role(head, units[i])
+        if guess is not None and i not in taken:
+            guesses.setdefault(guess, []).append(i)
+    for role in ROLES:
+        if role in chosen and chosen[role][0] >= 0:
+            continue
+        candidates = _preferred(role, guesses.get(role, []), names)
+        if len(candidates) > 1:
+            several = ", ".join(repr(names[i]) for i in candidates)
+            problems.append(Problem(role, f"several columns could be it: {several}; say which with {role}=NAME"))
+        elif candidates:
+            chosen[role] = (candidates[0], chosen.get(role, (0, None))[1])
+        elif role in chosen:
+            problems.append(Problem(role, _missing(role, names)))
+            del chosen[role]
+    columns = {}
+    for role, (place, stated) in chosen.items():
+        column, fault, note = _with_unit(role, names[place], units[place], stated)
+        if fault:
+            problems.append(Problem(role, fault))
+        elif column is not None:
+            columns[role] = replace(column, place=place)
+        notes += note
+    return columns, problems, notes
+
+
+def _as_given(
+    role: str, value: Any, names: Sequence[str], heads: Sequence[str]
+) -> tuple[int | None, str | None, str | None]:
+    """Column and unit as the user says, or what is wrong with it."""
+    stated: str | None = None
+    if isinstance(value, Mapping):
+        unknown = set(value) - {"column", "unit"}
+        if unknown:
+            return None, None, unknown_name("key", unknown.pop(), ["column", "unit"])
+        stated, value = value.get("unit"), value.get("column")
+    elif isinstance(value, (tuple, list)) and len(value) == 2:
+        value, stated = value
+    if stated is not None and (not isinstance(stated, str) or _known_unit(stated) is None):
+        return None, None, f"got unit {stated!r}; allowed: a unit such as that of {example(ROLES[role])}"
+    if value is None:
+        return None, stated, None
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= len(names):
+            return None, None, f"got column {value}; allowed: 1 to {len(names)}"
+        return value - 1, stated, None
+    if isinstance(value, str):
+        for known in (list(names), list(heads)):
+            if known.count(value) == 1:
+                return known.index(value), stated, None
+        found = _known_unit(value)
+        if stated is None and found is not None and _fits(role, found):
+            return None, found, None
+    return None, None, unknown_name("column", value, names)
+
+
+def _fits(role: str, name: str) -> bool:
+    """Whether a unit is one of a role's, forces included."""
+    dimension = unit(name)[1]
+    return dimension == unit(ROLES[role])[1] or (role in ("shear", "normal") and dimension == unit("N")[1])
+
+
+def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[int]:
+    """Of several columns, those whose names point at the load point or at effective stress."""
+    if len(candidates) < 2:
+        return candidates
+    marks = {"displacement": r"load|lp|shear|ram", "velocity": r"load|lp", "normal": r"eff"}
+    if role not in marks:
+        return candidates
+    better = [i for i in candidates if re.search(marks[role], names[i].lower())]
+    return better or candidates
+
+
+def _missing(role: str, names: Sequence[str]) -> str:
+    return f"no column for it; the file has {', '.join(map(repr, names))}; name it with {role}=NAME"
+
+
+def _with_unit(
+    role: str, name: str, own: str | None, stated: str | None
+) -> tuple[Column | None, str | None, list[str]]:
+    """The unit of a column: its own and the stated one must agree, and fit the role."""
+    notes: list[str] = []
+    stated = None if stated is None else _known_unit(stated)
+    if own is not None and stated is not None and unit(own) != unit(stated):
+        fault = f"column {name!r} is in {own} by its name, but {stated} is asked for; make them agree"
+        return None, fault, notes
+    found = stated or own
+    if found is None:
+        if role == "friction":
+            found = "1"
+        elif role == "time":
+            found = "s"
+            notes.append(f"time: column {name!r} has no unit; taken as s")
+        else:
+            fault = f"column {name!r} has no unit; write it in the name, such as '{name}({_usual(role)})', or say "
+            return None, fault + f"{role}=({name!r}, {_usual(role)!r})", notes
+    factor, dimension = unit(found)
+    force = role in ("shear", "normal") and dimension == unit("N")[1]
+    if not _fits(role, found):
+        wanted = described(ROLES[role]) + (" or a force" if role in ("shear", "normal") else "")
+        return None, f"column {name!r} is in {found}; expected {wanted}", notes
+    return Column(role, name, found, factor, force), None, notes
+
+
+def _usual(role: str) -> str:
+    return {"displacement": "um", "velocity": "um/s", "shear": "MPa", "normal": "MPa"}[role]
+
+
+def required(columns: Mapping[str, Column], names: Sequence[str]) -> list[Problem]:
+    """What a record cannot do without."""
+    problems = []
+    if "time" not in columns:
+        problems.append(Problem("time", _missing("time", names)))
+    if "friction" not in columns and not {"shear", "normal"} <= set(columns):
+        lacking = [role for role in ("shear", "normal") if role not in columns]
+        message = f"no column for friction, nor for {' and '.join(lacking)} to compute it from; the file has "
+        problems.append(Problem("friction", message + f"{', '.join(map(repr, names))}; name it with friction=NAME"))
+    return problems

@@ -1,0 +1,301 @@
+"""A record of an experiment: clean columns in SI units, with a note of everything that was done to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import Parameter, checked_number, real
+from steadyslip.experiments.loading.kinks import load_course
+from steadyslip.experiments.loading.loading import Loading
+from steadyslip.experiments.loading.pressing import oscillation, stress_course
+from steadyslip.experiments.measured.steps import Step, steps_of
+
+Array = np.ndarray
+FEWEST_ROWS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A record of an experiment; build one with `read_record` or `record_from_arrays`.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        s, rising.
+    friction : ndarray (n,)
+        Shear over normal stress.
+    normal, shear : ndarray (n,) or None
+        Pa.
+    displacement : ndarray (n,) or None
+        Of the load point, m; integrated where only its rate was measured.
+    velocity : ndarray (n,) or None
+        Rate of the load point, m/s, where it was measured.
+    source : str
+    notes : tuple of str
+        Everything that was noticed or changed.
+    integrated : bool
+        Whether the displacement comes from the velocity.
+    """
+
+    time: Array = field(repr=False)
+    friction: Array = field(repr=False)
+    normal: Array | None = field(repr=False)
+    shear: Array | None = field(repr=False)
+    displacement: Array | None = field(repr=False)
+    velocity: Array | None = field(repr=False)
+    source: str
+    notes: tuple[str, ...] = ()
+    integrated: bool = False
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """What was done to the sample, in the order of time."""
+        return steps_of(self.loading, None if self.normal is None else oscillation(self.time, self.normal))
+
+    @cached_property
+    def loading(self) -> Loading:
+        """What was commanded, as found in the measured displacement and normal stress."""
+        load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
+        return Loading(load, None if self.normal is None else stress_course(self.time, self.normal))
+
+    @cached_property
+    def initial_rate(self) -> float | None:
+        """Load-point rate before the first change of it, m/s; None if it was not measured."""
+        return None if self.loading.load is None else float(self.loading.load.at(self.time[:1])[0])
+
+    @cached_property
+    def rate(self) -> Array | None:
+        """Load-point rate at the samples, m/s: as measured, or slopes over seven samples."""
+        if self.velocity is not None or self.displacement is None:
+            return self.velocity
+        half = 3
+        n = len(self.time)
+        low, high = np.clip(np.arange(n) - half, 0, n - 1), np.clip(np.arange(n) + half, 0, n - 1)
+        rate: Array = (self.displacement[high] - self.displacement[low]) / (self.time[high] - self.time[low])
+        return rate
+
+    def taken(self, rows: Any, note: str) -> Record:
+        """Some of the samples, with a note that says which."""
+
+        def of(values: Array | None) -> Array | None:
+            return None if values is None else frozen(values[rows])
+
+        columns = {name: of(getattr(self, name)) for name in ("time", "friction", *_OPTIONAL)}
+        return replace(self, **columns, notes=(*self.notes, note))  # type: ignore[arg-type]
+
+    def between(self, start: Any, end: Any) -> Record:
+        """The part between two times (s, or text such as ``"11.6e3 s"``).
+
+        Raises
+        ------
+        ParameterError
+            If fewer than twenty samples are left.
+        """
+        first, last = seconds("start", start), seconds("end", end)
+        rows = (self.time >= first) & (self.time <= last)
+        if np.sum(rows) < FEWEST_ROWS:
+            span = f"{self.time[0]:.6g} to {self.time[-1]:.6g} s"
+            message = f"got {first!r} to {last!r} s, which leaves {np.sum(rows)} samples; the record is from {span}"
+            raise ParameterError([Problem("between", message)])
+        return self.taken(rows, f"cut to {first:.6g} to {last:.6g} s, {np.sum(rows)} of {len(self)} samples")
+
+    def decimated(self, count: int) -> Record:
+        """At most about `count` samples, dense after every step and thin where nothing happens.
+
+        The samples kept are as measured; nothing is averaged.
+        """
+        if count >= len(self):
+            return self
+        rows = transient_rows(self, count)
+        return self.taken(rows, f"decimated to {len(rows)} of {len(self)} samples, dense after steps")
+
+    def detrended(self, order: int = 1) -> Record:
+        """Friction without a polynomial in the load point's displacement (in time where that is unknown).
+
+        The polynomial is that of the last parts before every step and of the end, where friction is steady, levels
+        of their own allowed. A fit's own ``trend`` does the same with errors accounted for, and is to be preferred.
+        """
+        if not (isinstance(order, int) and 1 <= order <= 5):
+            raise ParameterError([Problem("order", f"got {order!r}; allowed: a whole number from 1 to 5")])
+        axis = self.time if self.displacement is None else self.displacement
+        s = (axis - axis[0]) / (axis[-1] - axis[0])
+        edges = np.searchsorted(self.time, [self.time[0], *(step.time for step in self.steps), np.inf])
+        columns, rows = [], []
+        for first, last in pairwise(edges):
+            if last - first >= FEWEST_ROWS:
+                part = np.arange(first + (last - first) * (0 if first == 0 else 2) // 3, last)
+                rows.append(part)
+        if not rows:
+            raise NotAvailable(
+                f"no part between steps has {FEWEST_ROWS} samples or more, so that no trend can be told from the "
+                "steps; fit with trend= instead"
+            )
+        level = np.zeros((sum(map(len, rows)), len(rows)))
+        place = 0
+        for i, part in enumerate(rows):
+            level[place : place + len(part), i] = 1.0
+            place += len(part)
+        chosen = np.concatenate(rows)
+        columns = [s**k for k in range(1, order + 1)]
+        matrix = np.hstack([level, np.column_stack([c[chosen] for c in columns])])
+        solution = np.linalg.lstsq(matrix, self.friction[chosen], rcond=None)[0][len(rows) :]
+        trend = sum(c * x for c, x in zip(columns, solution, strict=True))
+        note = (
+            f"a polynomial of order {order} was taken out of friction; it changes by {trend[-1] - trend[0]:.3g} over it"
+        )
+        return replace(self, friction=frozen(self.friction - trend), shear=None, notes=(*self.notes, note))
+
+    def windows(self, before: Any = None, after: Any = None) -> tuple[Record, ...]:
+        """One part around each velocity step, hold with its reslide, or step of normal stress.
+
+        Parameters
+        ----------
+        before, after : float or str, optional
+            Time to keep on both sides, s; halfway to the neighbouring steps unless given.
+        """
+        steps = [s for s in self.steps if s.kind != "reslide"]
+        if not steps:
+            raise NotAvailable(f"{self.source}: no steps were found in this record")
+        times = [s.time for s in steps]
+        ends = [self.time[0], *times, self.time[-1]]
+        found = []
+        for i, moment in enumerate(times):
+            low = 0.5 * (ends[i] + moment) if before is None and i else ends[0]
+            high = ends[i + 2] if i + 2 == len(ends) - 1 else 0.5 * (moment + ends[i + 2])
+            low = low if before is None else max(moment - seconds("before", before), self.time[0])
+            high = high if after is None else min(moment + seconds("after", after), self.time[-1])
+            found.append(self.between(low, high))
+        return tuple(found)
+
+    def summary(self) -> str:
+        """What is in it, in a few lines."""
+        span = self.time[-1] - self.time[0]
+        spacing = np.diff(self.time)
+        low, high = float(np.min(self.friction)), float(np.max(self.friction))
+        lines = [
+            f"{self.source}: {len(self)} samples over {shown(float(span), 's')}, "
+            f"one every {shown(float(np.median(spacing)), 's')}",
+            f"friction        {low:.4g} to {high:.4g}",
+        ]
+        if self.normal is not None:
+            stress = self.normal
+            lines.append(f"normal stress   {shown(float(stress.min()), 'Pa')} to {shown(float(stress.max()), 'Pa')}")
+        if self.displacement is not None:
+            moved = float(self.displacement[-1] - self.displacement[0])
+            lines.append(f"load point      {shown(moved, 'm')}, at first {shown(self.initial_rate or 0.0, 'm/s')}")
+        lines += [f"step            {step}" for step in self.steps] or ["step            none found"]
+        lines += [f"note            {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw friction, load-point rate and normal stress in time, with the steps found.
+
+        Returns
+        -------
+        array of matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the columns as text, units in the header, in the form that `read_record` understands.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        names = {"time": "Time (s)", "displacement": "Load displacement (m)", "velocity": "Load velocity (m/s)",
+                 "friction": "Friction", "shear": "Shear stress (Pa)", "normal": "Normal stress (Pa)"}  # fmt: skip
+        if self.integrated:
+            del names["displacement"]
+        present = {title: getattr(self, n) for n, title in names.items() if getattr(self, n) is not None}
+        try:
+            np.savetxt(
+                path, np.column_stack(list(present.values())), "%.12g", ",", header=",".join(present), comments=""
+            )
+        except OSError as error:
+            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+
+
+_OPTIONAL = ("normal", "shear", "displacement", "velocity")
+
+
+def whole_record(source: str, notes: tuple[str, ...], integrated: bool, **columns: Array | None) -> Record:
+    """A record from columns that were clean once.
+
+    Raises
+    ------
+    ParameterError
+        If they are not: times that do not rise, numbers that are not finite, too few of them.
+    """
+    present = {name: frozen(values) for name, values in columns.items() if values is not None}
+    time, normal = present["time"], present.get("normal")
+    problems = [Problem(name, "is not finite throughout") for name, a in present.items() if not np.all(np.isfinite(a))]
+    if len(time) < FEWEST_ROWS:
+        problems.append(Problem("time", f"has {len(time)} samples; a record needs {FEWEST_ROWS} or more"))
+    elif not np.all(np.diff(time) > 0):
+        problems.append(Problem("time", "does not rise throughout"))
+    if normal is not None and not np.all(normal > 0):
+        problems.append(Problem("normal", "is not > 0 throughout"))
+    if problems:
+        raise ParameterError(problems, title=source)
+    return Record(
+        **{name: present.get(name) for name in ("time", "friction", *_OPTIONAL)},  # type: ignore[arg-type]
+        source=source, notes=notes, integrated=integrated,
+    )  # fmt: skip
+
+
+def frozen(values: Any) -> Array:
+    """A copy as floats that cannot be written to."""
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def seconds(name: str, value: Any) -> float:
+    """A time from a number or text."""
+    try:
+        return checked_number(Parameter("s", real, name), value)
+    except ParameterError as error:
+        raise ParameterError([p.under(name) for p in error.problems]) from error
+
+
+# -- thinning
+
+
+def transient_rows(record: Record, count: int) -> Array:
+    """Rows to keep of a record: as many after every step as before the next, evenly in the logarithm of time."""
+    time, n = record.time, len(record)
+    usual = float(np.median(np.diff(time)))
+    weight = np.full(n, 1.0 / (time[-1] - time[0]))  # samples wanted per second
+    moments = [time[0], *(step.time for step in record.steps if step.kind != "normal-stress oscillation")]
+    for i, moment in enumerate(moments):
+        after = time >= moment - 2 * usual
+        share = 0.3 if i == 0 and len(moments) > 1 else 1.0
+        weight += share * np.where(after, 1.0 / (np.maximum(time - moment, 0.0) + 5 * usual), 0.0) / 8.0
+    spacing = np.gradient(time)
+    low, high = 0.0, 1e6 * count
+    for _ in range(60):
+        scale = 0.5 * (low + high)
+        if np.sum(np.minimum(weight * spacing * scale, 1.0)) < count:
+            low = scale
+        else:
+            high = scale
+    cumulated = np.cumsum(np.minimum(weight * spacing * high, 1.0))
+    chosen = np.searchsorted(cumulated, np.arange(0.5, cumulated[-1], 1.0))
+    return np.unique(np.concatenate([[0], np.minimum(chosen, n - 1), [n - 1]]))

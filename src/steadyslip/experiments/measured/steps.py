@@ -1,0 +1,62 @@
+"""What was done to a sample, in words: changes of the load-point rate, holds, changes of normal stress."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steadyslip.core.quantities import shown
+from steadyslip.experiments.loading.loading import Change, Loading
+from steadyslip.experiments.loading.pressing import Wave
+
+
+@dataclass(frozen=True)
+class Step:
+    """One change of what drives an experiment.
+
+    Attributes
+    ----------
+    kind : str
+        ``velocity step``, ``hold``, ``reslide``, ``normal-stress step`` or ``normal-stress oscillation``.
+    time : float
+        When it begins, s.
+    duration : float
+        How long it takes, s; zero if at once. Of an oscillation: its period.
+    before, after : float
+        Load-point rate (m/s) or normal stress (Pa); of an oscillation mean and amplitude.
+    """
+
+    kind: str
+    time: float
+    duration: float
+    before: float
+    after: float
+
+    @property
+    def unit(self) -> str:
+        return "Pa" if self.kind.startswith("normal") else "m/s"
+
+    def __str__(self) -> str:
+        if self.kind == "normal-stress oscillation":
+            return (
+                f"{self.kind} from {self.time:.6g} s: {shown(self.before, 'Pa')} ± {shown(self.after, 'Pa')}, "
+                f"period {shown(self.duration, 's')}"
+            )
+        lasting = f", in {shown(self.duration, 's')}" if self.duration else ""
+        values = f"{shown(self.before, self.unit)} to {shown(self.after, self.unit)}"
+        return f"{self.kind} at {self.time:.6g} s: {values}{lasting}"
+
+
+def steps_of(loading: Loading, wave: Wave | None) -> tuple[Step, ...]:
+    """The changes of a loading, in the order of time."""
+    found = [_step(channel, change) for channel, _, change in loading.changes]
+    if wave is not None:
+        found.append(Step("normal-stress oscillation", wave.time, wave.period, wave.mean, wave.amplitude))
+    return tuple(sorted(found, key=lambda step: step.time))
+
+
+def _step(channel: str, change: Change) -> Step:
+    if channel == "stress":
+        kind = "normal-stress step"
+    else:
+        kind = "hold" if change.after == 0.0 else "reslide" if change.before == 0.0 else "velocity step"
+    return Step(kind, change.time, change.duration, change.before, change.after)

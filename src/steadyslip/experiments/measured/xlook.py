@@ -1,0 +1,70 @@
+"""Binary files of XLOOK, the program that many rock-friction laboratories reduce their records with.
+
+A header of 36 bytes (name, numbers of records and of columns, two settings), 32 descriptions of channels of 84 bytes
+(name, unit, gain, comment, number of elements), then the columns one after another, as floating-point numbers of four
+or eight bytes. Headers are big-endian; columns are in whichever order of bytes makes numbers of them.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+
+Array = np.ndarray
+HEAD, CHANNELS, CHANNEL = 36, 32, 84
+UNUSED = "no_val"
+KINDS = (">f4", ">f8", "<f4", "<f8")
+
+
+def is_xlook(raw: bytes) -> bool:
+    """Whether the sizes in a header are those of the file."""
+    return _size(raw) is not None
+
+
+def _size(raw: bytes) -> tuple[int, int, int] | None:
+    """Rows, columns and bytes of a number, None if the file is no such one."""
+    body = len(raw) - HEAD - CHANNELS * CHANNEL
+    if body <= 0:
+        return None
+    rows, columns = struct.unpack(">ii", raw[20:28])
+    if rows <= 0 or not 0 < columns <= CHANNELS or body % (rows * columns):
+        return None
+    width = body // (rows * columns)
+    return (rows, columns, width) if width in (4, 8) else None
+
+
+def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Array]:
+    """Names, units and values (columns, rows) of a file's bytes.
+
+    Raises
+    ------
+    NotAvailable
+        If its sizes do not fit together, or its columns are no numbers.
+    """
+    size = _size(raw)
+    if size is None:
+        raise NotAvailable(f"{source!r} is no XLOOK file: its header does not say as many numbers as it has")
+    rows, columns, width = size
+    names, units = [], []
+    for k in range(CHANNELS):
+        start = HEAD + k * CHANNEL
+        name = _text(raw[start : start + 13])
+        if name and not name.startswith(UNUSED):
+            names.append(name)
+            units.append(_text(raw[start + 13 : start + 26]) or None)
+    names = [*names, *(f"column {k}" for k in range(len(names) + 1, columns + 1))][:columns]
+    units = [*units, *([None] * columns)][:columns]
+    for kind in (kind for kind in KINDS if int(kind[-1]) == width):
+        values = np.frombuffer(raw, kind, rows * columns, HEAD + CHANNELS * CHANNEL).reshape(columns, rows)
+        found = values.astype(float)
+        size_of = np.abs(found[found != 0.0])
+        if np.all(np.isfinite(found)) and (not len(size_of) or (size_of.max() < 1e20 and np.median(size_of) > 1e-20)):
+            return names, units, found
+    raise NotAvailable(f"{source!r} looks like an XLOOK file, but its columns are no numbers in either order of bytes")
+
+
+def _text(raw: bytes) -> str:
+    return raw.partition(b"\0")[0].decode("latin-1").strip()

@@ -1,0 +1,154 @@
+"""Files that come from outside: regular ones of bounded size, opened without waiting for anybody."""
+
+from __future__ import annotations
+
+import os
+import stat
+from os import PathLike
+from pathlib import Path
+
+from steadyslip.core.errors import NotAvailable
+
+MOST_TEXT = 2**20
+"""Bytes of a file that somebody typed: a rig, a protocol, a map, a fit."""
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+
+
+class UnreadableFile(NotAvailable):
+    """A file cannot be read.
+
+    Attributes
+    ----------
+    reason : str
+        Why, without the file's name: ``no such file``, ``it is a pipe; give a regular file``, ...
+    """
+
+    def __init__(self, name: str, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"cannot read {name!r}: {reason}")
+
+
+def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, private: bool = False) -> bytes:
+    """The content of a regular file.
+
+    The file is opened first and looked at then, so that nothing can take its place in between; opening a pipe does
+    not wait for its other end, and no more is read than is allowed, whatever the file's size is said to be.
+
+    Parameters
+    ----------
+    path : path
+    most : int
+        Greatest allowed size in bytes.
+    links : bool
+        Whether `path` itself may be a symbolic link.
+    private : bool
+        Whether to refuse a file that anybody else can change.
+
+    Raises
+    ------
+    UnreadableFile
+        If it is not a regular file, larger than allowed, or cannot be read.
+    """
+    name = str(path)
+    if "\0" in name:
+        raise UnreadableFile(name, "a name of a file has no null character")
+    try:
+        descriptor = os.open(path, _FLAGS | (0 if links else getattr(os, "O_NOFOLLOW", 0)))
+    except OSError as error:
+        raise UnreadableFile(name, _reason(error)) from error
+    try:
+        found = os.fstat(descriptor)
+        check_kind(name, found)
+        if private and not is_private(found):
+            raise UnreadableFile(name, "others can change it")
+        _check_size(name, found.st_size, most)
+        parts, left = [], most + 1
+        while left and (part := os.read(descriptor, min(left, 2**24))):
+            parts.append(part)
+            left -= len(part)
+    except OSError as error:
+        raise UnreadableFile(name, _reason(error)) from error
+    finally:
+        os.close(descriptor)
+    content = parts[0] if len(parts) == 1 else b"".join(parts)
+    _check_size(name, len(content), most)  # it grew, or its file system knows no sizes
+    return content
+
+
+def check_file(path: str | PathLike[str], most: int) -> None:
+    """Refuse what `read_bytes` would, before another library opens it by its name.
+
+    Raises
+    ------
+    UnreadableFile
+    """
+    name = str(path)
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError) as error:
+        raise UnreadableFile(name, _reason(error)) from error
+    check_kind(name, found)
+    _check_size(name, found.st_size, most)
+
+
+def inside(root: Path, key: str) -> Path:
+    """The file below a folder that `key`, names joined by ``/``, says; it need not be there.
+
+    Raises
+    ------
+    UnreadableFile
+        If that leads out of the folder, or through a symbolic link.
+    """
+    path = root
+    for part in key.split("/"):
+        path = path / part
+        if part in ("", ".", "..") or "\0" in part:
+            raise UnreadableFile(str(path), "no file has this name")
+        if path.is_symlink():
+            raise UnreadableFile(str(path), "it is a link, which may lead anywhere; remove it")
+    return path
+
+
+def check_kind(name: str, found: os.stat_result) -> None:
+    """Refuse what is not a regular file.
+
+    Raises
+    ------
+    UnreadableFile
+    """
+    if not stat.S_ISREG(found.st_mode):
+        raise UnreadableFile(name, f"it is {_KINDS.get(stat.S_IFMT(found.st_mode), 'special')}; give a regular file")
+
+
+def is_private(found: os.stat_result) -> bool:
+    """Whether a file or folder is this user's, and nobody else may write to it; always so where there are no owners."""
+    if not hasattr(os, "getuid"):
+        return True
+    return found.st_uid == os.getuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _check_size(name: str, size: int, most: int) -> None:
+    if size > most:
+        raise UnreadableFile(name, f"it has {_shown(size)}, more than the {_shown(most)} allowed")
+
+
+def _reason(error: OSError | ValueError) -> str:
+    if isinstance(error, FileNotFoundError):
+        return "no such file"
+    return (getattr(error, "strerror", None) or str(error)).lower()
+
+
+def _shown(size: int) -> str:
+    """A number of bytes for people."""
+    for unit in ("bytes", "kiB", "MiB"):
+        if size < 10_000:
+            return f"{size} {unit}"
+        size = -(-size // 1024)
+    return f"{size} GiB"

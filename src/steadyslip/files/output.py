@@ -1,0 +1,127 @@
+"""Files of results: which endings there are, refused before anything is computed; files written whole."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable
+
+FIGURES = (".png", ".svg", ".pdf")
+
+
+class OutputClosed(Exception):
+    """Nobody reads the standard output any more, as after ``| head``."""
+
+
+@contextmanager
+def answering() -> Iterator[None]:
+    """What is printed inside is out at the end.
+
+    Raises
+    ------
+    OutputClosed
+    NotAvailable
+        If the standard output cannot be written, as on a full disk.
+    """
+    try:
+        yield
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        discard_output()
+        raise OutputClosed from None
+    except OSError as error:
+        discard_output()
+        raise NotAvailable(f"cannot write to the standard output: {error.strerror or error}") from error
+
+
+def discard_output() -> None:
+    """Let what is still buffered go nowhere, so that nothing fails when Python ends."""
+    with suppress(OSError, ValueError, AttributeError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
+
+
+def check_output(paths: Iterable[Path], allowed: Sequence[str]) -> None:
+    """Refuse files that could not be written.
+
+    Raises
+    ------
+    NotAvailable
+        If an ending is unknown, or the folder does not exist.
+    """
+    for path in paths:
+        if path.suffix.lower() not in allowed:
+            raise NotAvailable(f"cannot write {str(path)!r}: allowed endings are {', '.join(allowed)}")
+        if not path.parent.is_dir():
+            raise NotAvailable(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
+
+
+def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]], figure: Callable[[], Any]) -> None:
+    """Write with the writer of a file's ending, or the figure, an Axes or an array of them.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is unknown or the file cannot be written.
+    """
+    check_output([path], (*writers, *FIGURES))
+    ending = path.suffix.lower()
+    try:
+        if ending in writers:
+            writers[ending](path)
+            return
+        axes = figure()
+        first = axes.flat[0] if hasattr(axes, "flat") else axes
+        first.figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+
+
+@contextmanager
+def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[str]:
+    """The name of a temporary file, which takes the place of `path` once it is written without fault.
+
+    A `private` file is for its owner alone.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    target, temporary = Path(path), ""
+    try:
+        descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=target.suffix)
+        os.close(descriptor)
+        yield temporary
+        if not private:
+            mask = os.umask(0)
+            os.umask(mask)
+            os.chmod(temporary, 0o666 & ~mask)  # temporary files are the owner's alone
+        os.replace(temporary, target)
+    except BaseException as error:
+        with suppress(OSError):
+            os.unlink(temporary)
+        if isinstance(error, OSError):
+            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+        raise
+
+
+def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:
+    """Write an xarray.Dataset as netCDF; a file of that name is replaced only once the new one is whole.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    with whole_file(path) as temporary:
+        dataset.to_netcdf(temporary, engine="netcdf4")

@@ -1,0 +1,123 @@
+"""Files that this program writes to read them again: a kind, a version of its layout, a checksum over everything.
+
+A sealed file ends in one line of text behind its content::
+
+    steadyslip run 2 <what it is of> <sha256 of all before>
+
+so that it is still what its ending says to other programs, which do not look behind their own content. Reading
+checks size, kind, version and checksum before anything else sees a byte. The seal finds damage and mistakes; it is no
+signature, so what is inside is checked as well.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.files.inputs import read_bytes
+from steadyslip.files.output import whole_file
+
+_LINE = re.compile(rb"\nsteadyslip ([a-z]{1,20}) ([0-9]{1,6}) ([0-9a-f]{64}) ([0-9a-f]{64})\n\Z")
+_LONGEST = 180  # bytes of that line
+_DIGEST = 65  # its last ones
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of file.
+
+    Attributes
+    ----------
+    name : str
+        One word in small letters.
+    version : int
+        Of the layout; files of another one are refused.
+    most : int
+        Greatest size in bytes.
+    remedy : str
+        What to do instead of reading a file that cannot be read.
+    """
+
+    name: str
+    version: int
+    most: int
+    remedy: str
+
+
+def seal(content: bytes, kind: Kind, of: str = "") -> bytes:
+    """The content of a sealed file; `of` is what it must be of to be accepted."""
+    line = f"\nsteadyslip {kind.name} {kind.version} {_name(of)} ".encode()
+    digest = hashlib.sha256(content)
+    digest.update(line)
+    return b"".join((content, line, digest.hexdigest().encode(), b"\n"))
+
+
+def unseal(raw: bytes, path: str | PathLike[str], kind: Kind, of: str = "") -> memoryview:
+    """What was sealed.
+
+    Raises
+    ------
+    NotAvailable
+        If `raw` is not a sealed file of this kind and version, is of something else, or is not what was written.
+    """
+
+    def refusal(reason: str) -> NotAvailable:
+        return NotAvailable(f"cannot read {str(path)!r}: {reason}; {kind.remedy}")
+
+    found = _LINE.search(raw, max(0, len(raw) - _LONGEST))
+    if found is None:
+        raise refusal(
+            f"it is not a steadyslip {kind.name}, is damaged, or was written by an earlier version or changed by "
+            "another program"
+        )
+    content = memoryview(raw)
+    if hashlib.sha256(content[: len(raw) - _DIGEST]).hexdigest().encode() != found[4]:
+        raise refusal("it is damaged, its content is not what was written")
+    if found[1] != kind.name.encode():
+        raise refusal(f"it holds a {found[1].decode()} and is not a steadyslip {kind.name}")
+    if int(found[2]) != kind.version:
+        raise refusal(f"its layout has version {int(found[2])}, and this program reads version {kind.version}")
+    if found[3] != _name(of).encode():
+        raise refusal(f"it is a {kind.name} of something else")
+    return content[: found.start()]
+
+
+def write_sealed(path: str | PathLike[str], content: bytes, kind: Kind, of: str = "", *, private: bool = False) -> None:
+    """Write a sealed file; a file of that name is replaced only once the new one is whole.
+
+    Raises
+    ------
+    NotAvailable
+        If it cannot be written, or is larger than what would be read again.
+    """
+    sealed = seal(content, kind, of)
+    if len(sealed) > kind.most:
+        size = f"has {len(sealed) / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name} may have"
+        raise NotAvailable(f"cannot write {str(path)!r}: it {size}")
+    with whole_file(path, private=private) as temporary, open(temporary, "wb") as file:
+        file.write(sealed)
+
+
+def read_sealed(path: str | PathLike[str], kind: Kind, of: str = "", *, private: bool = False) -> memoryview:
+    """What `write_sealed` wrote; `private` refuses a file that anybody else can change.
+
+    Raises
+    ------
+    NotAvailable
+        If it cannot be read, and as `unseal`.
+    """
+    return unseal(read_bytes(path, kind.most, private=private), path, kind, of)
+
+
+def fingerprint(data: Any) -> str:
+    """A checksum of plain data as JSON, whatever the order of names and however it is laid out."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _name(of: str) -> str:
+    return hashlib.sha256(of.encode()).hexdigest()

@@ -1,0 +1,108 @@
+"""Changes such as ``contact.angle=10 deg`` to the tables of a rig file, and the names that they may use."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
+from steadyslip.core.records import Part, Record, resolve
+from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.files.specifications.toml import NotToml, Table, tables_of
+from steadyslip.machine.slider import Slider
+
+
+def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
+    """Write ``name=value`` into the tables, and forget on which line that value stood; returns the problems."""
+    name, equals, raw = (part.strip() for part in text.partition("="))
+    if not equals or not name or not raw:
+        return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
+    full, problems = full_name(name, tables)
+    *path, last = full.split(".")
+    table: Any = tables
+    for step in path:
+        if isinstance(table, list):
+            index = int(step) - 1 if step.isdigit() else -1
+            table = table[index] if 0 <= index < len(table) else None
+        elif isinstance(table, dict):
+            table = table.setdefault(step, {})
+        if not isinstance(table, (dict, list)):
+            return [*problems, Problem(name, "cannot be set: there is no such table in the file")]
+    if isinstance(table, list):
+        message = "cannot be set: name one value of one member, such as friction.states.1.b"
+        return [*problems, Problem(name, message)]
+    try:
+        table[last] = value_of(raw, name)
+    except ParameterError as error:
+        return [*problems, *error.problems]
+    for key in [key for key in lines if key == full]:  # the fault is no longer on that line
+        del lines[key]
+    return problems
+
+
+def value_of(raw: str, name: str) -> Any:
+    """A value of `name` written without the quotes that TOML wants around text.
+
+    Raises
+    ------
+    ParameterError
+        If more than one value is written.
+    """
+    try:
+        tables = tables_of(f"value = {raw}")
+    except NotToml:
+        return raw
+    if len(tables) > 1:
+        raise ParameterError([Problem(name, f"got {came(raw)}; allowed: one value; repeat the option for others")])
+    return tables["value"]
+
+
+def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
+    """A shortened name stands for the one key of that name that the chosen laws have."""
+    known = dict.fromkeys(_known_names(tables))
+    try:
+        return resolve(name, known), []
+    except UnknownNameError as error:
+        return name, [] if "." in name else [Problem(name, str(error))]
+
+
+def _known_names(tables: Table) -> list[str]:
+    """Every dotted name that the laws chosen in the file know."""
+    names: list[str] = []
+    for section in sections():
+        table = tables.get(section.name)
+        if section.family is None:
+            names += _names_of(Slider, {}, section.name + ".")
+        elif isinstance(table, dict):
+            names.append(f"{section.name}.{selector(section.family)[0]}")
+            names += _names_chosen(section.family, table, section.name + ".")
+    if PROTOCOL.family is not None and isinstance(table := tables.get(PROTOCOL.name, {}), dict):
+        names += _names_of(PROTOCOL.family, table, PROTOCOL.name + ".")
+    return names
+
+
+def _names_chosen(family: type[Record], table: Table, prefix: str) -> list[str]:
+    """The names below a table that says which law it is."""
+    key, default = selector(family)
+    chosen = table.get(key, default)
+    law = family.registry.get(chosen) if isinstance(chosen, str) else None
+    return _names_of(law, table, prefix) if law else []
+
+
+def _names_of(law: type[Record], table: Table, prefix: str) -> list[str]:
+    names: list[str] = []
+    for item, role in own_fields(law):
+        inner = table.get(item.name)
+        if not isinstance(role, Part):
+            names.append(prefix + item.name)
+        elif role.many and isinstance(inner, list):
+            below = _names_chosen if has_choice(role.family) else _names_of
+            for index, member in enumerate(inner, start=1):
+                if isinstance(member, dict):
+                    names += below(role.family, member, f"{prefix}{item.name}.{index}.")
+        elif not role.many:
+            chosen = inner.get("law") if isinstance(inner, dict) else inner
+            found = role.family.registry.get(chosen) if isinstance(chosen, str) else None
+            part_prefix = prefix if role.inline else f"{prefix}{item.name}."
+            names += [prefix + item.name] if role.inline else []
+            names += _names_of(found, {}, part_prefix) if found else []
+    return names

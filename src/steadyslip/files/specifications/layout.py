@@ -1,0 +1,81 @@
+"""How records map to the tables and keys of a rig file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import Field, dataclass, fields
+from importlib.metadata import entry_points
+from typing import Any
+
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.records import Part, Record, Role, role_of
+from steadyslip.machine.drive import Drive
+from steadyslip.machine.slider import Slider
+from steadyslip.protocol import Piece, Protocol
+
+ENTRY_POINTS = "steadyslip.laws"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table of the file: its name and the family of records that fills it (None: the slider itself)."""
+
+    name: str
+    family: type[Record] | None
+
+
+PROTOCOL = Section("protocol", Protocol)
+"""The table that a file may have besides those of the rig."""
+
+MAP = "map"
+"""A table that is read by what computes maps, and by nothing else."""
+
+
+def sections() -> tuple[Section, ...]:
+    """The tables of a rig, in order."""
+    found = [Section(item.name, role.family) for item in fields(Slider) if isinstance(role := role_of(item), Part)]
+    found.insert(2, Section(Slider.section.rstrip("."), None))
+    return tuple(found)
+
+
+def selector(family: type[Record]) -> tuple[str, str | None]:
+    """The key that names the law of a table, and the law meant when it is absent."""
+    if family is Piece:
+        return "kind", None
+    return ("control", "steady") if family is Drive else ("law", None)
+
+
+def has_choice(family: type[Record]) -> bool:
+    """Whether a table of this family names one of several laws, rather than being the one record itself."""
+    return bool(family.registry) and not family.name
+
+
+def find_law(family: type[Record], name: object) -> type[Record]:
+    """The law of a family with a registered name, or one that an installed package offers under it.
+
+    Raises
+    ------
+    ParameterError
+        If there is none; lists the nearest name and all others.
+    """
+    if isinstance(name, str):
+        if name in family.registry:
+            return family.registry[name]
+        for entry in entry_points(group=ENTRY_POINTS, name=name):
+            try:
+                law = entry.load()
+            except Exception as error:  # whatever a foreign package does when imported
+                message = f"{name!r} is offered by {entry.value!r}, which cannot be loaded: {error!r}"
+                raise ParameterError([Problem("", message)]) from error
+            if isinstance(law, type) and issubclass(law, family):
+                return law
+    raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])
+
+
+def own_fields(law: type[Record]) -> Iterator[tuple[Field[Any], Role]]:
+    """The fields of a record that are keys of its own table."""
+    for item in fields(law):  # type: ignore[arg-type]
+        role = role_of(item)
+        if law is Slider and isinstance(role, Part):
+            continue
+        yield item, role

@@ -1,0 +1,90 @@
+"""Protocols of experiments from rig files and from words of the command line."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable
+from os import PathLike
+
+from steadyslip.core.errors import InternalError, ParameterError, Problem
+from steadyslip.files.specifications.changes import value_of
+from steadyslip.files.specifications.layout import selector
+from steadyslip.files.specifications.read import Reader, read_text, text_of
+from steadyslip.files.specifications.toml import Table
+from steadyslip.protocol import Piece, Protocol
+
+
+def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Protocol | None:
+    """Read the protocol of a rig file, or of a file that has the table ``[protocol]`` alone.
+
+    Parameters
+    ----------
+    path : path
+        TOML file, UTF-8.
+    changes : iterable of str
+        Values that replace or complete those of the file, as ``"protocol.pieces.1.to=2 um/s"``.
+
+    Returns
+    -------
+    Protocol or None
+        None if the file has no such table.
+
+    Raises
+    ------
+    RigFileError
+        If the file cannot be read or anything in it, the rig included, is wrong.
+    """
+    return protocol_from_text(text_of(path), str(path), changes)
+
+
+def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Protocol | None:
+    """Read the protocol of a rig file's text; see `read_protocol`."""
+    return read_text(text, source, changes, rig_needed=False)[1]
+
+
+def piece_from_text(text: str, area: float | None = None) -> Piece:
+    """Read one piece of a protocol from a line of words, the kind first.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``"velocity-step at=10s to='2 um/s'"``; quotes keep words together as in a shell.
+    area : float, optional
+        Contact area of the rig, m^2: with it stresses are given as forces, as in a rig file.
+
+    Raises
+    ------
+    ParameterError
+        If anything is wrong; every problem is listed.
+
+    Examples
+    --------
+    >>> piece_from_text("velocity-step at=10s to='2 um/s'")
+    VelocityStep(at=10.0, to=2e-06)
+    """
+    try:
+        kind, *words = shlex.split(text)
+    except ValueError as error:
+        message = f"{error}" if text.strip() else f"is empty; write KIND KEY=VALUE ..., {_kinds()}"
+        raise ParameterError([Problem("piece", message)], title=repr(text)) from error
+    reader = Reader({})
+    reader.area = area
+    table: Table = {selector(Piece)[0]: kind}
+    for word in words:
+        name, equals, raw = word.partition("=")
+        if not (equals and name and raw):
+            reader.problem(word, "is not KEY=VALUE, such as at=10s; put quotes around a value with blanks")
+        elif name in table:
+            reader.problem(name, "is given twice")
+        else:
+            table[name] = value_of(raw, name)
+    piece = reader.record(Piece, table, "")
+    if reader.problems:
+        raise ParameterError(reader.problems, title=repr(text))
+    if not isinstance(piece, Piece):
+        raise InternalError("isinstance(piece, Piece)")
+    return piece
+
+
+def _kinds() -> str:
+    return f"KIND one of {', '.join(Piece.registry)}"

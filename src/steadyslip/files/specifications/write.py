@@ -1,0 +1,109 @@
+"""A Slider as the text of a rig file."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.quantities import outside
+from steadyslip.core.records import Option, Parameter, Part, Record, Samples
+from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.machine.slider import Slider
+from steadyslip.protocol import Protocol
+
+
+def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None = None) -> None:
+    """Write a rig file, with the protocol of an experiment if one is given; see `rig_to_text`.
+
+    Raises
+    ------
+    ParameterError
+        If the rig has a law without registered name.
+    OSError
+        If the file cannot be written.
+    """
+    Path(path).write_text(rig_to_text(rig, protocol), encoding="utf-8")
+
+
+def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
+    """The rig as TOML, SI numbers with the unit as a comment; with an area, totals (N, N/m, kg).
+
+    Raises
+    ------
+    ParameterError
+        If the rig or the protocol has a law without registered name, which no file can refer to.
+    """
+    blocks = []
+    for section in sections():
+        record = rig if section.family is None else getattr(rig, section.name)
+        first: list[str] = []
+        if section.family is not None:
+            key, default = selector(section.family)
+            word = _law_name(record, section.name)
+            first = [] if word == default else [f'{key} = "{word}"']
+        blocks.append(_table(f"[{section.name}]", record, first, section.name, rig.area))
+    if protocol is not None:
+        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, rig.area))
+    return "\n".join(blocks)
+
+
+def _law_name(record: Record, where: str) -> str:
+    if not record.name:
+        kind = type(record).__name__
+        raise ParameterError([Problem(where, f'{kind} has no name; declare it as class {kind}(..., name="...")')])
+    return record.name
+
+
+def _table(header: str, record: Record, first: list[str], path: str, area: float | None) -> str:
+    lines = [header, *first]
+    below: list[str] = []
+    for item, role in own_fields(type(record)):
+        value = getattr(record, item.name)
+        if value is None or value == item.default:
+            continue
+        if isinstance(role, Samples):
+            lines.append(f"{item.name} = {_column(role, value, area)}")
+        elif not isinstance(role, Part):
+            lines.append(f"{item.name} = {_scalar(role, value, area)}")
+        elif role.many:
+            below += [_member(role.family, member, f"{path}.{item.name}", path, area) for member in value]
+        elif role.inline:
+            lines.append(f'{item.name} = "{_law_name(value, path)}"')
+            lines += _table("", value, [], path, area).splitlines()[1:]
+        else:
+            name = f"{path}.{item.name}"
+            below.append(_table(f"[{name}]", value, [f'law = "{_law_name(value, name)}"'], name, area))
+    return "\n".join(["\n".join(lines) + "\n", *below])
+
+
+def _member(family: type[Record], member: Record, name: str, path: str, area: float | None) -> str:
+    """One table of a list."""
+    first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
+    return _table(f"[[{name}]]", member, first, path, area)
+
+
+def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
+    if isinstance(role, Option):
+        return str(value).lower() if isinstance(value, bool) else f'"{value}"'
+    if role.domain.whole:
+        return f"{value:.0f}"
+    factor, unit = outside(role.unit, area)
+    if not _reads_back(value, factor):
+        return f'"{float(value)!r} {role.unit}"'
+    return repr(float(value) * factor) + (f"  # {unit}" if unit != "1" else "")
+
+
+def _column(role: Samples, values: tuple[float, ...], area: float | None) -> str:
+    """A list of numbers, on as many lines as it needs."""
+    factor, unit = outside(role.unit, area)
+    each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {role.unit}"' for v in values]
+    text = wrap(", ".join(each), 100, break_on_hyphens=False)
+    return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
+
+
+def _reads_back(value: float, factor: float) -> bool:
+    """Whether a total gives the same number per unit area again; otherwise that number is written, with its unit."""
+    return float(value) * factor / factor == float(value)

@@ -1,0 +1,172 @@
+"""Results in files: named columns and a few attributes in one sealed netCDF file (`steadyslip.files.sealed`).
+
+Whoever writes a kind of file declares its attributes and columns; reading compares names, types, dimensions, sizes
+and units with that before an array is made. The seal has found damage by then; what is left to find is a file that
+somebody made.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.files.netcdf import File, FormatError, Variable, read
+from steadyslip.files.sealed import Kind, read_sealed, write_sealed
+
+Array = np.ndarray
+_SIZES = "sizes"  # attribute: the format has no empty dimensions, so that variables along them are left out
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a variable must be.
+
+    Attributes
+    ----------
+    dims : tuple of str
+    unit : str
+        SI; empty if it has none to state.
+    text : bool
+        Whether it holds words instead of numbers.
+    """
+
+    dims: tuple[str, ...]
+    unit: str = ""
+    text: bool = False
+
+
+def write_table(path: str | PathLike[str], kind: Kind, dataset: Any) -> None:
+    """Write an xarray.Dataset of floats and words; a file of that name is replaced only once the new one is whole.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written, or the dataset is too large.
+    """
+    if dataset.nbytes > kind.most:
+        size = f"it has {dataset.nbytes / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name}"
+        raise NotAvailable(f"cannot write {str(path)!r}: {size} may have; keep fewer samples")
+    kept = dataset.drop_vars([name for name, variable in dataset.variables.items() if not variable.size])
+    kept = kept.assign_attrs({_SIZES: json.dumps(dict(dataset.sizes))})
+    encoding = {name: {"_FillValue": None} for name, variable in kept.variables.items() if variable.dtype.kind == "f"}
+    content = kept.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
+    write_sealed(path, bytes(content), kind)
+
+
+class Table:
+    """A file that is open: its attributes, and its columns once somebody says which they must be.
+
+    Attributes
+    ----------
+    attributes : dict
+    """
+
+    def __init__(self, path: str | PathLike[str], kind: Kind, attributes: Mapping[str, type]) -> None:
+        self.path, self.kind = path, kind
+        try:
+            self._file: File = read(read_sealed(path, kind))
+        except FormatError as error:
+            raise self.fault(str(error)) from error
+        self.attributes: dict[str, Any] = dict(self._file.attributes)
+        sizes = self.json(self.attributes.pop(_SIZES, None), {str: int})
+        self._compare("attributes", self.attributes, attributes)
+        for name, type_ in attributes.items():
+            if type(self.attributes[name]) is not type_:
+                raise self.fault(f"{name} is {self.attributes[name]!r:.60}, not {_TYPES[type_]}")
+        self.sizes: dict[str, int] = sizes
+
+    def fault(self, what: str) -> NotAvailable:
+        """What to say of a file that was not written by this program."""
+        return NotAvailable(f"cannot read {str(self.path)!r}: as a {self.kind.name}, {what}; {self.kind.remedy}")
+
+    def json(self, text: Any, form: Any) -> Any:
+        """Data of a declared form from JSON text; see `fits_form`.
+
+        Raises
+        ------
+        NotAvailable
+        """
+        try:
+            found = json.loads(text)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise self.fault("an attribute is missing or not JSON") from error
+        if not fits_form(found, form):
+            raise self.fault(f"an attribute holds {found!r:.60}, which has another form")
+        return found
+
+    def columns(self, expected: Mapping[str, Column]) -> dict[str, Any]:
+        """All columns, arrays of float64 or lists of words.
+
+        Raises
+        ------
+        NotAvailable
+            If there are others, or one is not as expected.
+        """
+        dims = {dim for column in expected.values() for dim in column.dims}
+        self._compare("dimensions", self.sizes, dims)
+        present = {n: c for n, c in expected.items() if all(self.sizes[dim] for dim in c.dims)}
+        self._compare("columns", self._file.variables, present)
+        for name, column in present.items():
+            self._check(name, self._file.variables[name], column)
+        return {name: self._values(name, column) for name, column in expected.items()}
+
+    def _compare(self, what: str, found: Mapping[str, Any], expected: Any) -> None:
+        if missing := [name for name in expected if name not in found]:
+            raise self.fault(f"of its {what}, {missing[0]!r} is missing")
+        if more := [name for name in found if name not in expected]:
+            raise self.fault(f"it has unknown {what}, {more[0]!r}")
+
+    def _check(self, name: str, variable: Variable, column: Column) -> None:
+        rank = len(column.dims)
+        shape = tuple(self.sizes[dim] for dim in column.dims)
+        texts = variable.dtype == "S1" and len(variable.shape) == rank + 1 == 2
+        if not (texts if column.text else variable.dtype == ">f8" and len(variable.shape) == rank):
+            raise self.fault(f"{name} does not hold {'words' if column.text else 'numbers'} over {column.dims}")
+        if variable.dims[:rank] != column.dims or variable.shape[:rank] != shape:
+            raise self.fault(f"{name} has shape {variable.shape} over {variable.dims}, not {shape} over {column.dims}")
+        if variable.attributes.get("units", "") != column.unit:
+            raise self.fault(f"{name} is in {variable.attributes.get('units', '')!r:.40}, not in {column.unit!r}")
+
+    def _values(self, name: str, column: Column) -> Any:
+        if name not in self._file.variables:
+            return [] if column.text else np.empty([self.sizes[dim] for dim in column.dims])
+        try:
+            variable = self._file.variables[name]
+            return variable.texts() if column.text else variable.numbers()
+        except FormatError as error:
+            raise self.fault(f"{name} {error}") from error
+
+
+_TYPES = {str: "text", int: "a whole number", float: "a number"}
+
+
+def fits_form(value: Any, form: Any) -> bool:
+    """Whether plain data have a form.
+
+    That is a type, ``[form]`` for a list, ``(form, form)`` for a list of so many, ``{name: form}`` for exactly these
+    names, ``{str: form}`` for any, or ``{form, None}`` for what may be missing. Whole numbers are floats too.
+    """
+    if isinstance(value, int) and abs(value) >= 2**63:
+        return False
+    if form is float:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    if isinstance(form, type):
+        return type(value) is form
+    if isinstance(form, list):
+        return isinstance(value, list) and all(fits_form(item, form[0]) for item in value)
+    if isinstance(form, tuple):
+        same = isinstance(value, list) and len(value) == len(form)
+        return same and all(fits_form(v, f) for v, f in zip(value, form, strict=True))
+    if isinstance(form, set):
+        return value is None or any(fits_form(value, one) for one in form if one is not None)
+    if not isinstance(value, dict):
+        return False
+    if str in form:
+        return all(fits_form(item, form[str]) for item in value.values())
+    return value.keys() == form.keys() and all(fits_form(value[name], form[name]) for name in form)

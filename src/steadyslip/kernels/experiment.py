@@ -1,0 +1,118 @@
+"""The kernel that an experiment is compared with: friction, and its derivatives in several directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.expressions import array_function
+from steadyslip.kernels.build import Code, compiled, interpreted
+from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.lockstep import LockstepKernel
+from steadyslip.kernels.reduction import Reduction, W, reduce_model
+from steadyslip.kernels.variational import with_directions
+from steadyslip.model import Model
+
+LANES = 8  # one vector of doubles: sensitivities fill the registers
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentProgram:
+    """One such kernel of one model.
+
+    Attributes
+    ----------
+    reduction : Reduction
+        Without sensitivities.
+    directions : int
+    method : str
+    """
+
+    reduction: Reduction
+    directions: int
+    method: str
+    plain: bool = False
+
+    @cached_property
+    def kernel(self) -> LockstepKernel:
+        friction = self.reduction.outputs["tau"] / self.reduction.outputs["sigma"]
+        extended = with_directions(self.reduction, self.directions)
+        choice = Choice(self.method, level="linear", lanes=1 if self.plain else LANES, dense=False)
+        return LockstepKernel(extended, choice, friction)
+
+    @cached_property
+    def code(self) -> Code:
+        """Machine code, or plain Python if `plain`."""
+        return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
+
+    @cached_property
+    def through_table(self) -> Callable[..., None]:
+        """`steadyslip.kernels.lockstep_driver.through_table` of this model."""
+        return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
+
+    @cached_property
+    def _parameters(self) -> list[sp.Symbol]:
+        model = self.reduction.model
+        return [*model.parameters.values(), model.sigma_ss]
+
+    @cached_property
+    def _start(self) -> list[sp.Expr]:
+        model = self.reduction.model
+        steady = model.steady | {W: self.reduction.w_of_v.xreplace(model.steady)}
+        return [steady[symbol] for symbol in self.reduction.continuous]
+
+    @cached_property
+    def _values(self) -> Any:
+        constants = list(self.kernel.constants.symbols)
+        return array_function(self._parameters, [*constants, *self._start])
+
+    @cached_property
+    def _slopes(self) -> Any:
+        """Derivatives of constants and starting values in every parameter, σss following the parameters."""
+        model = self.reduction.model
+        expressions = [*self.kernel.constants.symbols, *self._start]
+        residual = model.steady_stress - model.sigma_ss
+        found = []
+        for symbol in model.parameters.values():
+            stress = -sp.diff(residual, symbol) / sp.diff(residual, model.sigma_ss)
+            for expression in expressions:
+                found.append(sp.diff(expression, symbol) + sp.diff(expression, model.sigma_ss) * stress)
+        return array_function(self._parameters, found)
+
+    def arrays(self, arguments: tuple[Any, ...], sigma: Any, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Constants with their rates of change, and starting states with theirs.
+
+        Parameters
+        ----------
+        arguments, sigma
+            Parameters of the model and steady normal stress, of every job.
+        chain : ndarray (jobs, directions, parameters)
+            How fast the parameters change in each direction.
+        """
+        jobs, _, count = chain.shape
+        with np.errstate(all="ignore"):
+            values = _stacked(self._values(*arguments, sigma), jobs)
+            slopes = _stacked(self._slopes(*arguments, sigma), jobs).reshape(jobs, count, -1)
+        rates = np.matmul(chain, slopes)
+        table, size = self.kernel.constants, len(self.kernel.constants.symbols)
+        constants = table.with_rates(values[:, :size], rates[:, :, :size], {})
+        start = np.concatenate([values[:, None, size:], rates[:, :, size:]], axis=1)
+        return constants, np.ascontiguousarray(start.reshape(jobs, -1))
+
+
+def _stacked(columns: list[Any], jobs: int) -> np.ndarray:
+    table = np.empty((jobs, len(columns)))
+    for i, column in enumerate(columns):
+        table[:, i] = column
+    return table
+
+
+@lru_cache(maxsize=64)
+def experiment_program(model: Model, directions: int, method: str) -> ExperimentProgram:
+    """The kernel for a model; made once per process."""
+    return ExperimentProgram(reduce_model(model, None), directions, method)

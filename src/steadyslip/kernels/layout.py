@@ -1,0 +1,199 @@
+"""Where everything lies in the arrays that kernels and their driver share: declared once, for both and for NumPy.
+
+A *record* holds one trajectory: first the numbers of `Row`, at the same place whatever the model, then groups whose
+sizes depend on the model and the method, where `Layout` says. Kernels of several lanes keep their records side by
+side: quantity ``row`` of lane ``l`` is ``S[row * lanes + l]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Row(IntEnum):
+    """Numbers of a record that every kernel has."""
+
+    V, ACCELERATION, SIGMA = 0, 1, 2
+    """Outputs at the end of the step."""
+    GAP = 3
+    """How much faster than the load point (and than the limit of arrest) the block is."""
+    Z, Z_SCALE = 4, 5
+    """The unknown of the balance, or a guess of it, and its scale."""
+    TAU, H, END = 6, 7, 8
+    """Time since the start of the segment, next step, length of the segment."""
+    START, SEGMENT = 9, 10
+    """Start of the segment since that of the run, and its number."""
+    RTOL = 11
+    INPUT, SLOPE = 12, 15
+    """v_lp, q and p at the start of the segment and their slopes: three each."""
+    ACTIVE, FLAG, GOOD = 18, 19, 20
+    """Whether there is a job, whether it needs the driver, whether the last step was accepted."""
+    ACCEPTED, REJECTED, FAILURES, ERROR = 21, 22, 23, 24
+    MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 25, 26, 27, 28, 29, 30
+    NEXT = 31
+    """How far into the segment the next sample is."""
+    SETTLED, SAME = 32, 33
+    SLIPPING, RESTING = 34, 35
+    DONE, TAU_OLD = 36, 37
+    """Length of the last step and where it began."""
+    V_OLD, ACCELERATION_OLD, SIGMA_OLD = 38, 39, 40
+    # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
+    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 41, 42, 43
+    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 44, 45, 46, 47, 48, 49
+    ARRESTS, VELOCITY_PEAKS, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 50, 51, 52, 53, 54
+    NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, DECIDED, ANY_BEGIN = (
+        55, 56, 57, 58, 59, 60, 61, 62, 63,
+    )  # fmt: skip
+    STOP = 64
+    """End of the segment since the start of the run."""
+    NOW_FROM, NOW_EVENT, NOW_V, NOW_SIGMA, NOW_TAU, NOW_SEGMENT = 65, 66, 67, 68, 69, 70
+    V_DRIVE = 71
+
+
+TALLY = tuple(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH)
+"""Columns of the tally of events, a result."""
+INPUTS = 3
+
+
+class Out(IntEnum):
+    """Places of the outputs, counted from the end of the state."""
+
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, COUNT = 0, 1, 2, 3, 4, 5, 6
+
+
+class Setting(IntEnum):
+    """Columns of the settings of a trajectory; absolute tolerances of the state follow."""
+
+    RTOL, MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 0, 1, 2, 3, 4, 5, 6
+    GUESS, Z_SCALE, FIRST_STEP, SETTLED, SAME, V_DRIVE, ATOL = 7, 8, 9, 10, 11, 12, 13
+
+
+SETTINGS = tuple(setting.name.lower() for setting in Setting if setting < Setting.ATOL)
+
+
+class Cursor(IntEnum):
+    """Where a chain of calls stands."""
+
+    NEXT_JOB, LAST_JOB, BUSY, PAUSED, LOGGED, RECORDED, FIRST_JOB, SIZE = 0, 1, 2, 3, 4, 5, 6, 7
+
+
+class Status(IntEnum):
+    """How a trajectory ended."""
+
+    RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
+    SETTLED, PERIODIC = 7, 8
+
+
+class Kind(IntEnum):
+    """What a row of the log says."""
+
+    NONE, EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN, TROUGH = 0, 1, 2, 3, 4, 5, 6, 7, 8
+
+
+LOG_COLUMNS = 8
+"""Kind, time, v, sigma, tau, T, slip, segment."""
+
+
+class Final(IntEnum):
+    """Columns of the final state of a trajectory."""
+
+    TIME, SEGMENT, ACCEPTED, REJECTED, STATE = 0, 1, 2, 3, 4
+
+
+class Layout(NamedTuple):
+    """Sizes of one kernel, and where the groups of its record begin."""
+
+    lanes: int
+    size: int
+    """Length of the state."""
+    kept: int
+    """Number of variables that jumps leave alone."""
+    constants: int
+    harmonics: int
+    stages: int
+    """That are kept for dense output; none without."""
+    massless: int
+    solved: int
+    """Whether the balance has to be solved to restore the variables that jumps leave alone."""
+    w: int
+    """Place of the velocity variable in the state, -1 if it is not there."""
+    own: int
+    """Length of the state without sensitivities."""
+    directions: int
+    x: int
+    """Place of the slip in the state."""
+    state: int
+    rate: int
+    continuous: int
+    atol: int
+    amplitude: int
+    omega: int
+    phase: int
+    constant: int
+    old: int
+    stage: int
+    seen: int
+    before: int
+    rows: int
+
+
+def make_layout(
+    *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, massless: bool = False,
+    solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0, seen: int = 0,
+) -> Layout:  # fmt: skip
+    """Put the groups one behind the other."""
+    waves = INPUTS * harmonics
+    sizes = {
+        "state": size, "rate": size, "continuous": kept, "atol": size, "amplitude": waves, "omega": waves,
+        "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages, "seen": seen,
+        "before": own if seen else 0,
+    }  # fmt: skip
+    places, position = {}, max(Row) + 1
+    for name, count in sizes.items():
+        places[name] = position
+        position += count
+    return Layout(
+        lanes=lanes, size=size, kept=kept, constants=constants, harmonics=harmonics, stages=stages,
+        massless=int(massless), solved=int(solved), w=w, own=own, directions=directions, x=x, rows=position, **places,
+    )  # fmt: skip
+
+
+Array = np.ndarray
+Routine = Callable[[Array, float, Array], None]
+
+
+class Routines(NamedTuple):
+    """The straight-line functions of one model, each ``(record, number, array) -> None``.
+
+    The driver runs with plain Python functions as it stands; compiled, it is given their addresses instead.
+
+    Attributes
+    ----------
+    step : one step of every lane
+    rates : rates, outputs and gap of the record's state
+    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`
+    restore : the variables that a jump leaves alone, from the record's state
+    place : the record's state from them and the velocity variable `number`
+    balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
+    dense : ``array[:size]`` = state at the fraction `number` of the last step
+    rates_lanes, see_lanes : of every lane: the rates; what is observed
+    """
+
+    step: Routine
+    rates: Routine
+    outputs: Routine
+    restore: Routine
+    place: Routine
+    balance: Routine
+    dense: Routine
+    rates_lanes: Routine
+    see_lanes: Routine
+
+
+def call(routine: Routine, record: Array, number: float, array: Array) -> None:
+    """Call a routine; compiled code jumps to its address instead (`steadyslip.kernels.build`)."""
+    routine(record, number, array)

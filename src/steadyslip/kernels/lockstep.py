@@ -1,0 +1,102 @@
+"""The kernel that takes all lanes through one table of inputs together, with sensitivities.
+
+Measured histories have a breakpoint at every sample. Lanes that each looked after their own breakpoints would spend
+most of their time there; lanes that share the samples of one record need not: they enter every row of the table
+together, each takes as many steps of its own size as it needs, and all wait for the last. What is observed and its
+derivatives in several directions are written down at every sample.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import sympy as sp
+
+from steadyslip.kernels.kernel import Choice, Kernel, Record, Step
+from steadyslip.kernels.layout import Layout, Row, make_layout
+from steadyslip.kernels.nodes import Program, as_node, select
+from steadyslip.kernels.reduction import V_LP, P, Q, Reduction
+
+
+class LockstepKernel(Kernel):
+    """Writes the programs of one such kernel.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        From `with_directions`, massless models in the form *explicit* or *implicit*: the state is continuous.
+    choice : Choice
+        Of level ``linear``, not dense.
+    observed : sympy.Expr
+        What is written down, in terms of state, unknown and inputs.
+    """
+
+    varied_inputs = (V_LP, Q, P)
+
+    def __init__(self, reduction: Reduction, choice: Choice, observed: sp.Expr) -> None:
+        self.observed = observed
+        self.own = len(reduction.state) // (1 + len(reduction.directions))
+        super().__init__(reduction, choice)
+
+    def _write(self) -> None:
+        self.counted = self.own  # sensitivities have tolerances of their own, and are not diluted by each other
+        super()._write()
+        self.full = self.rates
+        expression = self._fixed(self.observed)
+        wanted = [expression]
+        for direction, column in enumerate(self.reduction.directions):
+            change = self._change(expression, direction)
+            for variable, slope in zip(self.reduction.state[: self.own], column, strict=True):
+                change += self._fixed(self.reduction.derivative(self.observed, variable)) * slope
+            wanted.append(change)
+        self.seen = self._formulas(wanted)
+
+    def _made_layout(self) -> Layout:
+        directions = len(self.reduction.directions)
+        return make_layout(
+            lanes=self.choice.lanes,
+            size=self.size,
+            kept=0,
+            constants=len(self.constants.all),
+            own=self.own,
+            directions=directions,
+            x=self.reduction.names.index("x"),
+            seen=1 + directions,
+        )
+
+    @cached_property
+    def programs(self) -> tuple[Program, ...]:
+        """What `steadyslip.kernels.lockstep_driver` calls."""
+        return self._step(), self._lanes_program("rates_lanes"), self._lanes_program("see_lanes")
+
+    def _step(self) -> Program:
+        """One step; a lane that has arrived stays as it is."""
+        step = Step(self)
+        step.advance()
+        step._keep_state()
+        load, store, good = step.program.load, step.program.store, step.good
+        moves = select(step.rest > 0.0, 1.0, 0.0)
+        store(Row.ERROR, select(as_node(good, "bool") & (step.rest > 0.0), step.size, step.earlier))
+        store(Row.TAU, select(good, step.after, step.tau))
+        store(Row.H, step.next_h)
+        store(Row.ACCEPTED, load(Row.ACCEPTED) + select(good, moves, 0.0))
+        store(Row.REJECTED, load(Row.REJECTED) + select(good, 0.0, moves))
+        store(Row.FAILURES, select(good, 0.0, load(Row.FAILURES) + 1.0))
+        return step.program
+
+    def _lanes_program(self, name: str) -> Program:
+        record = Record(self, Program(name))
+        point = record.point(record.program.load(Row.TAU))
+        rates = name == "rates_lanes"
+        place = self.layout.rate if rates else self.layout.seen
+        for i, value in enumerate(record.evaluated(self.rates if rates else self.seen, point)):
+            record.program.store(place + i, value)
+        if rates:
+            record.keep_unknown()
+        return record.program
+
+    def input_rates(self) -> tuple[int, ...]:
+        """Where the rates of change of the inputs lie among the constants, direction by direction; -1 if nowhere."""
+        order = {pair: len(self.constants.symbols) + i for i, pair in enumerate(self.constants.rates)}
+        directions = range(len(self.reduction.directions))
+        return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs)

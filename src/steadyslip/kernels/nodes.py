@@ -1,0 +1,244 @@
+"""Straight-line programs: typed operations in the order in which they were written, and where results are stored.
+
+A `Node` is one operation. Arithmetic on nodes makes nodes, so that a method's step or a friction law written as
+ordinary Python becomes a program when it is run once; a printer (`printers/`) turns that into code.
+Branches are selections and there are no calls but to the listed primitives, so that every target, vector code
+included, takes the same program.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+PRIMITIVES = (
+    "exp", "log", "log1p", "expm1", "sinh", "cosh", "tanh", "asinh", "asinh_exp", "sin", "cos", "sqrt", "power", "sign",
+)  # fmt: skip
+"""Elementary functions that programs may use; `steadyslip.kernels.primitives` says what they are."""
+_order = itertools.count()
+
+
+class Node:
+    """One operation.
+
+    Attributes
+    ----------
+    op : str
+    args : tuple
+        Nodes, or for the leaves (``number``, ``load``, ``argument``, ``carried``) what they mean.
+    kind : str
+        ``real``, ``int`` or ``bool``.
+    loop : Loop or None
+        The loop in which it has to be computed.
+    order : int
+        Rises in the order in which nodes were made.
+    """
+
+    __slots__ = ("args", "kind", "loop", "op", "order")
+
+    def __init__(self, op: str, args: tuple[Any, ...], kind: str = "real", loop: Loop | None = None) -> None:
+        self.op, self.args, self.kind = op, args, kind
+        self.loop: Loop | None = loop or next((a.loop for a in self.operands if a.loop is not None), None)
+        self.order = next(_order)
+
+    @property
+    def operands(self) -> tuple[Node, ...]:
+        """Nodes that have to be computed before."""
+        return tuple(a for a in self.args if isinstance(a, Node))
+
+    def _with(self, op: str, other: Any, kind: str | None = None, swapped: bool = False) -> Node:
+        other = as_node(other, self.kind)
+        pair = (other, self) if swapped else (self, other)
+        return Node(op, pair, kind or self.kind)
+
+    def __add__(self, other: Any) -> Node:
+        return self._with("add", other)
+
+    def __radd__(self, other: Any) -> Node:
+        return self._with("add", other, swapped=True)
+
+    def __sub__(self, other: Any) -> Node:
+        return self._with("sub", other)
+
+    def __rsub__(self, other: Any) -> Node:
+        return self._with("sub", other, swapped=True)
+
+    def __mul__(self, other: Any) -> Node:
+        return self._with("mul", other)
+
+    def __rmul__(self, other: Any) -> Node:
+        return self._with("mul", other, swapped=True)
+
+    def __truediv__(self, other: Any) -> Node:
+        return self._with("div", other)
+
+    def __rtruediv__(self, other: Any) -> Node:
+        return self._with("div", other, swapped=True)
+
+    def __neg__(self) -> Node:
+        return Node("neg", (self,))
+
+    def __abs__(self) -> Node:
+        return Node("abs", (self,))
+
+    def __lt__(self, other: Any) -> Node:
+        return self._with("lt", other, "bool")
+
+    def __le__(self, other: Any) -> Node:
+        return self._with("le", other, "bool")
+
+    def __gt__(self, other: Any) -> Node:
+        return self._with("gt", other, "bool")
+
+    def __ge__(self, other: Any) -> Node:
+        return self._with("ge", other, "bool")
+
+    def __and__(self, other: Any) -> Node:
+        return self._with("and", other)
+
+    def __or__(self, other: Any) -> Node:
+        return self._with("or", other)
+
+    def __invert__(self) -> Node:
+        return Node("not", (self,), "bool")
+
+    def __lshift__(self, other: int) -> Node:
+        return self._with("shl", other)
+
+    def __rshift__(self, other: int) -> Node:
+        return self._with("shr", other)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a program has no branches; use select(condition, value, other)")
+
+
+Value = Node | float
+
+
+def as_node(value: Any, kind: str = "real") -> Node:
+    """A number as a node; a node as it is."""
+    if isinstance(value, Node):
+        return value
+    return Node("number", (int(value) if kind == "int" else bool(value) if kind == "bool" else float(value),), kind)
+
+
+# -- operations without an operator: on nodes they make nodes, on numbers they compute
+
+
+def select(condition: Any, value: Any, other: Any) -> Any:
+    """`value` where the condition holds, else `other`."""
+    if not isinstance(condition, Node):
+        return value if condition else other
+    return Node("select", (condition, as_node(value), as_node(other)))
+
+
+def larger(a: Any, b: Any) -> Any:
+    """The larger of two; `a` where `b` is NaN, as Python's max."""
+    return select(b > a, b, a)
+
+
+def smaller(a: Any, b: Any) -> Any:
+    """The smaller of two; `a` where `b` is NaN, as Python's min."""
+    return select(b < a, b, a)
+
+
+def primitive(name: str, *arguments: Any) -> Node:
+    """One of `PRIMITIVES` of nodes."""
+    return Node(name, tuple(map(as_node, arguments)))
+
+
+def exp(x: Node) -> Node:
+    """e^x."""
+    return primitive("exp", x)
+
+
+def log(x: Node) -> Node:
+    """ln x."""
+    return primitive("log", x)
+
+
+def weighted(weights: Iterable[float], terms: Iterable[Value]) -> Value:
+    """A weighted sum, zero weights left out."""
+    parts = [term if weight == 1.0 else weight * term for weight, term in zip(weights, terms, strict=False) if weight]
+    if not parts:
+        return 0.0
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
+
+
+class Loop:
+    """A fixed number of rounds that carry some values from one to the next.
+
+    Attributes
+    ----------
+    rounds : int
+    start, carried, following : tuple of Node
+        Values before the first round, as a round sees them, and as it leaves them.
+    results : tuple of Node
+        What is wanted of the last round.
+    """
+
+    def __init__(self, rounds: int, start: Sequence[Value], body: Callable[..., tuple[Any, Any]]) -> None:
+        self.rounds = rounds
+        self.start = tuple(map(as_node, start))
+        self.carried = tuple(Node("carried", (i,), loop=self) for i in range(len(start)))
+        following, results = body(*self.carried)
+        self.following, self.results = tuple(following), tuple(results)
+
+    def outcome(self) -> list[Node]:
+        """The results, for what comes after the loop."""
+        return [Node("result", (self, i)) for i in range(len(self.results))]
+
+    def nodes(self) -> list[Node]:
+        """What every round computes, in order."""
+        return [node for node in reachable([*self.following, *self.results]) if node.loop is self]
+
+    def given(self) -> list[Node]:
+        """What has to be there before the first round."""
+        wanted = [*self.following, *self.results, *(a for node in self.nodes() for a in node.operands)]
+        return [*self.start, *(node for node in wanted if node.loop is None)]
+
+
+def reachable(ends: Iterable[Node]) -> list[Node]:
+    """All nodes that some depend on, and these, in the order in which they were made; not into loops before them."""
+    found: dict[int, Node] = {}
+    waiting = list(ends)
+    while waiting:
+        node = waiting.pop()
+        if node.order in found:
+            continue
+        found[node.order] = node
+        waiting += cast(Loop, node.args[0]).given() if node.op == "result" else node.operands
+    return [found[order] for order in sorted(found)]
+
+
+@dataclass(eq=False)
+class Program:
+    """One function ``(record, number, array) -> None``.
+
+    Loads see the record as it was when the function was called.
+    """
+
+    name: str
+    stores: list[tuple[str, int, Node]] = field(default_factory=list)
+    number: Node = field(default_factory=lambda: Node("argument", ()))
+    _loads: dict[tuple[str, int], Node] = field(default_factory=dict)
+
+    def load(self, place: int, array: str = "R") -> Node:
+        """Number `place` of the record R or of the array y."""
+        key = (array, int(place))
+        if key not in self._loads:
+            self._loads[key] = Node("load", key)
+        return self._loads[key]
+
+    def store(self, place: int, value: Value, array: str = "R") -> None:
+        """Write a number."""
+        self.stores.append((array, int(place), as_node(value)))
+
+    def nodes(self) -> list[Node]:
+        """Everything that is computed, in order."""
+        return reachable([node for _, _, node in self.stores])

@@ -1,0 +1,1 @@
+"""Programs as text: LLVM assembly for the machine, Python to step through. Knows nodes only."""

@@ -1,0 +1,76 @@
+"""A model's compiled kernels and the arrays that they take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from steadyslip.kernels.build import Code, compiled, interpreted
+from steadyslip.kernels.kernel import Choice, Kernel
+from steadyslip.kernels.layout import SETTINGS, TALLY, Status
+from steadyslip.kernels.reduction import Reduction, reduce_model
+from steadyslip.model import Model
+
+STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
+LOG_KINDS = (
+    "", "slip begins", "slip ends", "velocity peak", "arrest", "restart", "contact lost", "blow-up", "velocity trough",
+)  # fmt: skip
+__all__ = ["LOG_KINDS", "SETTINGS", "STATUSES", "TALLY", "Program", "program"]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """One kernel of one model.
+
+    Attributes
+    ----------
+    reduction : Reduction
+    choice : Choice
+    """
+
+    reduction: Reduction
+    choice: Choice
+    plain: bool = False
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        return Kernel(self.reduction, self.choice)
+
+    @cached_property
+    def code(self) -> Code:
+        """Machine code, or plain Python if `plain`."""
+        return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
+
+    @cached_property
+    def _constants(self) -> Any:
+        model = self.reduction.model
+        return self.kernel.constants.function([*model.parameters.values(), model.sigma_ss])
+
+    def constants(self, arguments: tuple[Any, ...], sigma: Any) -> np.ndarray:
+        """Constants of every rig, (rigs, number); parameters and steady normal stress broadcast."""
+        with np.errstate(all="ignore"):
+            found = self._constants(*map(np.asarray, arguments), np.asarray(sigma))  # arrays divide by zero quietly
+        size = max([1, *(np.size(value) for value in found)])
+        table = np.empty((size, len(found)))
+        for column, value in enumerate(found):
+            table[:, column] = value
+        return table
+
+    def settings(self, values: Mapping[str, Any], atol: np.ndarray) -> np.ndarray:
+        """Rows of settings by name, `atol` (rigs or 1, state) last."""
+        size = max([len(atol), *(np.size(value) for value in values.values())])
+        table = np.empty((size, len(SETTINGS) + self.kernel.size))
+        for column, name in enumerate(SETTINGS):
+            table[:, column] = values[name]
+        table[:, len(SETTINGS) :] = atol
+        return table
+
+
+@lru_cache(maxsize=64)
+def program(model: Model, choice: Choice, eliminate: int | None = 0) -> Program:
+    """The kernel of a model; made once per process."""
+    return Program(reduce_model(model, eliminate), choice)

@@ -1,0 +1,1 @@
+"""Laws of `friction` and of `contact`: frozen records whose methods are expressions."""

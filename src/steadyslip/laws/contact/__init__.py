@@ -1,0 +1,31 @@
+"""Contact laws: the normal stress as a function of displacement, velocity, acceleration and forces."""
+
+from steadyslip.laws.contact.basic import Constant, Linear, Prescribed
+from steadyslip.laws.contact.law import ContactLaw, Motion, PreloadedContact
+from steadyslip.laws.contact.mechanisms import (
+    DilatingLayer,
+    InclinedSpring,
+    LeadScrew,
+    Lift,
+    SelfEnergising,
+    SliderCrank,
+    SlopedGuide,
+    Triaxial,
+)
+
+__all__ = [
+    "Constant",
+    "ContactLaw",
+    "DilatingLayer",
+    "InclinedSpring",
+    "LeadScrew",
+    "Lift",
+    "Linear",
+    "Motion",
+    "PreloadedContact",
+    "Prescribed",
+    "SelfEnergising",
+    "SliderCrank",
+    "SlopedGuide",
+    "Triaxial",
+]

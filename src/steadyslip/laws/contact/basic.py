@@ -1,0 +1,59 @@
+"""Contacts described by their normal stress alone: constant, prescribed in time, general linear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import sympy as sp
+
+from steadyslip.core.records import Condition, nonnegative, parameter, positive, real
+from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
+
+
+class Constant(PreloadedContact, name="constant"):
+    """A normal stress that never changes (dead weight, servo-controlled press): B0 = ... = B3 = 0."""
+
+
+class Prescribed(PreloadedContact, name="prescribed"):
+    """A normal stress imposed from outside: σ(t) = σ0 + amplitude · cos(2πt/period).
+
+    Stability is that of sliding at the mean; the response to the oscillation is the transfer function
+    of `steadyslip.state_space` from the input ``normal_disturbance`` (the B4 of eq. 12).
+    """
+
+    amplitude: float = parameter("Pa", nonnegative, "amplitude of the oscillation", default=0.0)
+    period: float | None = parameter("s", positive, "period of the oscillation", default=None)
+
+    def conditions(self) -> Iterator[Condition]:
+        mean = self.preload if self.preload is not None else self.steady_normal_stress
+        if self.period is None:
+            message = "missing; amplitude needs a period, such as '10 s'"
+            yield Condition("period", self.amplitude == 0, message, (self.amplitude,))
+        if mean is not None:
+            message = "got {}; allowed: less than the mean {} Pa"
+            yield Condition("amplitude", self.amplitude < mean, message, (self.amplitude, mean))
+
+    def imposed(self, time: Expression) -> Expression:
+        if self.period is None:
+            return 0
+        return self.amplitude * sp.cos(2 * sp.pi * time / self.period)
+
+
+class Linear(PreloadedContact, name="linear"):
+    """The general linear law, eq. 12 of Dupont & Bapna: σ̂ = (B0 s² + B1 s + k B2 + B3) x̂.
+
+    σ = σss + B0 v̇ + B1 (v − v0) + (k B2 + B3) x; x is the slip ahead of steady sliding and k the total
+    stiffness between block and load point. Positive coefficients press harder as the block runs ahead.
+    """
+
+    b0: float = parameter("kg/m^2", real, "B0, with acceleration", default=0.0, structural=True)
+    b1: float = parameter("Pa s/m", real, "B1, with velocity", default=0.0, structural=True)
+    b2: float = parameter("1", real, "B2, with displacement through the stiffness", default=0.0, structural=True)
+    b3: float = parameter("Pa/m", real, "B3, with displacement directly", default=0.0, structural=True)
+
+    def coupling(self, motion: Motion) -> Expression:
+        return (
+            self.b0 * motion.acceleration
+            + self.b1 * (motion.velocity - motion.steady_velocity)
+            + (motion.stiffness * self.b2 + self.b3) * motion.slip
+        )

@@ -1,0 +1,123 @@
+"""What every contact law provides: the normal stress as a function of the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable, Problem
+from steadyslip.core.records import Record, parameter, positive
+
+Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Everything that a normal stress may depend on; the symbols handed to a contact law.
+
+    Attributes
+    ----------
+    slip
+        x (m): slip of the block ahead of the load point, relative to steady sliding.
+    velocity, acceleration
+        v (m/s) and v̇ (m/s²) of the block.
+    spring, steady_spring
+        T and Tss (Pa): stress exerted by the spring (and dashpot, and controller) on the block.
+    friction, steady_friction
+        τ and τss (Pa): friction stress on the block; τ = T − ηv − m v̇ + q by the balance of forces.
+    stiffness
+        k (Pa/m): total stiffness between block and load point, gain of a controller included.
+    steady_velocity
+        v0 (m/s): velocity of the drive in steady sliding.
+    """
+
+    slip: Expression
+    velocity: Expression
+    acceleration: Expression
+    spring: Expression
+    steady_spring: Expression
+    friction: Expression
+    steady_friction: Expression
+    stiffness: Expression
+    steady_velocity: Expression
+
+    @property
+    def steady(self) -> Motion:
+        """The same contact in steady sliding."""
+        return replace(
+            self,
+            slip=0,
+            velocity=self.steady_velocity,
+            acceleration=0,
+            spring=self.steady_spring,
+            friction=self.steady_friction,
+        )
+
+
+class ContactLaw(Record, family="contact law"):
+    """Base of contact laws: normal stress σ (Pa, compression positive) from the motion.
+
+    σ = `load` + `coupling`(motion): a part that does not depend on the motion, and one that does. Where
+    the law is given by its steady normal stress instead of its load, the coupling counts from its
+    steady value. σ <= 0 is loss of contact. Laws are pure, read their own fields, return SymPy
+    expressions.
+    """
+
+    def load(self) -> Expression | None:
+        """Normal stress without the coupling, σ0 (Pa); None if `steady_stress` is given instead."""
+        raise NotImplementedError
+
+    def steady_stress(self) -> Expression | None:
+        """Normal stress in steady sliding, σss (Pa), where it is given instead of the load."""
+        return None
+
+    def coupling(self, motion: Motion) -> Expression:
+        """Normal stress due to the motion (Pa)."""
+        return 0
+
+    def imposed(self, time: Expression) -> Expression:
+        """Prescribed change of normal stress with time (Pa), zero on average."""
+        return 0
+
+    def normal_stress(self, motion: Motion) -> Expression:
+        """Normal stress σ (Pa), the imposed part left out."""
+        load = self.load()
+        if load is not None:
+            return load + self.coupling(motion)
+        return self.steady_stress() + self.coupling(motion) - self.coupling(motion.steady)
+
+    def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
+        """Stiffness along the sliding direction of a spring with the given stiffness along its axis."""
+        raise NotAvailable(
+            f"the contact {self.name!r} has no axis at an angle; give stiffness instead of axial_stiffness"
+        )
+
+    def has_axis(self) -> bool:
+        """Whether `sliding_stiffness` is defined."""
+        return type(self).sliding_stiffness is not ContactLaw.sliding_stiffness
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        """The lock-up condition in this law's own terms, empty if it has none to add."""
+        return ""
+
+
+class PreloadedContact(ContactLaw):
+    """Base of contacts that take either the preload σ0 or the steady normal stress σss."""
+
+    preload: float | None = parameter("Pa", positive, "normal stress σ0 without coupling to the motion", default=None)
+    steady_normal_stress: float | None = parameter(
+        "Pa", positive, "normal stress σss in steady sliding, instead of preload", default=None
+    )
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        if self.preload is None and self.steady_normal_stress is None:
+            yield Problem("preload", "missing; give preload or steady_normal_stress, such as '5 MPa'")
+        if self.preload is not None and self.steady_normal_stress is not None:
+            yield Problem("steady_normal_stress", "given beside preload; give one of the two")
+
+    def load(self) -> Expression | None:
+        return self.preload
+
+    def steady_stress(self) -> Expression | None:
+        return self.steady_normal_stress

@@ -1,0 +1,203 @@
+"""Mechanisms whose geometry makes the normal stress depend on the motion.
+
+Each docstring gives geometry, sign convention and the coefficients B0...B3 of eq. 12 that it comes
+down to (theory 3); the tests derive them from `coupling`. Sketches: docs/explanation/contacts.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import sympy as sp
+
+from steadyslip.core.errors import Problem
+from steadyslip.core.records import Condition, acute, angle, nonnegative, option, parameter, positive, real, turn
+from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact
+from steadyslip.units import deg
+
+
+class InclinedSpring(PreloadedContact, name="inclined-spring"):
+    """A spring pulling at an angle ψ to the surface (eqs 22-24): σ = σ0 − T tan ψ.
+
+    ψ > 0 pulls the block out of the surface, ψ < 0 presses it in. k and T are components along the
+    sliding direction: a spring of axial stiffness k_s has k = k_s cos²ψ.
+    B0...B3 = 0, c tan ψ, tan ψ, 0 with c a dashpot beside the spring. Lock-up: ψ <= −arccot μss (eq. 27).
+    """
+
+    angle: float = parameter("rad", angle, "spring angle ψ, positive when it pulls out of the surface")
+
+    def coupling(self, motion: Motion) -> Expression:
+        return -motion.spring * sp.tan(self.angle)
+
+    def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
+        return axial_stiffness * sp.cos(self.angle) ** 2
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        limit = -math.atan2(1.0, friction_coefficient) / deg
+        return f"the spring angle must be above −arccot μss = {limit:.4g} deg (eq. 27)"
+
+
+class SliderCrank(PreloadedContact, name="slider-crank"):
+    """The slider of a crank mechanism, held at one crank angle: a rod at angle ψ, σ = σ0 − T tan ψ.
+
+    The slide line passes through the crank centre; the crank pin stands at `crank_angle` from the slide
+    line, on the side away from the surface for angles in (0, 180°). sin of the rod's inclination is
+    (crank_radius/rod_length) sin(crank_angle). A rod that pulls a slider towards the crank lifts it
+    (ψ > 0), a rod that pushes it away presses it in (ψ < 0). B0...B3 = 0, c tan ψ, tan ψ, 0.
+    """
+
+    crank_angle: float = parameter("rad", turn, "crank angle from the slide line")
+    crank_radius: float = parameter("m", positive, "crank radius")
+    rod_length: float = parameter("m", positive, "connecting-rod length, longer than the crank")
+    stroke: str = option("pull", "push", doc="whether the rod pulls the slider or pushes it", default="pull")
+
+    def conditions(self) -> Iterator[Condition]:
+        longer = self.rod_length > self.crank_radius
+        message = "got {}; allowed: more than crank_radius {}"
+        yield Condition("rod_length", longer, message, (self.rod_length, self.crank_radius))
+
+    def _tangent(self) -> Expression:
+        """tan ψ from the geometry."""
+        sine = self.crank_radius / self.rod_length * sp.sin(self.crank_angle)
+        tangent = sine / sp.sqrt(1 - sine**2)
+        return tangent if self.stroke == "pull" else -tangent
+
+    def coupling(self, motion: Motion) -> Expression:
+        return -motion.spring * self._tangent()
+
+    def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
+        return axial_stiffness / (1 + self._tangent() ** 2)
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        return f"tan of the pushing rod's inclination must be below 1/μss = {1 / friction_coefficient:.4g}"
+
+
+class Triaxial(ContactLaw, name="triaxial"):
+    """Saw cut in a triaxial press at constant confining pressure: σ = P_c + T tan θ.
+
+    The cut stands at `angle` θ to the loading axis; the differential stress Q gives T = Q sin θ cos θ.
+    The press has an axial stiffness K (differential stress per axial shortening, Pa/m) and
+    k = K sin θ cos²θ along the cut. B0...B3 = 0, −c tan θ, −tan θ, 0. Lock-up: tan θ >= 1/μss.
+    """
+
+    angle: float = parameter("rad", acute, "angle θ between saw cut and loading axis")
+    confining_pressure: float | None = parameter("Pa", positive, "confining pressure P_c", default=None)
+    steady_normal_stress: float | None = parameter(
+        "Pa", positive, "normal stress σss in steady sliding, instead of confining_pressure", default=None
+    )
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        if (self.confining_pressure is None) == (self.steady_normal_stress is None):
+            yield Problem("confining_pressure", "give exactly one of confining_pressure and steady_normal_stress")
+
+    def load(self) -> Expression | None:
+        return self.confining_pressure
+
+    def steady_stress(self) -> Expression | None:
+        return self.steady_normal_stress
+
+    def coupling(self, motion: Motion) -> Expression:
+        return motion.spring * sp.tan(self.angle)
+
+    def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
+        return axial_stiffness * sp.sin(self.angle) * sp.cos(self.angle) ** 2
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        limit = math.atan2(1.0, friction_coefficient) / deg
+        return f"the saw-cut angle must be below arccot μss = {limit:.4g} deg"
+
+
+class SelfEnergising(PreloadedContact, name="self-energising"):
+    """A wedge or self-energising guide: friction itself adds to the normal stress, σ = σ0 + γτ.
+
+    Give the gain γ, or the geometry behind it: `wedge_angle` of a wedge that friction drags into its gap
+    under a frictionless roof (γ = cot), or `lead_angle` of a thread (γ = tan; see `LeadScrew` for signs
+    and load). γ < 0 releases the contact. B0...B3 = −γm, −γ(c + η), −γ, 0 (and B4 = γq). Needs γ f1 < 1
+    and γ μss < 1; the latter is lock-up.
+    """
+
+    gain: float | None = parameter("1", real, "gain γ of friction on normal stress", default=None)
+    wedge_angle: float | None = parameter("rad", acute, "wedge angle, γ = cot(wedge_angle)", default=None)
+    lead_angle: float | None = parameter("rad", angle, "lead angle of a thread, γ = tan(lead_angle)", default=None)
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        yield from super().inconsistencies()
+        if [self.gain, self.wedge_angle, self.lead_angle].count(None) != 2:
+            yield Problem("gain", "give exactly one of gain, wedge_angle and lead_angle")
+
+    def _gain(self) -> Expression:
+        if self.gain is not None:
+            return self.gain
+        return 1 / sp.tan(self.wedge_angle) if self.wedge_angle is not None else sp.tan(self.lead_angle)
+
+    def coupling(self, motion: Motion) -> Expression:
+        return self._gain() * motion.friction
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        return f"the gain must be below 1/μss = {1 / friction_coefficient:.4g}"
+
+
+class LeadScrew(ContactLaw, name="lead-screw"):
+    """The thread of a lead screw under axial load W: σ = W/cos β ± τ tan β, β the lead angle.
+
+    + when the screw raises the load, − when it lowers it. Load and friction are per unit thread area;
+    slip is measured along the thread. With γ = ± tan β: B0...B3 = −γm, −γ(c + η), −γ, 0.
+    """
+
+    lead_angle: float = parameter("rad", acute, "lead angle β of the thread")
+    axial_load: float = parameter("Pa", positive, "axial load W per unit thread area")
+    direction: str = option("raising", "lowering", doc="whether the screw raises or lowers the load", default="raising")
+
+    def load(self) -> Expression | None:
+        return self.axial_load / sp.cos(self.lead_angle)
+
+    def coupling(self, motion: Motion) -> Expression:
+        gain = sp.tan(self.lead_angle) * (1 if self.direction == "raising" else -1)
+        return gain * motion.friction
+
+    def lock_up(self, friction_coefficient: float) -> str:
+        limit = math.atan2(1.0, friction_coefficient) / deg
+        return f"raising needs a lead angle below arccot μss = {limit:.4g} deg"
+
+
+class DilatingLayer(PreloadedContact, name="dilating-layer"):
+    """Double direct shear with a compliant normal ram: σ = σ0 + k_n e ln(v/v_ref).
+
+    The sheared layer thickens by e ln(v/v_ref) at once when slip speeds up, against a ram of normal
+    stiffness k_n (Pa per metre of thickening; with two layers between the blocks, twice the ram's own).
+    e > 0 dilates. `preload` is the normal stress at v_ref. B0...B3 = 0, k_n e/v0, 0, 0.
+    """
+
+    ram_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the ram")
+    dilatancy: float = parameter("m", real, "thickening e of the layer per e-fold of velocity")
+    v_ref: float = parameter("m/s", positive, "velocity at which the normal stress is the preload")
+
+    def coupling(self, motion: Motion) -> Expression:
+        return self.ram_stiffness * self.dilatancy * sp.log(motion.velocity / self.v_ref)
+
+
+class Lift(PreloadedContact, name="lift"):
+    """A guide whose lubricant lifts the block as it speeds up: σ = σ0 − l (v − v_ref).
+
+    `preload` is the normal stress at v_ref; l >= 0. B0...B3 = 0, −l, 0, 0.
+    """
+
+    lift: float = parameter("Pa s/m", nonnegative, "loss of normal stress per unit velocity, l")
+    v_ref: float = parameter("m/s", positive, "velocity at which the normal stress is the preload")
+
+    def coupling(self, motion: Motion) -> Expression:
+        return -self.lift * (motion.velocity - self.v_ref)
+
+
+class SlopedGuide(PreloadedContact, name="sloped-guide"):
+    """A guide of normal stiffness k_n that follows a surface sloping at β: σ = σ0 + k_n x tan β.
+
+    β > 0 rises in the direction of sliding. The law is local in x. B0...B3 = 0, 0, 0, k_n tan β.
+    """
+
+    guide_stiffness: float = parameter("Pa/m", nonnegative, "normal stiffness k_n of the guide")
+    slope: float = parameter("rad", angle, "slope β of the surface along the slide")
+
+    def coupling(self, motion: Motion) -> Expression:
+        return self.guide_stiffness * motion.slip * sp.tan(self.slope)

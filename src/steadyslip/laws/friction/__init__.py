@@ -1,0 +1,24 @@
+"""Friction laws: τ(v, σ, memory), the evolution of the memory, and the steady state."""
+
+from steadyslip.laws.friction.bristle import CoulombStribeck, LuGre
+from steadyslip.laws.friction.evolution import PRZ, Aging, Evolution, Nagata, Slip
+from steadyslip.laws.friction.law import FrictionLaw
+from steadyslip.laws.friction.normal_memory import LinkerDieterich, NoMemory, NormalMemory, PrakashClifton
+from steadyslip.laws.friction.rate_state import RateState, State
+
+__all__ = [
+    "PRZ",
+    "Aging",
+    "CoulombStribeck",
+    "Evolution",
+    "FrictionLaw",
+    "LinkerDieterich",
+    "LuGre",
+    "Nagata",
+    "NoMemory",
+    "NormalMemory",
+    "PrakashClifton",
+    "RateState",
+    "Slip",
+    "State",
+]

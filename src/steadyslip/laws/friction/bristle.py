@@ -1,0 +1,60 @@
+"""Laws of machine friction: LuGre bristles, and the memoryless Coulomb–Stribeck curve."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from steadyslip.core.records import nonnegative, parameter, positive
+from steadyslip.laws.friction.law import Expression, FrictionLaw
+
+
+class CoulombStribeck(FrictionLaw, name="coulomb-stribeck"):
+    """Friction that depends on the present velocity only.
+
+    τ = σ[g(v) + σ2 v], g = μ_C + (μ_S − μ_C) exp(−(v/v_S)²). Without a memory there is no critical
+    stiffness: where friction falls with velocity, the quasistatic problem is ill-posed and with mass no
+    stiffness stabilises. Here to show just that.
+    """
+
+    mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
+    mu_static: float = parameter("1", positive, "static friction coefficient μ_S")
+    v_stribeck: float = parameter("m/s", positive, "Stribeck velocity v_S")
+    viscous: float = parameter("s/m", nonnegative, "viscous coefficient σ2, per unit normal stress", default=0.0)
+
+    def _curve(self, v: Expression) -> Expression:
+        """g(v), the falling part of the friction coefficient."""
+        return self.mu_coulomb + (self.mu_static - self.mu_coulomb) * sp.exp(-((v / self.v_stribeck) ** 2))
+
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+        return sigma * (self._curve(v) * sp.sign(v) + self.viscous * v)
+
+
+class LuGre(CoulombStribeck, name="lugre"):
+    """LuGre friction (Canudas de Wit et al. 1995), per unit normal stress.
+
+    τ = σ[σ0 z + σ1 ż + σ2 v], ż = v − σ0 |v| z/g(v), with the mean bristle deflection z (m) as memory.
+    """
+
+    bristle_stiffness: float = parameter("1/m", positive, "bristle stiffness σ0, per unit normal stress")
+    bristle_damping: float = parameter("s/m", nonnegative, "bristle damping σ1, per unit normal stress", default=0.0)
+
+    def memory(self) -> tuple[str, ...]:
+        return ("z",)
+
+    def memory_units(self) -> tuple[str, ...]:
+        return ("m",)
+
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+        (rate,) = self.rates(v, sigma, memory, tau)
+        return sigma * (self.bristle_stiffness * memory[0] + self.bristle_damping * rate + self.viscous * v)
+
+    def rates(
+        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+    ) -> tuple[Expression, ...]:
+        return (v - self.bristle_stiffness * sp.Abs(v) * memory[0] / self._curve(v),)
+
+    def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
+        return (self._curve(v) / self.bristle_stiffness,)
+
+    def steady_strength(self, v: Expression, sigma: Expression) -> Expression:
+        return sigma * (self._curve(v) + self.viscous * v)

@@ -1,0 +1,72 @@
+"""How the state of rate-and-state friction evolves with slip and time at constant normal stress.
+
+Θ is the dimensionless state, −ln(v/v*) in steady sliding for every law, so that slip, aging and PRZ
+share one linearisation and differ only beyond it.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import sympy as sp
+
+from steadyslip.core.records import Record, nonnegative, parameter
+from steadyslip.laws.friction.law import Expression
+
+
+class Evolution(Record, family="evolution law"):
+    """Base of evolution laws: dΘ/dt at constant normal stress."""
+
+    def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
+        """Rate of Θ (1/s) at slip rate `v` >= 0, slip distance `d_c` and reference rate `v_ref`."""
+        raise NotImplementedError
+
+    def scaled_rate(
+        self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
+    ) -> Expression:
+        """Rate of bΘ (1/s) from bΘ itself."""
+        return b * self.rate(v, b_theta / b, d_c, v_ref)
+
+    def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
+        """The usual state θ in seconds that belongs to Θ: Θ = ln(v* θ/d_c) unless stated otherwise."""
+        return d_c / v_ref * sp.exp(state)
+
+
+class Slip(Evolution, name="slip"):
+    """Slip law (Ruina 1983; eq. 1 of Dupont & Bapna): Θ̇ = −(v/d_c)[ln(v/v*) + Θ]."""
+
+    def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
+        return -v / d_c * (sp.log(v / v_ref) + state)
+
+    def scaled_rate(
+        self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
+    ) -> Expression:
+        return -v / d_c * (b * sp.log(v / v_ref) + b_theta)  # without division by b, which may be zero
+
+
+class Aging(Evolution, name="aging"):
+    """Aging law (Dieterich 1979): θ̇ = 1 − vθ/d_c, with Θ = ln(v* θ/d_c)."""
+
+    def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
+        return v_ref / d_c * sp.exp(-state) - v / d_c
+
+
+class PRZ(Evolution, name="prz"):
+    """Perrin–Rice–Zheng law (1995): θ̇ = 1 − (vθ/2d_c)², with Θ = ln(v* θ/2d_c)."""
+
+    def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
+        return v_ref / (2 * d_c) * sp.exp(-state) - v**2 / (2 * d_c * v_ref) * sp.exp(state)
+
+    def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
+        return 2 * d_c / v_ref * sp.exp(state)
+
+
+class Nagata(Aging, name="nagata"):
+    """Nagata law (Nagata et al. 2012): aging with an extra −(c_N θ/b) d(τ/σ)/dt.
+
+    The extra term is integrated exactly by the memory variable of `RateState`; `rate` is the aging part.
+    """
+
+    needs_stress: ClassVar[bool] = True
+
+    c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N")

@@ -1,0 +1,60 @@
+"""What every friction law provides: strength, memory, and the steady state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from steadyslip.core.records import Record
+
+Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
+
+
+class FrictionLaw(Record, family="friction law"):
+    """Base of friction laws: τ(v, σ, memory) and the evolution of the memory.
+
+    A law works in *memory variables*: combinations of its states that stay continuous when velocity
+    or normal stress jump (theory: Φ, σ_e, z). Every method is pure, reads the record's own fields and
+    returns SymPy expressions; the same methods serve numbers and symbols.
+
+    Subclasses set ``memory`` and define `strength`, `rates` and `steady_memory`; the rest has defaults.
+    Stresses are in Pa per unit nominal area, velocity in m/s, positive in the direction of loading.
+    """
+
+    def memory(self) -> tuple[str, ...]:
+        """Names of the memory variables, in the order used everywhere; empty for a law without."""
+        return ()
+
+    def memory_units(self) -> tuple[str, ...]:
+        """SI units of the memory variables; dimensionless unless overridden."""
+        return tuple("1" for _ in self.memory())
+
+    def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
+        """Friction stress τ (Pa).
+
+        `tau` is the stress itself, for the rare law (Nagata) whose state depends on it; others ignore it.
+        """
+        raise NotImplementedError
+
+    def rates(
+        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+    ) -> tuple[Expression, ...]:
+        """Time derivatives of the memory variables (1/s times their unit)."""
+        return ()
+
+    def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
+        """Memory variables in steady sliding at velocity `v` > 0 and normal stress `sigma` > 0."""
+        return ()
+
+    def steady_strength(self, v: Expression, sigma: Expression) -> Expression:
+        """Friction stress in steady sliding, τss(v, σ)."""
+        return self.strength(v, sigma, self.steady_memory(v, sigma), sp.nan)
+
+    def observables(
+        self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+    ) -> dict[str, tuple[Expression, str]]:
+        """What the field calls the states, from the memory variables: name to (expression, SI unit)."""
+        return {
+            name: (value, unit) for name, value, unit in zip(self.memory(), memory, self.memory_units(), strict=True)
+        }

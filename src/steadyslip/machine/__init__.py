@@ -1,0 +1,1 @@
+"""What the sliding contact is built into: the slider and its drive."""

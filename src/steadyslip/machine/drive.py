@@ -1,0 +1,56 @@
+"""What moves the load point: a steady pull, or a position controller that follows a ramp.
+
+The spring stress on the block is T = Tss − k x − c (v − v_lp) − (controller), with x the slip of the
+block ahead of the load point. A controller that holds the block to the reference v0 t sees the position
+error −x, so its proportional gain acts as a stiffness and its derivative gain as a dashpot (theory 4).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from steadyslip.core.records import Record, nonnegative, parameter, positive
+
+
+class Drive(Record, family="drive", kw_only=False):
+    """Base of drives: steady velocity and the gains of a controller, zero unless a subclass has them."""
+
+    velocity: float = parameter("m/s", positive, "velocity of the load point in steady sliding")
+
+    def proportional(self) -> Any:
+        """Stiffness added by the controller (Pa/m)."""
+        return 0
+
+    def derivative(self) -> Any:
+        """Damping added by the controller (Pa s/m)."""
+        return 0
+
+    def integral(self) -> Any:
+        """Stress per unit time integral of the slip x (Pa/(m s)), None without integral action."""
+        return None
+
+
+class Steady(Drive, name="steady", kw_only=False):
+    """A load point pulled at constant velocity."""
+
+
+class PD(Drive, name="pd", kw_only=False):
+    """A position controller with proportional and derivative gain, following the ramp v0 t."""
+
+    kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True)
+    kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True)
+
+    def proportional(self) -> Any:
+        return self.kp
+
+    def derivative(self) -> Any:
+        return self.kd
+
+
+class PID(PD, name="pid", kw_only=False):
+    """A position controller with proportional, integral and derivative gain, following the ramp v0 t."""
+
+    ki: float = parameter("Pa/m/s", nonnegative, "integral gain", default=0.0, structural=True, adds_state=True)
+
+    def integral(self) -> Any:
+        return None if self.ki == 0 else self.ki

@@ -1,0 +1,114 @@
+"""Maps and sensitivities from files and the words of a command line, and the files that they are written to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.files.output import FIGURES, check_output, write_by_ending
+from steadyslip.maps.plan.axes import Axis, Generated
+from steadyslip.maps.plan.map import Map
+from steadyslip.maps.plan.spec import read_map
+from steadyslip.maps.refine import Refined
+from steadyslip.maps.sensitivity import POINTS, Sensitivity, sensitivity
+from steadyslip.maps.store.arrays import check_path
+from steadyslip.maps.view.result import MapResult, open_map
+from steadyslip.maps.work.run import run_map
+
+STORE = ".zarr"
+ENDINGS = (STORE, ".nc", ".parquet", *FIGURES)
+REFINED = (".csv", *ENDINGS)
+
+
+def map_file(
+    source: Path, outputs: Sequence[Path], changes: Iterable[str] = (), workers: int | None = None,
+    cluster: str | None = None, refine: bool = False, figure: Mapping[str, Any] | None = None,
+    edge: Mapping[str, Any] | None = None,
+) -> MapResult:  # fmt: skip
+    """Compute the map of a rig file into the one of `outputs` that ends in .zarr, or open a map.
+
+    Raises
+    ------
+    ParameterError, NotAvailable
+        If anything is wrong, before anything is computed where it can be known.
+    """
+    _check_words(refine, figure or {}, edge or {})
+    check_output([path for path in outputs if path.suffix != STORE], REFINED if refine else ENDINGS)
+    stores = [path for path in outputs if path.suffix == STORE]
+    if source.suffix == STORE:
+        if stores or changes or cluster:
+            message = "is a map already; give its rig file to compute another one"
+            raise ParameterError([Problem(str(source), message)])
+        return open_map(source)
+    if len(stores) != 1:
+        came = "missing" if not stores else f"got {len(stores)} names"
+        message = f"{came}; give one name for the map, such as -o {source.with_suffix(STORE).name}"
+        raise ParameterError([Problem("output", message)])
+    check_path(stores[0])
+    return run_map(read_map(source, changes), stores[0], workers=workers, cluster=cluster)
+
+
+def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any]) -> None:
+    """Options that would have no effect are mistakes."""
+    if refine:
+        idle = [name for name, value in figure.items() if value is not None]
+        message = "is for figures of a map; with --refine they show the edge. Draw the map itself in a second command"
+    else:
+        idle = [name for name, value in edge.items() if value is not None]
+        message = "is about the edge to refine; add --refine N"
+    if idle:
+        raise ParameterError([Problem(f"--{name}", message) for name in idle])
+
+
+def write_map(found: MapResult, path: Path, options: Mapping[str, Any], edge: Refined | None = None) -> None:
+    """Write a map as netCDF, Parquet or figure, or a refined edge as text or figure, by the ending of the name.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    ParameterError
+        If the figure cannot be drawn so.
+    """
+    writers: dict[str, Any] = {".nc": found.to_netcdf, ".parquet": found.to_parquet}
+    if edge is not None:
+        writers[".csv"] = edge.to_csv
+    write_by_ending(path, writers, lambda: found.plot(**options) if edge is None else edge.plot())
+
+
+def sensitivity_file(
+    source: Path, changes: Iterable[str] = (), of: Sequence[str] = (), points: int = POINTS
+) -> Sensitivity:
+    """Sobol indices over the ranges of the grids and samples of a rig file's ``[map]``.
+
+    Raises
+    ------
+    ParameterError
+        If anything is wrong.
+    NotAvailable
+        If a parameter has no range.
+    """
+    plan = read_map(source, changes)
+    ranges: dict[str, tuple[Any, ...]] = {axis.name: _range_of(axis) for axis in plan.axes}
+    if isinstance(plan.sampling, Generated):
+        ranges |= {name: (low, high, spacing) for name, low, high, spacing in plan.sampling.ranges}
+    elif plan.sampling is not None:
+        raise NotAvailable("the draws of a fit depend on each other, and Sobol indices are for independent parameters")
+    return sensitivity(plan.rig, ranges, of or _suited(plan), points=points, protocol=plan.protocol)
+
+
+def _range_of(axis: Axis) -> tuple[float, float, str]:
+    low, high = float(np.min(axis.values)), float(np.max(axis.values))
+    return low, high, "log" if axis.spacing == "log" else "linear"
+
+
+def _suited(plan: Map) -> tuple[Any, ...]:
+    """What the map computes as far as it is one number a point; critical stiffness and margin if nothing is."""
+    found = tuple(
+        one for one in plan.compute if not any(o.flags or o.extra for o in one.outputs(plan.rig, plan.varied))
+    )
+    return found or ("critical_stiffness", "margin")

@@ -1,0 +1,309 @@
+"""Which parameters a map varies, and through which values: grids and lists are axes, samples share one dimension."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.records import Parameter, checked_number
+from steadyslip.values import checked_array
+
+Array = np.ndarray
+SPACINGS = ("linear", "log")
+METHODS = ("sobol", "latin-hypercube")
+SAMPLE = "sample"
+COMPLETE = "complete"  # the array of marks
+MOST_POINTS = 10**12
+SOBOL_BITS = 32  # SciPy's jumps ahead work up to here
+LARGEST_HYPERCUBE = 2**22  # all its points are needed for one of them
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Evenly spaced values of a parameter, both ends included.
+
+    Parameters
+    ----------
+    start, stop : float or str
+        SI units, or text such as ``"10 deg"``.
+    points : int
+        At least 1; one point is `start`.
+    spacing : str
+        ``linear``, or ``log`` for even spacing of the logarithm.
+    """
+
+    start: Any
+    stop: Any
+    points: int
+    spacing: str = "linear"
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points spread over ranges of several parameters, along one dimension of the map.
+
+    Parameters
+    ----------
+    over : mapping of str to (low, high) or (low, high, "log")
+        Ranges by dotted name, SI units or text; uniform in the value or in its logarithm.
+    points : int
+        A power of 2 suits Sobol points best.
+    method : str
+        ``sobol`` (scrambled), or ``latin-hypercube`` for up to 4 million points.
+    seed : int
+    """
+
+    over: Mapping[str, Sequence[Any]]
+    points: int
+    method: str = "sobol"
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """Values of one parameter along a dimension of its own."""
+
+    name: str
+    role: Parameter
+    values: Array = field(repr=False)
+    spacing: str
+
+    def definition(self) -> dict[str, Any]:
+        if self.spacing == "list":
+            return {"values": len(self.values), "digest": digest(self.values)}
+        ends = {"from": float(self.values[0]), "to": float(self.values[-1])}
+        return {**ends, "points": len(self.values), "spacing": self.spacing}
+
+
+@dataclass(frozen=True)
+class Generated:
+    """Sample points that follow from a seed, a piece at a time.
+
+    Attributes
+    ----------
+    ranges : tuple of (str, float, float, str)
+        Name, ends and spacing of each parameter.
+    """
+
+    ranges: tuple[tuple[str, float, float, str], ...]
+    points: int
+    method: str
+    seed: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(name for name, *_ in self.ranges)
+
+    def part(self, start: int, stop: int) -> dict[str, Array]:
+        """Parameters of points `start` to `stop`."""
+        unit = _sobol(self).part(start, stop) if self.method == "sobol" else _hypercube(self)[start:stop]
+        found = {}
+        for column, (name, low, high, spacing) in zip(unit.T, self.ranges, strict=True):
+            value = low * (high / low) ** column if spacing == "log" else low + (high - low) * column
+            found[name] = np.clip(value, min(low, high), max(low, high))
+        return found
+
+    def definition(self) -> dict[str, Any]:
+        over = {name: {"from": low, "to": high, "spacing": spacing} for name, low, high, spacing in self.ranges}
+        return {"points": self.points, "method": self.method, "seed": self.seed, "over": over}
+
+
+class _Sobol:
+    """A Sobol sequence that goes on from where it was; back to its beginning only if it must."""
+
+    def __init__(self, dimensions: int, seed: int) -> None:
+        self.dimensions, self.seed = dimensions, seed
+        self._restart()
+
+    def _restart(self) -> None:
+        from scipy.stats import qmc
+
+        self.engine, self.position = qmc.Sobol(self.dimensions, scramble=True, bits=SOBOL_BITS, seed=self.seed), 0
+
+    def part(self, start: int, stop: int) -> Array:
+        import warnings
+
+        if start < self.position:
+            self._restart()
+        if start > self.position:
+            self.engine.fast_forward(start - self.position)
+        with warnings.catch_warnings():  # that the number of points is no power of 2: pieces add up to the whole
+            warnings.simplefilter("ignore", UserWarning)
+            found = self.engine.random(stop - start)
+        self.position = stop
+        return np.asarray(found)
+
+
+@lru_cache(maxsize=4)
+def _sobol(of: Generated) -> _Sobol:
+    return _Sobol(len(of.ranges), of.seed)
+
+
+@lru_cache(maxsize=2)
+def _hypercube(of: Generated) -> Array:
+    from scipy.stats import qmc
+
+    return np.asarray(qmc.LatinHypercube(len(of.ranges), seed=of.seed).random(of.points))
+
+
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """Sample points given one by one, such as draws of a fit.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray (m,)
+    source : str
+        Where they come from, in words.
+    """
+
+    values: dict[str, Array] = field(repr=False)
+    source: str = "list"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.values)
+
+    @property
+    def points(self) -> int:
+        return len(next(iter(self.values.values())))
+
+    def part(self, start: int, stop: int) -> dict[str, Array]:
+        """Parameters of points `start` to `stop`."""
+        return {name: column[start:stop] for name, column in self.values.items()}
+
+    def definition(self) -> dict[str, Any]:
+        over = {name: {"digest": digest(column)} for name, column in self.values.items()}
+        return {"points": self.points, "source": self.source, "over": over}
+
+
+Sampling = Generated | Listed
+
+
+def digest(values: Array) -> str:
+    """A short name for the exact numbers of an array."""
+    return hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()[:16]
+
+
+def make_axis(name: str, role: Parameter, given: Any) -> Axis:
+    """The axis of a parameter.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter and what is wrong.
+    """
+    if isinstance(given, Grid):
+        low, high = _ends(name, role, given.start, given.stop, given.spacing)
+        points = _count(f"{name}.points", given.points)
+        space = np.geomspace if given.spacing == "log" else np.linspace
+        values = space(low, high, points)
+        return Axis(name, role, np.clip(values, min(low, high), max(low, high)), given.spacing)
+    if isinstance(given, (str, bytes, Mapping)) or not hasattr(given, "__len__"):
+        message = f"got {given!r}; allowed: a Grid (in a file {{from, to, points}}) or a list of values"
+        raise ParameterError([Problem(name, message)])
+    numbers, problems = [], []
+    for place, value in enumerate(given, start=1):
+        try:
+            numbers.append(checked_number(role, value))
+        except ParameterError as error:
+            problems += [Problem(name, f"value {place}: {p.message}") for p in error.problems]
+    if not len(given):
+        problems.append(Problem(name, "got an empty list; give at least one value"))
+    elif not problems and len(set(numbers)) < len(numbers):
+        problems.append(Problem(name, "a value comes twice; give each once"))
+    if problems:
+        raise ParameterError(problems[:3])
+    return Axis(name, role, np.array(numbers), "list")
+
+
+def make_sampling(given: Any, roles: Mapping[str, Parameter]) -> Sampling:
+    """Sample points from `Samples`, or from a mapping of full names to arrays of equal length.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    """
+    if isinstance(given, Samples):
+        return _generated(given, roles)
+    problems, columns = [], {}
+    if not given:
+        raise ParameterError([Problem("map.samples", "is empty; name at least one parameter and its values")])
+    for name, values in given.items():
+        try:
+            columns[name] = np.atleast_1d(np.asarray(checked_array(name, roles[name], values), dtype=float))
+            if columns[name].ndim != 1:
+                problems.append(
+                    Problem(
+                        f"map.samples.over.{name}", f"got an array of {columns[name].ndim} dimensions; allowed: one"
+                    )
+                )
+        except ParameterError as error:
+            problems += (p.under("map.samples.over") for p in error.problems)
+    if len({len(column) for column in columns.values()}) > 1:
+        lengths = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
+        problems.append(Problem("map.samples", f"columns differ in length: {lengths}"))
+    if problems:
+        raise ParameterError(problems)
+    return Listed(columns)
+
+
+def _generated(given: Samples, roles: Mapping[str, Parameter]) -> Generated:
+    problems, ranges = [], []
+    if given.method not in METHODS:
+        problems.append(Problem("map.samples.method", unknown_name("method", given.method, METHODS)))
+    if isinstance(given.seed, bool) or not isinstance(given.seed, (int, np.integer)) or given.seed < 0:
+        problems.append(Problem("map.samples.seed", f"got {given.seed!r}; allowed: a whole number >= 0"))
+    try:
+        points = _count("map.samples.points", given.points)
+        if given.method == "latin-hypercube" and points > LARGEST_HYPERCUBE:
+            message = f"got {points}; allowed for a Latin hypercube: up to {LARGEST_HYPERCUBE}; use method = 'sobol'"
+            problems.append(Problem("map.samples.points", message))
+        if points > 2**SOBOL_BITS:
+            problems.append(Problem("map.samples.points", f"got {points}; allowed: up to {2**SOBOL_BITS}"))
+    except ParameterError as error:
+        problems += error.problems
+    for name, ends in given.over.items():
+        try:
+            if not isinstance(ends, (list, tuple)) or len(ends) not in (2, 3):
+                raise ParameterError([Problem(name, f"got {ends!r}; allowed: two ends, and 'log' if so wanted")])
+            spacing = ends[2] if len(ends) == 3 else "linear"
+            ranges.append((name, *_ends(name, roles[name], ends[0], ends[1], spacing), spacing))
+        except ParameterError as error:
+            problems += (p.under("map.samples.over") for p in error.problems)
+    if not given.over:
+        problems.append(Problem("map.samples.over", "missing; name at least one parameter and its range"))
+    if problems:
+        raise ParameterError(problems)
+    return Generated(tuple(ranges), points, given.method, int(given.seed))
+
+
+def _ends(name: str, role: Parameter, start: Any, stop: Any, spacing: str) -> tuple[float, float]:
+    problems, ends = [], []
+    for word, value in (("from", start), ("to", stop)):
+        try:
+            ends.append(checked_number(role, value))
+        except ParameterError as error:
+            problems += [Problem(f"{name}.{word}", p.message) for p in error.problems]
+    if spacing not in SPACINGS:
+        problems.append(Problem(f"{name}.spacing", unknown_name("spacing", spacing, SPACINGS)))
+    elif spacing == "log" and not problems and not (ends[0] > 0 and ends[1] > 0):
+        problems.append(Problem(f"{name}.spacing", "'log' needs two ends > 0"))
+    if len(ends) == 2 and ends[0] == ends[1]:
+        problems.append(Problem(name, f"both ends are {ends[0]!r}; give a range"))
+    if problems:
+        raise ParameterError(problems)
+    return ends[0], ends[1]
+
+
+def _count(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST_POINTS:
+        raise ParameterError([Problem(name, f"got {value!r}; allowed: a whole number from 1 to {MOST_POINTS:.0e}")])
+    return int(value)

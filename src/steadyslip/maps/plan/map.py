@@ -1,0 +1,384 @@
+"""A map as data: which rig, what is computed, over which parameters; and how its points fall into chunks."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
+from steadyslip.core.records import Address, Parameter, Record, parameters, resolve
+from steadyslip.files.specifications import rig_to_text
+from steadyslip.files.specifications.layout import find_law
+from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
+from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
+from steadyslip.protocol import Protocol
+from steadyslip.values import model_values
+
+SECONDS = 0.5  # that a chunk should take: long beside the cost of handing it out, short enough to lose
+LARGEST_CHUNK = 2**20  # points; bounds the memory of a worker
+LEAST_CHUNKS = 32  # so that all workers have something to do until the end
+SHORT = 0.2  # seconds; chunks are not made shorter than this to have more of them
+MOST_AXIS = 10**7  # values along one axis, which is kept in memory
+MOST_CHUNKS = 2 * 10**6  # each is a few files
+
+AnyMeasure = Measure | FunctionMeasure
+
+
+@dataclass(frozen=True, eq=False)
+class Map:
+    """What to compute of which rigs.
+
+    Parameters
+    ----------
+    rig : Slider
+        The base: what does not vary has its values.
+    over : mapping of str to Grid or array_like, optional
+        Parameters by dotted name, of the rig or of the protocol; each spans a dimension.
+    compute : sequence of str, Measure or function
+        Measures by name (``status``, ``critical_stiffness``, ``safety_factor``, ``margin``, ``stable_stiffness``,
+        ``growth_rate``, ``onset``, ``events``, ``threshold``), with options as records such as ``Events(until=200.0)``,
+        or functions of a rig; see `measure`.
+    samples : Samples, mapping of str to array_like, Fit or Draws, optional
+        Parameters that vary together along the dimension ``sample``: spread over ranges, listed, or as a fit allows, in
+        which case the rig gets the fit's friction as in `predict`.
+    protocol : Protocol or piece, optional
+        For measures that simulate.
+    chunk : int, optional
+        Points computed in one go; chosen by what they cost unless given.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    """
+
+    rig: Slider
+    over: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    compute: Any = ("status", "critical_stiffness")
+    samples: Any = None
+    protocol: Any = field(default_factory=Protocol, repr=False)
+    chunk: int | None = None
+    axes: tuple[Axis, ...] = field(init=False, default=())
+    sampling: Sampling | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        problems: list[Problem] = []
+        if not isinstance(self.rig, Slider):
+            raise ParameterError([Problem("rig", f"got {self.rig!r}; allowed: a Slider, such as read_rig gives")])
+        self._set("protocol", Protocol.of(self.protocol))
+        self._set("compute", _measures(self.compute, problems))
+        self._read_samples(problems)
+        self._read_axes(problems)
+        whole = isinstance(self.chunk, int) and not isinstance(self.chunk, bool)
+        if self.chunk is not None and not (whole and 1 <= self.chunk <= 2**24):
+            problems.append(Problem("map.chunk", f"got {self.chunk!r}; allowed: a whole number from 1 to {2**24}"))
+        if not (self.axes or self.sampling or problems):
+            problems.append(Problem("map.over", "missing; name at least one parameter and its values"))
+        for one in self.compute:
+            for problem in one.problems(self.rig, self.protocol):
+                problems.append(problem.under(f"map.{one.name}"))
+        names = [output.name for one in self.compute for output in one.outputs(self.rig, ())]
+        extra = {dim for one in self.compute for output in one.outputs(self.rig, ()) for dim, _ in output.extra}
+        taken = {*names} & {*self.known(), SAMPLE, COMPLETE, *extra}
+        problems += [
+            Problem("map.compute", f"{n!r} is the name of something else; give another") for n in sorted(taken)
+        ]
+        twice = sorted({n for n in names if names.count(n) > 1})
+        problems += [Problem("map.compute", f"{n!r} is computed twice; name it once") for n in twice]
+        if problems:
+            raise ParameterError(problems)
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _read_samples(self, problems: list[Problem]) -> None:
+        given = self.samples
+        if given is None:
+            return
+        try:
+            if isinstance(given, Samples):
+                over = self._resolved(given.over, "map.samples.over", problems)
+                found: Any = Samples(over, given.points, given.method, given.seed)
+            elif isinstance(given, Mapping):
+                found = self._resolved(given, "map.samples.over", problems)
+            else:
+                rig, found = _of_fit(self.rig, given)
+                self._set("rig", rig)
+            roles = {name: address.role for name, address in self.known().items()}
+            self._set("sampling", make_sampling(found, roles))
+            for name in self.sampling.names if self.sampling else ():
+                probe = np.unique([values[name] for values in self._extremes(name)])
+                problems += (p.under("map.samples.over") for p in self._allowed(name, probe))
+        except ParameterError as error:
+            problems += error.problems
+
+    def _extremes(self, name: str) -> list[dict[str, Any]]:
+        """Some values of a sampled parameter, its ends among them."""
+        if isinstance(self.sampling, Generated):
+            return [{n: end} for n, low, high, _ in self.sampling.ranges for end in (low, high) if n == name]
+        if self.sampling is None:
+            raise InternalError("self.sampling is not None")
+        column = self.sampling.part(0, self.sampling.points)[name]
+        return [{name: column.min()}, {name: column.max()}]
+
+    def _read_axes(self, problems: list[Problem]) -> None:
+        axes = []
+        over = self._resolved(self.over, "map.over", problems)
+        sampled = self.sampling.names if self.sampling else ()
+        for name, given in over.items():
+            if name in sampled:
+                problems.append(Problem(f"map.over.{name}", "varies twice, in over and in samples; name it once"))
+                continue
+            points = getattr(given, "points", 0)
+            if isinstance(points, int) and points > MOST_AXIS:
+                message = f"got {points}; allowed: up to {MOST_AXIS} along one parameter; let two vary, or use samples"
+                problems.append(Problem(f"map.over.{name}.points", message))
+                continue
+            try:
+                axis = make_axis(name, self.known()[name].role, given)
+                problems += (p.under("map.over") for p in self._allowed(name, axis.values[[0, -1]]))
+                axes.append(axis)
+            except ParameterError as error:
+                problems += (p.under("map.over") for p in error.problems)
+        self._set("axes", tuple(axes))
+        if not problems:
+            problems += (p.under("map.over") for p in self._allowed_together())
+
+    def _allowed_together(self) -> tuple[Problem, ...]:
+        """What is wrong with the corners of the map, where several axes meet."""
+        known = self.rig.parameters()
+        axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
+        corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
+        try:
+            model_values(self.rig, {a.name: ends for a, ends in zip(axes, corners, strict=True)})
+        except ParameterError as error:
+            return error.problems
+        return ()
+
+    def known(self) -> dict[str, Address]:
+        """All parameters that may vary, by full name."""
+        return self.rig.parameters() | parameters(self.protocol, "protocol.")
+
+    def _resolved(self, given: Mapping[str, Any], place: str, problems: list[Problem]) -> dict[str, Any]:
+        """By full name; what is wrong with names is added to the problems."""
+        found: dict[str, Any] = {}
+        if not isinstance(given, Mapping):
+            problems.append(Problem(place, f"got {given!r}; allowed: names and their values"))
+            return found
+        for name, value in given.items():
+            try:
+                full = resolve(str(name), self.known())
+                if full in found:
+                    problems.append(Problem(f"{place}.{full}", "is named twice; name it once"))
+                found[full] = value
+            except UnknownNameError as error:
+                problems.append(Problem(f"{place}.{name}", str(error)))
+        return found
+
+    def _allowed(self, name: str, values: Any) -> tuple[Problem, ...]:
+        """What the rig has against this parameter being varied."""
+        if name.startswith("protocol."):
+            if any(one.moves for one in self.compute):
+                return ()
+            return (Problem(name, "varies, but nothing that is computed simulates the protocol; add 'events'"),)
+        role = self.known()[name].role
+        if any(one.moves for one in self.compute) and role.adds_state:
+            return ()  # simulated regime by regime
+        try:
+            model_values(self.rig, {name: np.asarray(values, dtype=float)}, scan=True)
+        except ParameterError as error:
+            return error.problems
+        except SteadyslipError as error:
+            return (Problem(name, str(error)),)
+        return ()
+
+    # -- shape -----------------------------------------------------------------------------------------
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Full names of all parameters that vary."""
+        return tuple(axis.name for axis in self.axes) + (self.sampling.names if self.sampling else ())
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions: those of the axes, then ``sample``."""
+        return tuple(axis.name for axis in self.axes) + ((SAMPLE,) if self.sampling else ())
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(len(axis.values) for axis in self.axes) + ((self.sampling.points,) if self.sampling else ())
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    def outputs(self) -> tuple[Output, ...]:
+        """All arrays of the map."""
+        varied = [n for n in self.varied if n in self.rig.parameters()]
+        return tuple(output for one in self.compute for output in one.outputs(self.rig, varied))
+
+    @cached_property
+    def chunks(self) -> tuple[int, ...]:
+        """Points of a chunk along each dimension: whole last dimensions, then part of the one before."""
+        target = self.chunk or self._suited_chunk()
+        found: list[int] = []
+        for size in reversed(self.shape):
+            most = max(1, min(size, target))
+            count = math.ceil(size / most)
+            found.append(math.ceil(size / count))
+            target //= found[-1]
+        return tuple(reversed(found))
+
+    @cached_property
+    def seconds(self) -> float:
+        """About how long a point takes on one core."""
+        probes = self.probes()
+        return float(sum(one.seconds(self.rig, self.protocol, _for(one, probes)) for one in self.compute))
+
+    def _suited_chunk(self) -> int:
+        """Points that take about half a second."""
+        seconds = self.seconds
+        points = min(SECONDS / seconds, LARGEST_CHUNK)
+        least = -(-2 * self.size // MOST_CHUNKS)  # the last chunk of a row may be a small one
+        return max(1, int(max(min(points, self.size / LEAST_CHUNKS), min(points, SHORT / seconds))), least)
+
+    def probes(self) -> dict[str, Any]:
+        """Parameters at some points of the map, always the same."""
+        generator = np.random.default_rng(0)
+        count = min(PROBES, self.size)
+        found = {axis.name: generator.choice(axis.values, count) for axis in self.axes}
+        if self.sampling:
+            start = int(generator.integers(0, max(1, min(self.sampling.points, 2**16) - count)))
+            part = self.sampling.part(start, min(start + count, self.sampling.points))
+            found |= {name: np.resize(column, count) for name, column in part.items()}
+        return found
+
+    def definition(self) -> dict[str, Any]:
+        """Plain data that tells whether two maps are the same."""
+        return {
+            "rig": rig_definition(self.rig, self.protocol),
+            "compute": {one.name: one.definition() for one in self.compute},
+            "over": {axis.name: axis.definition() for axis in self.axes},
+            "samples": self.sampling.definition() if self.sampling else {},
+        }
+
+    def __str__(self) -> str:
+        parts = [f"{axis.name} ({len(axis.values)})" for axis in self.axes]
+        if self.sampling:
+            parts.append(f"{self.sampling.points} samples of {', '.join(self.sampling.names)}")
+        what = ", ".join(one.name for one in self.compute)
+        return f"map of {what} over {' x '.join(parts)}: {self.size:,} points"
+
+
+def _for(one: AnyMeasure, vary: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters that matter for a measure: those of the protocol only where something moves."""
+    return {name: a for name, a in vary.items() if one.moves or not name.startswith("protocol.")}
+
+
+def evaluate(rig: Slider, protocol: Protocol, compute: Iterable[AnyMeasure], vary: Mapping[str, Any]) -> dict[str, Any]:
+    """All outputs of all measures at points given as arrays that broadcast; (..., extra) each."""
+    shape = np.broadcast_shapes(*(np.shape(a) for a in vary.values()))
+    results: dict[str, Any] = {}
+    for one in compute:
+        own = _for(one, vary)
+        found = one.arrays(rig, protocol, own)
+        for output in one.outputs(rig, [n for n in own if n in rig.parameters()]):
+            extra = tuple(size for _, size in output.extra)
+            given = np.asarray(found[output.name])
+            inner = given.shape[given.ndim - len(extra) :]
+            if inner != extra:
+                padded = np.full((*given.shape[: given.ndim - len(extra)], *extra), output.fill)
+                region: Any = (..., *(slice(0, n) for n in inner))
+                padded[region] = given
+                given = padded
+            results[output.name] = np.broadcast_to(given, (*shape, *extra)).astype(output.dtype, copy=False)
+    return results
+
+
+def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
+    found: list[AnyMeasure] = []
+    single = isinstance(given, (str, Measure, FunctionMeasure)) or not isinstance(given, (list, tuple))
+    for one in [given] if single else given:
+        try:
+            if isinstance(one, (Measure, FunctionMeasure)):
+                found.append(one)
+            elif isinstance(one, type) and issubclass(one, Measure):
+                found.append(one())
+            elif callable(one):
+                found.append(measure(one))
+            else:
+                law = find_law(Measure, one)
+                if not issubclass(law, Measure):
+                    raise InternalError("issubclass(law, Measure)")
+                found.append(law())
+        except ParameterError as error:
+            problems += [p.under("map.compute") for p in error.problems]
+    if not found and not problems:
+        problems.append(Problem("map.compute", f"is empty; allowed: {', '.join(Measure.registry)}"))
+    return tuple(found)
+
+
+def _of_fit(rig: Slider, given: Any) -> tuple[Slider, dict[str, Any]]:
+    """The rig with a fit's friction, and draws of the parameters."""
+    from steadyslip.experiments import Draws, Fit
+    from steadyslip.experiments.answers.predict import transferred
+
+    if not isinstance(given, (Fit, Draws)):
+        message = f"got {given!r}; allowed: Samples, names and their values, a Fit or Draws of one"
+        raise ParameterError([Problem("map.samples", message)])
+    target, _, vary = transferred(rig, given)
+    return target, dict(vary)
+
+
+def rig_definition(rig: Slider, protocol: Protocol) -> dict[str, Any]:
+    """Plain data that tells whether two rigs and protocols are the same, laws of other packages by their text."""
+    foreign = {
+        type(record).__qualname__: source_digest(type(record))
+        for record in (*_records(rig), *_records(protocol))
+        if not type(record).__module__.startswith("steadyslip.")
+    }
+    try:
+        tables = tomllib.loads(rig_to_text(rig, protocol))
+    except ParameterError:  # a law without a name, which no file can refer to
+        tables = {"description": f"{rig!r} {protocol!r}"}
+    return tables | ({"laws": foreign} if foreign else {})
+
+
+def _records(record: Record) -> Iterator[Record]:
+    yield record
+    for item in fields(record):  # type: ignore[arg-type]
+        value = getattr(record, item.name)
+        for inner in value if isinstance(value, tuple) else (value,):
+            if isinstance(inner, Record):
+                yield from _records(inner)
+
+
+def differences(old: Any, new: Any, name: str = "map") -> list[str]:
+    """What differs between two definitions, in words."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        found = []
+        for key in dict.fromkeys(itertools.chain(old, new)):
+            found += differences(old.get(key), new.get(key), f"{name}.{key}")
+        if not found and list(old) != list(new):
+            found.append(f"{name}: the order was {', '.join(old)}, now {', '.join(new)}")
+        return found
+    return [] if old == new else [f"{name}: was {_plain(old)}, is {_plain(new)}"]
+
+
+def _plain(value: Any) -> str:
+    return "absent" if value is None else str(value)
+
+
+def roles(plan: Map) -> dict[str, Parameter]:
+    """Units and meanings of all parameters that vary."""
+    known = plan.known()
+    return {name: known[name].role for name in plan.varied}

@@ -1,0 +1,377 @@
+"""What a map can show: each measure turns rigs, given as arrays of parameters, into named arrays.
+
+A measure is a record like a law: registered under the word used in ``[map] compute``, its options are its fields.
+Any other function of a rig becomes one by `measure`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
+from steadyslip.core.records import Domain, Record, option, parameter, positive
+from steadyslip.linear import critical_stiffness, growth_rate, safety_factor, stable_stiffness
+from steadyslip.linear.polynomials import most_intervals
+from steadyslip.linear.response import has_closed_form
+from steadyslip.linear.status import status
+from steadyslip.linear.stiffness import stiffness_polynomials
+from steadyslip.machine.slider import Slider
+from steadyslip.motion import simulate_many
+from steadyslip.motion.many import EVENT_UNITS
+from steadyslip.motion.status import WORDS
+from steadyslip.nonlinear.kicks.brackets import threshold_brackets
+from steadyslip.nonlinear.kicks.kicks import KICKS
+from steadyslip.nonlinear.onset.hopf import onset_map
+from steadyslip.protocol import Protocol
+from steadyslip.values import model_values
+
+Vary = Mapping[str, Any]
+SECONDS_A_STEP = 4e-8  # of a lane's step on one core; decides no more than the size of chunks
+PROBES = 64
+NOT_DONE = -1
+
+STATUS = ("no steady sliding", "stable", "unstable", "out of range")
+ONSET = ("none", "supercritical", "subcritical", "degenerate")
+
+
+@dataclass(frozen=True)
+class Output:
+    """One array that a measure gives.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+    flags : tuple of str
+        What the numbers 0, 1, ... stand for; such arrays hold small integers, -1 where nothing is computed yet.
+    extra : tuple of (str, int)
+        Dimensions besides those of the map, with their sizes.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    flags: tuple[str, ...] = ()
+    extra: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def dtype(self) -> str:
+        return "int8" if self.flags else "float64"
+
+    @property
+    def fill(self) -> float:
+        return NOT_DONE if self.flags else np.nan
+
+
+class Measure(Record, family="measure"):
+    """Base of what a map can show.
+
+    A subclass is registered under a name, lists its `outputs` and computes them in `arrays`. Results must depend
+    on the parameters of a point alone, not on which other points are computed with it. Where an output has
+    further dimensions, shorter arrays are padded.
+    """
+
+    moves: ClassVar[bool] = False
+    """Whether the protocol matters; otherwise parameters of the protocol that vary are left out."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        """The arrays that it gives where the named parameters vary."""
+        raise NotImplementedError
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        """The outputs by name, for parameters in SI units that broadcast against each other."""
+        raise NotImplementedError
+
+    def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
+        """What is missing or wrong with it for this rig."""
+        yield from ()
+
+    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+        """About how long one point takes on one core; `probes` are parameters at some points of the map.
+
+        Must not depend on a clock: the size of chunks follows from it, and the same map gets the same chunks.
+        """
+        present = [name for name in probes if name in rig.parameters()]
+        return 1.2e-7 if has_closed_form(model_values(rig, None, present).model) else 4e-6
+
+    def definition(self) -> dict[str, Any]:
+        """Name and options, to tell whether two measures are the same."""
+        options = {item.name: getattr(self, item.name) for item in fields(self)}
+        found = {"name": self.name, **{name: value for name, value in options.items() if value is not None}}
+        if not type(self).__module__.startswith("steadyslip."):
+            found["text"] = source_digest(type(self))
+        return found
+
+
+class CriticalStiffness(Measure, name="critical_stiffness"):
+    """Edge of the stable set nearest to the rig's own stiffness; see `steadyslip.critical_stiffness`."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("critical_stiffness", "Pa/m", "critical stiffness"),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"critical_stiffness": critical_stiffness(rig, vary)}
+
+
+class SafetyFactor(Measure, name="safety_factor"):
+    """Stiffness over critical stiffness; see `steadyslip.safety_factor`."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("safety_factor", "1", "stiffness over critical stiffness"),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"safety_factor": safety_factor(rig, vary)}
+
+
+class Margin(Measure, name="margin"):
+    """Logarithm of the safety factor, ln(k/k_cr): zero at the edge, as far below it as above by the same factor."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("margin", "1", "logarithm of stiffness over critical stiffness"),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"margin": np.log(safety_factor(rig, vary))}
+
+
+class StableStiffness(Measure, name="stable_stiffness"):
+    """All stable stiffnesses as intervals; see `steadyslip.stable_stiffness`."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        values = model_values(rig, None, [n for n in varied if n in rig.parameters()])
+        one = has_closed_form(values.model)
+        most = 1 if one else most_intervals(stiffness_polynomials(values)[0].shape[-1] - 1)
+        extra = (("interval", most), ("end", 2))
+        return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"stable_stiffness": stable_stiffness(rig, vary)}
+
+
+class GrowthRate(Measure, name="growth_rate"):
+    """Largest real part of the eigenvalues; see `steadyslip.growth_rate`."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("growth_rate", "1/s", "growth rate of small disturbances"),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"growth_rate": growth_rate(rig, vary)}
+
+
+class Status(Measure, name="status"):
+    """Stable, unstable (ill-posed included), or no steady sliding."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("status", "1", "stability of steady sliding", STATUS),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        values = model_values(rig, vary)
+        found = [np.broadcast_to(status(part), part.shape).reshape(-1) for part in values.pieces(32768)]
+        return {"status": np.concatenate(found).reshape(values.shape)}
+
+
+class OnsetKind(Measure, name="onset"):
+    """Kind of onset at the oscillatory edge in stiffness nearest to the rig's own; see `steadyslip.hopf`."""
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (
+            Output("onset", "1", "kind of onset", ONSET),
+            Output("onset_edge", "Pa/m", "stiffness at the oscillatory edge"),
+            Output("onset_coefficient", "1/s", "cubic coefficient of the onset"),
+        )
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        found = onset_map(rig, vary)
+        return {
+            "onset": found["kind"], "onset_edge": found["edge"], "onset_coefficient": found["coefficient"]
+        }  # fmt: skip
+
+    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+        return 1e-4
+
+
+small = Domain(0, 0.1, False, True, "a number > 0 and <= 0.1")
+steps = Domain(1, 1e9, True, True, "a whole number from 1 to 1e9", whole=True)
+
+
+class Events(Measure, name="events"):
+    """Statistics of slip events under the protocol; see `steadyslip.simulate_many`."""
+
+    moves = True
+    until: float | None = parameter("s", positive, "end of every run; that of the protocol unless given", default=None)
+    method: str = option("auto", "explicit", "rosenbrock", doc="of integration", default="auto")
+    rtol: float = parameter("1", small, "error allowed per step", default=1e-7)
+    arrest: float = parameter("1", small, "velocity over the drive's below which a block counts as held", default=1e-3)
+    most_steps: float = parameter("1", steps, "steps after which a run is given up", default=1_000_000)
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        ended = (
+            Output("outcome", "1", "how the run ended", tuple(WORDS)),
+            Output("end_time", "s", "time reached"),
+        )
+        meant = (Output(name, unit, name.replace("_", " ")) for name, unit in EVENT_UNITS.items())
+        return (*ended, *meant)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        found = self._run(rig, protocol, vary)
+        return {"outcome": found.status_code, "end_time": found.end, **found.events}
+
+    def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
+        if self.until is None and protocol.until is None:
+            message = "missing; give the end of the runs, such as '200 s', here or in [protocol]"
+            yield Problem("until", message)
+
+    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+        found = self._run(rig, protocol, probes)
+        return float(np.mean(found.steps + found.rejected)) * SECONDS_A_STEP + 1e-6
+
+    def _run(self, rig: Slider, protocol: Protocol, vary: Vary) -> Any:
+        return simulate_many(
+            rig, vary, protocol, until=self.until, observables=(), method=self.method, rtol=self.rtol,
+            most_steps=int(self.most_steps), arrest=self.arrest, threads=1, progress=False,
+        )  # fmt: skip
+
+
+class KickThreshold(Measure, name="threshold"):
+    """Smallest kick that steady sliding does not survive; see `steadyslip.threshold_map`."""
+
+    kick: str = option(*KICKS, doc="kind of kick", default="velocity")
+    reverse: bool = option(False, True, doc="slower, backward, pressed less", default=False)
+    reference: str = option(
+        "before", "after", doc="whether the drive's velocity is that before or after a velocity step", default="before"
+    )
+    precision: float = parameter("1", small, "relative, of the size found", default=1e-4)
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (
+            Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
+            Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),
+            Output("threshold_high", "1", f"size of the smallest {self.kick} kick known not to be survived"),
+        )
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        direction = -1 if self.reverse else 1
+        found, _, _ = threshold_brackets(
+            rig, vary, self.kick, direction=direction, reference=self.reference, precision=self.precision, threads=1,
+            progress=False,
+        )  # fmt: skip
+        return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high}
+
+    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+        return 5e-3
+
+
+@dataclass(frozen=True)
+class FunctionMeasure:
+    """A function of a rig as a measure; made by `measure`."""
+
+    name: str
+    function: Callable[..., Any]
+    unit: str = "1"
+    takes_arrays: bool = False
+    cost: float = 1e-3
+    moves: ClassVar[bool] = False
+
+    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output(self.name, self.unit, self.name.replace("_", " ")),)
+
+    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        if self.takes_arrays:
+            return {self.name: self.function(rig, vary)}
+        shape = np.broadcast_shapes(*(np.shape(a) for a in vary.values()))
+        columns = {name: np.broadcast_to(a, shape).reshape(-1) for name, a in vary.items()}
+        size = int(np.prod(shape, dtype=int))
+        found = np.array([self._at(rig, {n: float(c[i]) for n, c in columns.items()}) for i in range(size)])
+        return {self.name: found.reshape(shape)}
+
+    def _at(self, rig: Slider, point: dict[str, float]) -> float:
+        """NaN where the question has no answer; any other failure names the point."""
+        try:
+            return float(self.function(rig.with_values(point)))
+        except SteadyslipError:
+            return np.nan
+        except Exception as error:
+            where = ", ".join(f"{name} = {value!r}" for name, value in point.items())
+            message = f"failed with {type(error).__name__}: {error}; at {where}"
+            raise ParameterError([Problem(f"map.compute.{self.name}", message)]) from error
+
+    def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
+        yield from ()
+
+    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+        return self.cost
+
+    def definition(self) -> dict[str, Any]:
+        return {
+            "name": self.name, "function": getattr(self.function, "__qualname__", ""), "unit": self.unit,
+            "text": source_digest(self.function),
+        }  # fmt: skip
+
+
+def source_digest(thing: Any) -> str:
+    """A short name for a function or class: its text, and what it holds (closure, defaults, attributes)."""
+    if isinstance(thing, partial):
+        text = f"{source_digest(thing.func)} {thing.args!r} {sorted(thing.keywords.items())!r}"
+    else:
+        written = thing if inspect.isroutine(thing) or isinstance(thing, type) else type(thing)
+        try:
+            text = inspect.getsource(written)
+        except (OSError, TypeError):  # typed at a prompt, or compiled
+            code = getattr(thing, "__code__", None)
+            text = repr((code.co_code, code.co_consts, code.co_names)) if code else repr(written)
+        held = [getattr(thing, name, None) for name in ("__defaults__", "__kwdefaults__")]
+        held += [cell.cell_contents for cell in getattr(thing, "__closure__", None) or ()]
+        if written is not thing:
+            held += sorted(getattr(thing, "__dict__", {}).items())
+        text += repr(held)
+    return hashlib.sha256(re.sub(r" at 0x[0-9a-f]+", "", text).encode()).hexdigest()[:16]
+
+
+def measure(
+    function: Callable[..., Any] | None = None,
+    *,
+    name: str | None = None,
+    unit: str = "1",
+    arrays: bool = False,
+    seconds: float | None = None,
+) -> Any:
+    """Make a function of a rig into something that a map can show; usable as a decorator.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(rig)`` gives a number; NaN, or one of this package's exceptions, where there is none. With
+        `arrays`, ``function(rig, vary)`` gives an array for parameters, by dotted name, that broadcast. It must depend
+        on nothing else: maps are computed in several processes and may be continued another day. Its text, and
+        what it holds, tell whether it is still the same then.
+    name : str, optional
+        Of the array; the function's own unless given.
+    unit : str
+    arrays : bool
+        Whether the function takes arrays.
+    seconds : float, optional
+        About how long one point takes; 1 ms unless given (1 us with `arrays`). Decides the size of chunks.
+
+    Returns
+    -------
+    FunctionMeasure
+    """
+    if function is None:
+        return lambda f: measure(f, name=name, unit=unit, arrays=arrays, seconds=seconds)
+    problems = []
+    if not callable(function):
+        problems.append(Problem("measure", f"got {function!r}; allowed: a function of a rig"))
+    label = str(name or getattr(function, "__name__", ""))
+    if not label.isidentifier():
+        problems.append(Problem("measure", f"got the name {label!r}; give a name=... of letters, digits and _"))
+    if seconds is not None and not seconds > 0:
+        problems.append(Problem("measure", f"got seconds={seconds!r}; allowed: a number > 0"))
+    if problems:
+        raise ParameterError(problems)
+    return FunctionMeasure(label, function, unit, arrays, seconds or (1e-6 if arrays else 1e-3))

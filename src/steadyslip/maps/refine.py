@@ -1,0 +1,388 @@
+"""New points of a map along an edge instead of everywhere.
+
+Between neighbouring points of a grid that differ (stable or not, say) lies an edge. The cells that it crosses are
+divided in two along each axis, again and again; a cell whose corners agree is taken in as soon as a point on its rim
+differs, so that an edge is followed out of the cells in which it was seen first.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown
+from steadyslip.core.results import ReadOnly
+from steadyslip.files.specifications import protocol_from_text
+from steadyslip.files.specifications.layout import find_law
+from steadyslip.maps.plan.axes import SAMPLE
+from steadyslip.maps.plan.map import AnyMeasure, Map
+from steadyslip.maps.plan.measures import Measure
+from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.work.run import run_map
+
+Array = np.ndarray
+MOST_ROUNDS = 12
+MOST_AXES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Refined(ReadOnly):
+    """An edge of a map, and the points computed to find it.
+
+    Attributes
+    ----------
+    map : MapResult
+    of : str
+        The result whose edge it is.
+    level : float or None
+        Value that it crosses there; None where it is one of several kinds.
+    rounds : int
+        How often cells were halved.
+    points : dict of str to ndarray (m,)
+        New points: parameters that vary and all results, SI units.
+    edge : dict of str to ndarray (n,)
+        Points on the edge: parameters halfway between two of the finest neighbours that differ.
+    sides : ndarray (n, 2)
+        What `of` is on both sides: kind, or whether it is above the level.
+    spacing : dict of str to float
+        Largest distance of neighbours along each parameter, on the finest level; the edge is known to half of it.
+    """
+
+    map: MapResult
+    of: str
+    level: float | None
+    rounds: int
+    points: dict[str, Array] = field(repr=False)
+    edge: dict[str, Array] = field(repr=False)
+    sides: Array = field(repr=False)
+    spacing: dict[str, float]
+
+    def __str__(self) -> str:
+        count = len(next(iter(self.points.values()), ()))
+        sizes = zip(self.map.dims, self.map.shape, strict=True)
+        full = np.prod([(n - 1) * 2**self.rounds + 1 if name in self.spacing else n for name, n in sizes], dtype=float)
+        lines = [
+            f"edge of {self.of}{'' if self.level is None else f' at {self.level:.4g}'}: {count:,} new points, "
+            f"where the whole grid would have {full:,.4g}"
+        ]
+        for name, size in self.spacing.items():
+            lines.append(f"  {name:<24}known to {shown(0.5 * size, self.map.unit(name), 3, self.map.area)} or better")
+        lines.append(f"  {len(self.sides):,} points on the edge")
+        return "\n".join(lines)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the points on the edge, a line each: parameters in SI units, then both sides.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        words = self.map.words(self.of)
+        names = [f"{name} ({self.map.unit(name)})" for name in self.edge]
+        columns = [[repr(float(v)) for v in column] for column in self.edge.values()]
+        for side in (0, 1):
+            sides: Any = self.sides[:, side] if len(self.sides) else []
+            columns.append([words[int(s)] if words else ("below", "above")[int(s)] for s in sides])
+        rows = [",".join([*names, "one side", "other side"]), *(",".join(row) for row in zip(*columns, strict=True))]
+        try:
+            Path(path).write_text("\n".join(rows) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw new points and edge; see `steadyslip.figures.refined`."""
+        return draw(self, ax=ax)
+
+
+def refine(
+    found: MapResult,
+    rounds: int = 3,
+    *,
+    of: str | None = None,
+    level: float | None = None,
+    compute: Sequence[AnyMeasure] | None = None,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: bool | None = None,
+) -> Refined:
+    """Put new points along an edge of a map.
+
+    Parameters
+    ----------
+    found : MapResult
+        Complete, over up to three parameters on grids; lists of values stay as they are.
+    rounds : int
+        How often to halve the cells that the edge crosses; each round costs about as many points as the edge has cells.
+    of : str, optional
+        Result whose edge is wanted; ``status`` unless given, or the map's first result.
+    level : float, optional
+        Value in SI units that a result of numbers crosses at the edge; 0 for ``growth_rate`` and ``margin``, 1 for
+        ``safety_factor`` unless given. Where the result does not exist counts as below.
+    compute : sequence of Measure, optional
+        What to compute; as in the map unless given, which is needed where it had functions.
+    workers, cluster, progress
+        As for `run_map`. New points are kept beside the map, in a folder of its name that ends in ``.refined``.
+
+    Returns
+    -------
+    Refined
+
+    Raises
+    ------
+    ParameterError
+        If an argument is wrong.
+    NotAvailable
+        If the map is not complete, has samples, or no edge.
+    """
+    of = of or ("status" if "status" in found.results else found.results[0])
+    level = _checked(found, rounds, of, level)
+    lattice = _Lattice(found, rounds)
+    kinds = _Kinds(found, of, level)
+    base = found.read(of)
+    nodes = lattice.flat(np.indices(found.shape).reshape(len(found.shape), -1).T * lattice.size)
+    known = _Known(nodes, kinds(base.reshape(-1)))
+    batch = _Batches(found, of, level, compute, lattice, workers, cluster, progress)
+    cells = lattice.first_cells()
+    cells = cells[_mixed(lattice, known, cells, lattice.size)]
+    if not len(cells):
+        raise NotAvailable(f"{of} is the same at all points of the map; there is no edge to refine")
+    for number in range(1, rounds + 1):
+        step = lattice.size // 2**number
+        cells = _divided(lattice, known, cells, step, lambda flat, n=number: kinds(batch(flat, n)[of]))
+    points = batch.points()
+    edge, sides = _edge(lattice, known, cells)
+    spacing = {name: lattice.spacing(i) for i, name in enumerate(found.dims) if lattice.divides[i]}
+    return Refined(found, of, level, rounds, points, edge, sides, spacing)
+
+
+def _checked(found: MapResult, rounds: int, of: str, level: float | None) -> float | None:
+    problems = []
+    if isinstance(rounds, bool) or not isinstance(rounds, int) or not 1 <= rounds <= MOST_ROUNDS:
+        problems.append(Problem("rounds", f"got {rounds!r}; allowed: a whole number from 1 to {MOST_ROUNDS}"))
+    if of not in found.results:
+        problems.append(Problem("of", unknown_name("result", of, found.results)))
+    elif found.store.array(of).ndim > len(found.dims):
+        problems.append(Problem("of", f"{of!r} has several numbers a point; choose another result"))
+    elif found.words(of):
+        if level is not None:
+            problems.append(Problem("level", f"{of} is one of several kinds; leave the level away"))
+    elif level is None:
+        usual = {"growth_rate": 0.0, "margin": 0.0, "safety_factor": 1.0}
+        if of not in usual:
+            problems.append(Problem("level", f"missing; give the value of {of} at the edge"))
+        level = usual.get(of)
+    elif isinstance(level, bool) or not isinstance(level, (int, float)):
+        problems.append(Problem("level", f"got {level!r}; allowed: a number in {found.unit(of)}"))
+    if problems:
+        raise ParameterError(problems)
+    if SAMPLE in found.dims:
+        raise NotAvailable("samples have no neighbours; refine a map over grids")
+    if not found.complete:
+        raise NotAvailable(f"{str(found.path)!r} is not complete; compute the rest of it first")
+    return level
+
+
+class _Kinds:
+    """Which side of the edge values are on, as small integers."""
+
+    def __init__(self, found: MapResult, of: str, level: float | None) -> None:
+        self.level = None if found.words(of) else level
+
+    def __call__(self, values: Array) -> Array:
+        if self.level is None:
+            return np.asarray(values, dtype=np.int8)
+        return (np.asarray(values) > self.level).astype(np.int8)
+
+
+class _Lattice:
+    """Points between those of a grid: whole numbers, `size` of them from one grid point to the next."""
+
+    def __init__(self, found: MapResult, rounds: int) -> None:
+        over = found.store.definition["over"]
+        self.names = found.dims
+        self.values = [found.read(name) for name in self.names]
+        self.logs = [over[name].get("spacing") == "log" for name in self.names]
+        self.divides = [over[n].get("spacing", "list") != "list" and len(v) > 1 for n, v in zip(
+            self.names, self.values, strict=True)]  # fmt: skip
+        if not any(self.divides):
+            raise NotAvailable("the map has no grid to refine; give a parameter as a grid, with from, to and points")
+        if sum(self.divides) > MOST_AXES:
+            raise NotAvailable(f"a map over more than {MOST_AXES} grids cannot be refined; hold one of them")
+        self.size = 2**rounds
+        self.shape = tuple((len(v) - 1) * self.size + 1 for v in self.values)
+        if float(np.prod([float(n) for n in self.shape])) > 2.0**62:
+            raise NotAvailable(f"{rounds} rounds are more than can be counted on this map; ask for fewer")
+        unit = [1 if d else 0 for d in self.divides]
+        self.corners = np.array(list(itertools.product(*((0, u) for u in unit))), dtype=np.int64)
+        self.corners = np.unique(self.corners, axis=0)
+        thirds = itertools.product(*((0, 1, 2) if u else (0,) for u in unit))
+        self.inside = np.array(list(thirds), dtype=np.int64)
+
+    def flat(self, nodes: Array) -> Array:
+        """Nodes (m, n) as single numbers."""
+        return np.asarray(np.ravel_multi_index(tuple(np.asarray(nodes).T), self.shape), dtype=np.int64)
+
+    def nodes(self, flat: Array) -> Array:
+        return np.stack(np.unravel_index(flat, self.shape), axis=-1).astype(np.int64)
+
+    def first_cells(self) -> Array:
+        """Lowest corners of all cells of the grid."""
+        counts = [len(v) - 1 if d else len(v) for v, d in zip(self.values, self.divides, strict=True)]
+        return np.asarray(np.indices(counts).reshape(len(counts), -1).T * self.size)
+
+    def inner(self, cells: Array, step: int) -> Array:
+        """Whether cells lie within the grid."""
+        high = np.array(self.shape) - np.where(self.divides, step, 1)
+        return np.asarray(np.all((cells >= 0) & (cells <= high), axis=1))
+
+    def parameters(self, nodes: Array) -> dict[str, Array]:
+        """Values of the parameters at nodes that need not be whole, SI units."""
+        found = {}
+        for i, (name, values) in enumerate(zip(self.names, self.values, strict=True)):
+            place = nodes[:, i] / self.size
+            below = np.minimum(np.floor(place).astype(int), max(len(values) - 2, 0))
+            share = place - below
+            low, high = values[below], values[np.minimum(below + 1, len(values) - 1)]
+            between = low * (high / low) ** share if self.logs[i] else low + (high - low) * share
+            found[name] = np.where(share == 0, low, np.where(share == 1, high, between))
+        return found
+
+    def spacing(self, axis: int) -> float:
+        nodes = np.zeros((self.shape[axis], len(self.names)))
+        if self.shape[axis] > 2**20:  # even spacing is enough to know
+            return float(np.max(np.abs(np.diff(self.values[axis]))) / self.size)
+        nodes[:, axis] = np.arange(self.shape[axis])
+        return float(np.max(np.abs(np.diff(self.parameters(nodes)[self.names[axis]]))))
+
+
+class _Known:
+    """Nodes whose kind is known, in order."""
+
+    def __init__(self, flat: Array, kinds: Array) -> None:
+        order = np.argsort(flat)
+        self.flat, self.kinds = flat[order], kinds[order]
+
+    def has(self, flat: Array) -> Array:
+        place = np.minimum(np.searchsorted(self.flat, flat), len(self.flat) - 1)
+        return np.asarray(self.flat[place] == flat)
+
+    def of(self, flat: Array) -> Array:
+        return np.asarray(self.kinds[np.searchsorted(self.flat, flat)])
+
+    def add(self, flat: Array, kinds: Array) -> None:
+        both = np.concatenate([self.flat, flat])
+        order = np.argsort(both, kind="stable")
+        self.flat, self.kinds = both[order], np.concatenate([self.kinds, kinds])[order]
+
+
+class _Batches:
+    """Computes points as maps of their own beside the map, so that work on them can be interrupted as well."""
+
+    def __init__(
+        self, found: MapResult, of: str, level: float | None, compute: Sequence[AnyMeasure] | None, lattice: _Lattice,
+        workers: int | None, cluster: str | None, progress: bool | None,
+    ) -> None:  # fmt: skip
+        self.found, self.lattice = found, lattice
+        text = str(found.dataset.attrs["definition"])
+        self.rig = found.rig
+        self.protocol = protocol_from_text(str(found.dataset.attrs["rig"]), str(found.path))
+        self.compute = tuple(compute) if compute is not None else _measures_of(json.loads(text)["compute"])
+        name = hashlib.sha256(f"{text} {of} {level}".encode()).hexdigest()[:8]
+        self.folder = found.path.with_suffix(".refined") / f"{of}-{name}"
+        self.options: dict[str, Any] = {"workers": workers, "cluster": cluster, "progress": progress}
+        self.counts: dict[int, int] = {}
+        self.found_points: list[dict[str, Array]] = []
+
+    def __call__(self, flat: Array, number: int) -> dict[str, Array]:
+        values = self.lattice.parameters(self.lattice.nodes(flat))
+        part = self.counts[number] = self.counts.get(number, 0) + 1
+        plan = Map(self.rig, compute=self.compute, samples=values, protocol=self.protocol)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise NotAvailable(f"cannot write {str(self.folder)!r}: {error.strerror or error}") from error
+        done = run_map(plan, self.folder / f"{number}-{part}.zarr", **self.options)
+        if not done.complete:
+            raise KeyboardInterrupt
+        data = done.dataset
+        self.found_points.append({name: data[name].values for name in (*values, *done.results)})
+        return self.found_points[-1]
+
+    def points(self) -> dict[str, Array]:
+        names = self.found_points[0] if self.found_points else {}
+        return {name: np.concatenate([part[name] for part in self.found_points]) for name in names}
+
+
+def _measures_of(definition: dict[str, Any]) -> tuple[Any, ...]:
+    found = []
+    for name, options in definition.items():
+        if "function" in options:
+            message = f"the map computes the function {name!r}, which is not kept with it; give compute=[...]"
+            raise NotAvailable(message)
+        law = find_law(Measure, name)
+        found.append(law(**{key: value for key, value in options.items() if key not in ("name", "text")}))
+    return tuple(found)
+
+
+def _mixed(lattice: _Lattice, known: _Known, cells: Array, step: int) -> Array:
+    """Whether the corners of cells, given by their lowest ones, differ."""
+    corners = cells[:, None, :] + step * lattice.corners
+    kinds = known.of(lattice.flat(corners.reshape(-1, corners.shape[-1]))).reshape(len(cells), -1)
+    return np.asarray(np.any(kinds != kinds[:, :1], axis=1))
+
+
+def _divided(lattice: _Lattice, known: _Known, cells: Array, step: int, compute: Any) -> Array:
+    """Halve cells of size 2 step, and others that the edge turns out to cross; returns the mixed halves."""
+    active = np.unique(lattice.flat(cells))
+    waiting = active
+    unit = np.where(lattice.divides, 1, 0)
+    while len(waiting):
+        nodes = lattice.nodes(waiting)[:, None, :] + step * lattice.inside
+        flat = np.unique(lattice.flat(nodes.reshape(-1, nodes.shape[-1])))
+        new = flat[~known.has(flat)]
+        if len(new):
+            known.add(new, compute(new))
+        # the rim: points that differ from a corner of the cell belong to its neighbours' business too
+        kinds = known.of(lattice.flat(nodes.reshape(-1, nodes.shape[-1]))).reshape(len(waiting), -1)
+        is_corner = np.all(lattice.inside != 1, axis=1)
+        odd = np.any(kinds[:, :, None] != kinds[:, None, is_corner], axis=2) & ~is_corner
+        rim = nodes[odd]
+        touched = []
+        for shift in itertools.product(*((0, 1) if u else (0,) for u in unit)):
+            low = rim - (rim % np.where(unit, 2 * step, 1)) - np.array(shift) * 2 * step
+            on_face = np.all((np.array(shift) == 0) | (rim % np.where(unit, 2 * step, 1) == 0), axis=1)
+            touched.append(low[on_face])
+        candidates = np.concatenate(touched) if touched else np.empty((0, len(unit)), dtype=np.int64)
+        candidates = candidates[lattice.inner(candidates, 2 * step)]
+        waiting = np.setdiff1d(lattice.flat(candidates), active) if len(candidates) else np.empty(0, dtype=np.int64)
+        active = np.union1d(active, waiting)
+    halves = (lattice.nodes(active)[:, None, :] + step * lattice.corners).reshape(-1, len(unit))
+    halves = np.unique(halves, axis=0)
+    return np.asarray(halves[_mixed(lattice, known, halves, step)])
+
+
+def _edge(lattice: _Lattice, known: _Known, cells: Array) -> tuple[dict[str, Array], Array]:
+    """Halfway points between finest neighbours that differ, and their kinds."""
+    places, sides = [], []
+    for axis in np.flatnonzero(lattice.divides):
+        along = np.zeros(len(lattice.names), dtype=np.int64)
+        along[axis] = 1
+        starts = lattice.corners[lattice.corners[:, axis] == 0]
+        low = (cells[:, None, :] + starts).reshape(-1, len(along))
+        low = np.unique(low, axis=0)
+        pair = np.stack([known.of(lattice.flat(low)), known.of(lattice.flat(low + along))], axis=-1)
+        differs = pair[:, 0] != pair[:, 1]
+        places.append(low[differs] + 0.5 * along)
+        sides.append(pair[differs])
+    return lattice.parameters(np.concatenate(places)), np.concatenate(sides)

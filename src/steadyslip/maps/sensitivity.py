@@ -1,0 +1,207 @@
+"""Which parameters decide: Sobol indices of a result over ranges of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.pictures import draw
+from steadyslip.core.results import ReadOnly
+from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan.axes import Samples
+from steadyslip.maps.plan.map import Map, evaluate
+
+Array = np.ndarray
+POINTS = 4096
+RESAMPLES = 200
+LEAST, MOST = 64, 2**20
+WIDE = 0.2  # width of an interval from which on an index says little
+LEVEL = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity(ReadOnly):
+    """Shares of a result's variance that parameters are responsible for.
+
+    Attributes
+    ----------
+    rig : Slider
+    parameters : tuple of str
+    ranges : dict of str to (float, float, str)
+        Ends in SI units, and ``linear`` or ``log``.
+    first, total : dict of str to ndarray (d,)
+        By result: share by a parameter alone, and with all that it does together with others.
+    first_interval, total_interval : dict of str to ndarray (2, d)
+        95 % intervals by bootstrap.
+    missing : dict of str to float
+        Share of the points at which the result does not exist; they are left out, so that the shares are those within
+        the rest.
+    points : dict of str to int
+        Sets of points used, each of d + 2 evaluations.
+    """
+
+    rig: Slider = field(repr=False)
+    parameters: tuple[str, ...]
+    ranges: dict[str, tuple[float, float, str]]
+    first: dict[str, Array]
+    total: dict[str, Array]
+    first_interval: dict[str, Array] = field(repr=False)
+    total_interval: dict[str, Array] = field(repr=False)
+    missing: dict[str, float]
+    points: dict[str, int]
+
+    def ranked(self, result: str) -> list[str]:
+        """Parameters by falling total share."""
+        return [self.parameters[i] for i in np.argsort(-self.total[result])]
+
+    def __str__(self) -> str:
+        width = max(len(name) for name in self.parameters)
+        lines = []
+        for result in self.first:
+            lines.append(f"{result}: share of its variance, by a parameter alone and with others (95 %)")
+            for name in self.ranked(result):
+                i = self.parameters.index(name)
+                one, all_ = self.first[result][i], self.total[result][i]
+                low, high = self.total_interval[result][:, i]
+                lines.append(f"  {name:<{width}}  {one:6.3f}  {all_:6.3f}  ({low:.3f} to {high:.3f})")
+            intervals = np.stack([self.first_interval[result], self.total_interval[result]])
+            if np.max(intervals[:, 1] - intervals[:, 0]) > WIDE:
+                lines.append(f"  not settled: some intervals are wider than {WIDE:g}; ask for more points")
+            if self.missing[result]:
+                lines.append(
+                    f"  does not exist at {100 * self.missing[result]:.3g} % of the points, which are left out"
+                )
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "parameters": list(self.parameters),
+            "ranges": {name: list(ends) for name, ends in self.ranges.items()},
+            "results": {
+                result: {
+                    "first": self.first[result].tolist(),
+                    "first_interval": self.first_interval[result].T.tolist(),
+                    "total": self.total[result].tolist(),
+                    "total_interval": self.total_interval[result].T.tolist(),
+                    "missing": self.missing[result],
+                    "points": self.points[result],
+                }
+                for result in self.first
+            },
+        }
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the shares as bars; see `steadyslip.figures.sensitivity`."""
+        return draw(self, ax=ax)
+
+
+def sensitivity(
+    rig: Slider,
+    over: Mapping[str, Sequence[Any]],
+    of: Any = ("critical_stiffness", "margin"),
+    *,
+    points: int = POINTS,
+    seed: int = 0,
+    protocol: Any = None,
+) -> Sensitivity:
+    """Sobol indices of results over ranges of parameters.
+
+    Parameters
+    ----------
+    rig : Slider
+    over : mapping of str to (low, high) or (low, high, "log")
+        At least two parameters by dotted name and their ranges, SI units or text; independent, and uniform in the value
+        or in its logarithm.
+    of : sequence of str, Measure or function
+        Measures as for `Map` that give one number a point; ``margin`` is ln(k/k_cr).
+    points : int
+        Sets of points, a power of 2; each costs as many evaluations as there are parameters, and two.
+    seed : int
+    protocol : Protocol or piece, optional
+        For measures that simulate.
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    ParameterError
+        If anything given is wrong.
+    NotAvailable
+        If a result exists at too few points, or does not vary.
+
+    Notes
+    -----
+    First-order indices by Saltelli et al. (2010, their table 2 b), total ones by Jansen (2 f), from Sobol points, by
+    `scipy.stats.sobol_indices`. Where a result does not exist at one of the points of a set, the set is left out; the
+    largest power of 2 of the remaining sets is used.
+    """
+    whole = isinstance(points, int) and not isinstance(points, bool)
+    if not (whole and LEAST <= points <= MOST and points & (points - 1) == 0):
+        raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, from {LEAST} to {MOST}")])
+    plan = Map(rig, compute=of, samples=Samples(over, points, seed=seed), protocol=protocol)
+    if len(plan.varied) < 2:
+        raise ParameterError([Problem("over", "give at least two parameters; one alone has all the variance")])
+    outputs = plan.outputs()
+    several = [output.name for output in outputs if output.flags or output.extra]
+    if several:
+        raise ParameterError([Problem("of", f"{name!r} is not one number a point") for name in several])
+    sets = _sets(plan, points, seed)
+    with np.errstate(all="ignore"):
+        values = evaluate(plan.rig, plan.protocol, plan.compute, sets)  # (d + 2, points) each
+    generator = np.random.default_rng(seed)
+    found: dict[str, dict[str, Any]] = {n: {} for n in ("first", "total", "low", "high", "missing", "points")}
+    for output in outputs:
+        column = values[output.name]
+        good = np.all(np.isfinite(column), axis=0)
+        used = np.flatnonzero(good)[: 2 ** int(np.log2(max(good.sum(), 1)))]
+        if len(used) < LEAST:
+            count = f"{output.name} exists at {good.sum()} of {points} sets of points only"
+            message = f"{count}; ask for more points, or for other ranges"
+            raise NotAvailable(message)
+        column = column[:, used]
+        if np.ptp(column) == 0:
+            raise NotAvailable(f"{output.name} does not depend on {', '.join(plan.varied)}")
+        found["first"][output.name], found["total"][output.name] = _indices(column)
+        again = np.stack([_indices(column[:, generator.integers(0, len(used), len(used))]) for _ in range(RESAMPLES)])
+        interval = np.quantile(again, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
+        found["low"][output.name], found["high"][output.name] = interval[:, 0], interval[:, 1]
+        found["missing"][output.name] = float(np.mean(~np.isfinite(values[output.name])))
+        found["points"][output.name] = len(used)
+    ranges = {name: (low, high, spacing) for name, low, high, spacing in plan.sampling.ranges}  # type: ignore[union-attr]
+    return Sensitivity(
+        plan.rig, plan.varied, ranges, found["first"], found["total"], found["low"], found["high"], found["missing"],
+        found["points"],
+    )  # fmt: skip
+
+
+def _sets(plan: Map, points: int, seed: int) -> dict[str, Array]:
+    """Parameters at points A, B, and A with one parameter of B each, (d + 2, points)."""
+    from scipy.stats import qmc
+
+    ranges = plan.sampling.ranges  # type: ignore[union-attr]
+    d = len(ranges)
+    unit = qmc.Sobol(2 * d, seed=seed).random(points).T.reshape(2, d, points)
+    found = {}
+    for i, (name, low, high, spacing) in enumerate(ranges):
+        column = low * (high / low) ** unit[:, i] if spacing == "log" else low + (high - low) * unit[:, i]
+        rows = np.repeat(column[:1], d + 2, axis=0)
+        rows[1] = column[1]
+        rows[2 + i] = column[1]
+        found[name] = rows
+    return found
+
+
+def _indices(column: Array) -> Array:
+    """First and total indices, (2, d), from a result at all sets, (d + 2, n)."""
+    from scipy.stats import sobol_indices
+
+    parts = {"f_A": column[:1], "f_B": column[1:2], "f_AB": column[2:, None, :]}
+    result = sobol_indices(func=parts, n=column.shape[1])
+    return np.array([np.atleast_1d(result.first_order), np.atleast_1d(result.total_order)])

@@ -1,0 +1,111 @@
+"""The folder of a map as a Zarr store that stays inside itself: regular files of declared sizes, no links.
+
+A map may come from a stranger, or be gone on with. Nothing in it is followed out of it, waited for, or unpacked into
+more than its array has room for.
+"""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+from typing import Any
+
+from zarr.storage import LocalStore
+
+from steadyslip.files.inputs import UnreadableFile, check_kind, inside
+from steadyslip.maps.plan.axes import COMPLETE
+
+METADATA = 2**26
+"""Bytes of a file of metadata, at most."""
+_HEAD, _OVERHEAD = 16, 64  # bytes of what Blosc writes before its blocks, and of all that is added to a chunk
+
+
+class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no further
+    """Zarr's store of local files, every access of which is looked at first.
+
+    `sizes` are the bytes that a chunk of an array takes unpacked, by the array's name.
+    """
+
+    def __init__(self, root: Path | str, *, read_only: bool = False) -> None:
+        super().__init__(root, read_only=read_only)
+        self.sizes: dict[str, int] = {}
+
+    def with_read_only(self, read_only: bool = False) -> MapFolder:
+        found = MapFolder(self.root, read_only=read_only)
+        found.sizes = self.sizes
+        return found
+
+    def _look(self, key: str) -> None:
+        """Refuse to read what is not a file of the store, or too large to be one."""
+        path = inside(self.root, key)
+        try:
+            found = path.lstat()
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        if stat.S_ISDIR(found.st_mode):
+            return  # Zarr finds nothing there
+        check_kind(str(path), found)
+        most = METADATA
+        if "/c/" in key:
+            most = self.sizes.get(key.split("/")[0], 0) + _OVERHEAD  # a mark, a chunk, or nothing of ours
+        if found.st_size > most:
+            raise UnreadableFile(str(path), f"it has {found.st_size} bytes, more than the {most} that it may have")
+
+    def _sound(self, key: str, found: Any) -> Any:
+        """Refuse a chunk that says of itself that it unpacks into something else than its array holds."""
+        name = key.split("/")[0]
+        if found is None or "/c/" not in key or not self.sizes.get(name):
+            return found
+        content = found.to_bytes()
+        if name == COMPLETE:  # marks are as they are
+            if len(content) != self.sizes[name]:
+                raise UnreadableFile(str(self.root / key), "it is damaged, a mark has another size")
+            return found
+        unpacked, packed = (int.from_bytes(content[at : at + 4], "little") for at in (4, 12))
+        if len(content) < _HEAD or unpacked != self.sizes[name] or packed + 4 != len(content):
+            raise UnreadableFile(str(self.root / key), "it is damaged, its sizes are not those of its array")
+        return found
+
+    async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
+        self._look(key)
+        if prototype is None:  # older versions of Zarr have no default
+            from zarr.core.buffer import default_buffer_prototype
+
+            prototype = default_buffer_prototype()
+        found = await super().get(key, prototype, byte_range)
+        return self._sound(key, found) if byte_range is None else found
+
+    def get_sync(self, key: str, *, prototype: Any = None, byte_range: Any = None) -> Any:
+        self._look(key)
+        found = super().get_sync(key, prototype=prototype, byte_range=byte_range)
+        return self._sound(key, found) if byte_range is None else found
+
+    async def get_partial_values(self, prototype: Any, key_ranges: Any) -> Any:
+        wanted = list(key_ranges)
+        for key, _ in wanted:
+            self._look(key)
+        return await super().get_partial_values(prototype, wanted)
+
+    async def exists(self, key: str) -> bool:
+        self._look(key)
+        return bool(await super().exists(key))
+
+    async def set(self, key: str, value: Any) -> None:
+        inside(self.root, key)
+        await super().set(key, value)
+
+    def set_sync(self, key: str, value: Any) -> None:
+        inside(self.root, key)
+        super().set_sync(key, value)
+
+    async def set_if_not_exists(self, key: str, value: Any) -> None:
+        inside(self.root, key)
+        await super().set_if_not_exists(key, value)
+
+    async def delete(self, key: str) -> None:
+        inside(self.root, key)
+        await super().delete(key)
+
+    def delete_sync(self, key: str) -> None:
+        inside(self.root, key)
+        super().delete_sync(key)

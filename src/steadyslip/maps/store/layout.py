@@ -1,0 +1,310 @@
+"""How a map is laid out on disk: its metadata, declared and sealed when it is made, compared with that when opened.
+
+Zarr format 3 only; element types and codecs are those listed here, so that nothing that is read can be more than
+numbers. The group's metadata hold those of all arrays, and a checksum of themselves.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.files.inputs import read_bytes
+from steadyslip.files.sealed import fingerprint
+from steadyslip.files.specifications import rig_to_text
+from steadyslip.files.tables import fits_form
+from steadyslip.maps.plan.axes import COMPLETE, MOST_POINTS, SAMPLE, Generated
+from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
+
+FORMAT = 2
+METADATA = 2**26  # bytes
+MOST_CHUNK = 2**30  # bytes of a chunk of one array
+MOST_EXTRA = 1000  # values of a result at one point
+_VERSIONS = ("numpy", "scipy", "numba", "zarr")
+_TEXTS = ("title", "rig", "definition", "dims", "results", "steadyslip", "versions", "coordinates", "seal")
+_ARRAY = {"shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes",
+          "dimension_names", "zarr_format", "node_type", "storage_transformers"}  # fmt: skip
+_TYPES = {"float64": "NaN", "int8": -1}  # with what they hold where nothing is computed
+_PACKED, _PLAIN = ("bytes", "blosc", "crc32c"), ("bytes",)
+
+
+class LayoutError(ValueError):
+    """Metadata are not those of a map."""
+
+
+@dataclass(frozen=True)
+class Array:
+    """What the metadata say of one array."""
+
+    dtype: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    chunks: tuple[int, ...]
+    attributes: dict[str, Any]
+
+    @property
+    def unpacked(self) -> int:
+        """Bytes of a chunk."""
+        return math.prod(self.chunks) * np.dtype(self.dtype).itemsize
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the metadata of a map say.
+
+    Attributes
+    ----------
+    definition, versions : dict
+    version, title, rig_text : str
+    dims, results, sampled, generated : tuple of str
+        Dimensions, results, parameters along the sample dimension, and those of them written chunk by chunk.
+    shape, chunks, grid : tuple of int
+    arrays : dict of str to Array
+    """
+
+    definition: dict[str, Any]
+    versions: dict[str, str]
+    version: str
+    title: str
+    rig_text: str
+    dims: tuple[str, ...]
+    results: tuple[str, ...]
+    sampled: tuple[str, ...]
+    generated: tuple[str, ...]
+    shape: tuple[int, ...]
+    chunks: tuple[int, ...]
+    grid: tuple[int, ...]
+    arrays: dict[str, Array]
+
+
+# -- reading
+
+
+def read_layout(path: Path) -> Layout:
+    """The layout of the map in a folder.
+
+    Raises
+    ------
+    NotAvailable
+        If there is none, or something about it is not as this program writes it.
+    """
+    try:
+        return _layout(json.loads(read_bytes(path / "zarr.json", METADATA, links=False)))
+    except (NotAvailable, ValueError, RecursionError) as error:
+        reason = str(error) if isinstance(error, (LayoutError, NotAvailable)) else "zarr.json is not JSON"
+        raise NotAvailable(
+            f"{str(path)!r} exists and is not a map of this program, or its zarr.json is damaged ({reason}); give "
+            "another name, or move it away"
+        ) from error
+
+
+def _layout(document: Any) -> Layout:
+    _demand(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
+                                 "node_type": str}), "it is no Zarr group of format 3")  # fmt: skip
+    _demand((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
+    attributes = document["attributes"]
+    _demand("steadyslip_map" in attributes, "it has no steadyslip_map")
+    version = attributes["steadyslip_map"]
+    _demand(version == FORMAT, f"its layout has version {version!r:.20}, and this program reads version {FORMAT}")
+    _demand(fits_form(attributes, {"steadyslip_map": int} | dict.fromkeys(_TEXTS, str)), "its attributes are others")
+    _demand(_seal(document) == attributes["seal"], "it was changed since it was written")
+    definition = _json(attributes, "definition", {"rig": dict, "compute": dict, "over": {str: dict}, "samples": dict})
+    dims, results = (tuple(_json(attributes, name, [str])) for name in ("dims", "results"))
+    samples = definition["samples"]
+    over = samples.get("over", {})
+    _demand(isinstance(over, dict) and all(isinstance(one, dict) for one in over.values()), "samples have no over")
+    sampled = tuple(over)
+    _demand(dims == (*definition["over"], *([SAMPLE] if samples else [])) and dims, "dims are not those defined")
+    sizes = [one.get("points", one.get("values")) for one in definition["over"].values()]
+    sizes += [samples.get("points")] if samples else []
+    _demand(fits_form(sizes, [int]) and all(n > 0 for n in sizes), "the definition has no numbers of points")
+    stored = document["consolidated_metadata"].get("metadata")
+    _demand(isinstance(stored, dict), "the metadata of its arrays are missing")
+    varied = (*definition["over"], *sampled)
+    names = (*varied, *results, COMPLETE)
+    _demand(len(set(names)) == len(names) and set(stored) == set(names), "its arrays are not those of its definition")
+    arrays = {name: _array(name, stored[name], _PLAIN if name == COMPLETE else _PACKED) for name in names}
+    grid, chunks = arrays[COMPLETE].shape, arrays[results[0]].chunks[: len(dims)] if results else ()
+    found = Layout(
+        definition, _json(attributes, "versions", {str: str}), attributes["steadyslip"], attributes["title"],
+        attributes["rig"], dims, results, sampled, sampled if "method" in samples else (), tuple(sizes), chunks, grid,
+        arrays,
+    )  # fmt: skip
+    _check_arrays(found)
+    return found
+
+
+def _demand(condition: object, message: str) -> None:
+    if not condition:
+        raise LayoutError(message)
+
+
+def _json(attributes: dict[str, Any], name: str, form: Any) -> Any:
+    found = json.loads(attributes[name])
+    _demand(fits_form(found, form), f"{name} has another form")
+    return found
+
+
+def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> Array:
+    def demand(condition: object, what: str) -> None:
+        _demand(condition, f"{name!r:.60}: {what}")
+
+    demand(name not in ("", ".", "..", "zarr.json") and not {"/", "\0"} & set(name), "is no name of an array")
+    demand(isinstance(stored, dict) and set(stored) == _ARRAY, "its metadata are others")
+    demand((stored["zarr_format"], stored["node_type"], stored["storage_transformers"]) == (3, "array", []), "format")
+    dtype = stored["data_type"]
+    expected = {"uint64": 0} if codecs == _PLAIN else _TYPES
+    demand(isinstance(dtype, str) and dtype in expected and stored["fill_value"] == expected[dtype], "element type")
+    kinds = [one.get("name") if isinstance(one, dict) else None for one in _listed(stored["codecs"])]
+    demand(tuple(kinds) == codecs, f"codecs are {kinds!r:.60}, allowed: {', '.join(codecs)}")
+    options = [one.get("configuration", {}) for one in stored["codecs"]]
+    demand(fits_form(options, [dict]) and options[0].get("endian", "little") == "little", "options of codecs")
+    demand(len(options) == 1 or options[1].get("cname") == "zstd", "options of codecs")
+    keys = {"name": "default", "configuration": {"separator": "/"}}
+    demand(stored["chunk_key_encoding"] == keys, "names of chunks")
+    parts = stored["chunk_grid"]
+    demand(fits_form(parts, {"name": str, "configuration": {"chunk_shape": [int]}}), "chunks")
+    dims, shape, chunks = stored["dimension_names"], stored["shape"], parts["configuration"]["chunk_shape"]
+    demand(parts["name"] == "regular" and fits_form(dims, [str]) and fits_form(shape, [int]), "shape")
+    demand(len(dims) == len(shape) == len(chunks) <= 32, "shape")
+    demand(all(c > 0 and n > 0 for n, c in zip(shape, chunks, strict=True)), f"has shape {shape} in chunks of {chunks}")
+    attributes = stored["attributes"]
+    demand(isinstance(attributes, dict) and isinstance(attributes.get("units"), str), "has no units")
+    demand(isinstance(attributes.get("long_name"), str), "has no long_name")
+    words = attributes.get("flag_meanings")
+    demand((dtype == "int8") == isinstance(words, str), "words for its numbers")
+    return Array(dtype, tuple(dims), tuple(shape), tuple(chunks), attributes)
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _check_arrays(layout: Layout) -> None:
+    """Shapes follow from the definition, and none is larger than a map can be."""
+    rank = len(layout.dims)
+    _demand(layout.results, "it has no results")
+    _demand(math.prod(layout.shape) <= MOST_POINTS, f"it has more than {MOST_POINTS:.0e} points")
+    grid = tuple(-(-n // c) for n, c in zip(layout.shape, layout.chunks, strict=True))
+    _demand(layout.grid == grid and layout.arrays[COMPLETE].chunks == (1,) * rank, "its marks are not one for a chunk")
+    _demand(math.prod(grid) <= MOST_CHUNKS, f"it has {math.prod(grid)} chunks, allowed are {MOST_CHUNKS}")
+    for name in layout.results:
+        one = layout.arrays[name]
+        extra = one.shape[rank:]
+        same = one.dims[:rank] == layout.dims and one.shape[:rank] == layout.shape and one.chunks[rank:] == extra
+        _demand(same and one.chunks[:rank] == layout.chunks, f"{name!r:.60} has shape {one.shape} in {one.chunks}")
+        _demand(math.prod(extra) <= MOST_EXTRA and one.unpacked <= MOST_CHUNK, f"a chunk of {name!r:.60} is too large")
+    for name in (*layout.dims[: rank - bool(layout.sampled)], *layout.sampled):
+        one, dim = layout.arrays[name], SAMPLE if name in layout.sampled else name
+        size = layout.shape[layout.dims.index(dim)]
+        part = layout.chunks[-1] if name in layout.generated else size
+        _demand((one.dtype, one.dims, one.shape, one.chunks) == ("float64", (dim,), (size,), (part,)),
+                f"{name!r:.60} has shape {one.shape} over {one.dims}")  # fmt: skip
+        _demand(name in layout.generated or size <= MOST_AXIS, f"{name!r:.60} has more than {MOST_AXIS} values")
+
+
+def _seal(document: dict[str, Any]) -> str:
+    attributes = {name: value for name, value in document["attributes"].items() if name != "seal"}
+    return fingerprint(document | {"attributes": attributes})
+
+
+# -- writing
+
+
+def lay_out(path: Path, plan: Map) -> None:
+    """Make all arrays of a map in an empty folder, and the coordinates."""
+    import zarr
+    from zarr.codecs import BloscCodec, BytesCodec, Crc32cCodec
+
+    from steadyslip import __version__
+
+    try:
+        rig = rig_to_text(plan.rig, plan.protocol)
+    except ParameterError:
+        rig = ""
+    outputs = plan.outputs()
+    group = zarr.create_group(str(path), zarr_format=3)
+    group.attrs.update(
+        {
+            "steadyslip_map": FORMAT,
+            "title": str(plan),
+            "rig": rig,
+            "definition": json.dumps(plan.definition()),
+            "dims": json.dumps(plan.dims),
+            "results": json.dumps([output.name for output in outputs]),
+            "steadyslip": __version__,
+            "versions": json.dumps(versions()),
+            "coordinates": " ".join(plan.sampling.names) if plan.sampling else "",
+        }
+    )
+
+    def array(name: str, dims: Any, shape: Any, chunks: Any, dtype: str, fill: Any, **attributes: Any) -> Any:
+        wide = np.dtype(dtype).itemsize > 1
+        packed = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle" if wide else "noshuffle")
+        return group.create_array(
+            name, shape=tuple(shape), chunks=tuple(chunks), dtype=dtype, fill_value=fill, dimension_names=tuple(dims),
+            compressors=(packed, Crc32cCodec()), serializer=BytesCodec() if wide else "auto", attributes=attributes,
+        )  # fmt: skip
+
+    known = roles(plan)
+    given = coordinates(plan)
+    for name in plan.varied:
+        n = len(given[name]) if name in given else plan.shape[-1]
+        part = n if name in given else plan.chunks[-1]
+        dim = name if name in plan.dims else SAMPLE
+        made = array(name, [dim], [n], [part], "float64", np.nan, units=known[name].unit, long_name=known[name].doc)
+        if name in given:
+            made[:] = given[name]
+    for output in outputs:
+        sizes = [size for _, size in output.extra]
+        attributes: dict[str, Any] = {"units": output.unit, "long_name": output.meaning}
+        if output.flags:
+            attributes["flag_values"] = list(range(-1, len(output.flags)))
+            attributes["flag_meanings"] = " ".join(word.replace(" ", "_") for word in ("not computed", *output.flags))
+        array(
+            output.name, [*plan.dims, *(dim for dim, _ in output.extra)], [*plan.shape, *sizes],
+            [*plan.chunks, *sizes], output.dtype, output.fill, **attributes,
+        )  # fmt: skip
+    grid = [-(-n // c) for n, c in zip(plan.shape, plan.chunks, strict=True)]
+    group.create_array(
+        COMPLETE, shape=tuple(grid), chunks=(1,) * len(grid), dtype="uint64", fill_value=0, compressors=None,
+        dimension_names=[f"{dim}_chunk" for dim in plan.dims],
+        attributes={"units": "1", "long_name": "checksum of each finished chunk, 0 until then"},
+    )  # fmt: skip
+    with warnings.catch_warnings():  # readers list nothing then; the specification is on its way
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(str(path))
+    _seal_file(path / "zarr.json")
+    for file in path.rglob("*"):
+        if file.is_file():  # nothing recalculates these
+            with open(file, "rb") as written:
+                os.fsync(written.fileno())
+
+
+def _seal_file(file: Path) -> None:
+    document = json.loads(file.read_bytes())
+    document["attributes"]["seal"] = _seal(document)
+    file.write_text(json.dumps(document, indent=2), encoding="utf-8")
+
+
+def coordinates(plan: Map) -> dict[str, np.ndarray]:
+    """Parameters whose values are written when the store is made."""
+    found = {axis.name: axis.values for axis in plan.axes}
+    if plan.sampling and not isinstance(plan.sampling, Generated):
+        found |= plan.sampling.part(0, plan.sampling.points)
+    return found
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that numbers depend on."""
+    from importlib.metadata import version
+
+    return {name: version(name) for name in _VERSIONS}

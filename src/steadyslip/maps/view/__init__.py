@@ -1,0 +1,1 @@
+"""What is seen of a map: its result, cuts through it, other files of it."""

@@ -1,0 +1,233 @@
+"""The part of a map that fits into a picture: one or two parameters vary, others are held, samples are summed up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import (
+    NotAvailable,
+    ParameterError,
+    Problem,
+    SteadyslipError,
+    UnknownNameError,
+    unknown_name,
+)
+from steadyslip.core.quantities import parse
+from steadyslip.core.records import resolve
+from steadyslip.core.results import ReadOnly
+from steadyslip.linear.status import STABLE
+from steadyslip.maps.plan.axes import SAMPLE
+from steadyslip.maps.view.result import MapResult
+
+Array = np.ndarray
+MOST = 500  # points along an axis: more than a picture shows
+MOST_IN_ALL = 2 * 10**7  # values read, samples included
+MOST_SCATTERED = 5000
+BAND = (0.025, 0.5, 0.975)
+FAILING = ("safety_factor", "margin")
+"""Results that a sample lacks because it is stable at every stiffness, or has failed: at none, or no steady sliding."""
+
+
+@dataclass(frozen=True, eq=False)
+class View(ReadOnly):
+    """Numbers of a picture, in SI units.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters on the axes, x first.
+    places : tuple of ndarray
+        Their values: of a grid, or of scattered points one by one.
+    values : dict of str to ndarray
+        Results, (nx,), (ny, nx), or (m,) if scattered, with further dimensions of the result behind; medians of
+        samples.
+    bands : dict of str to ndarray
+        Quantiles of samples at 2.5, 50 and 97.5 %, first axis; empty without samples. For the results in `FAILING`
+        samples without a value count as failures, below all others; for other results they are left out.
+    missing : dict of str to ndarray
+        Share of the samples without a value, for the results in `bands`.
+    shares : dict of str to ndarray
+        For results that are kinds: share of the samples of each kind, first axis; empty without samples.
+    held : dict of str to float
+        Other parameters and the values at which they are held.
+    scattered : bool
+    """
+
+    names: tuple[str, ...]
+    places: tuple[Array, ...] = field(repr=False)
+    values: dict[str, Array] = field(repr=False)
+    bands: dict[str, Array] = field(repr=False)
+    shares: dict[str, Array] = field(repr=False)
+    held: dict[str, float]
+    scattered: bool
+    missing: dict[str, Array] = field(default_factory=dict, repr=False)
+
+
+def axes_of(found: MapResult, x: str | None, y: str | None, facet: str | None = None) -> tuple[str, ...]:
+    """Full names of the parameters on the axes; the first ones of the map unless given, and not that of the facets.
+
+    Raises
+    ------
+    ParameterError
+        If a name is not one of those that vary.
+    """
+    own = [dim for dim in found.dims if dim not in (SAMPLE, facet) and found.shape[found.dims.index(dim)] > 1]
+    problems, given = [], []
+    for place, name in (("x", x), ("y", y)):
+        if name is None:
+            continue
+        try:
+            given.append(resolve(name, dict.fromkeys(found.parameters)))
+        except UnknownNameError:
+            problems.append(Problem(place, unknown_name("parameter", name, found.parameters)))
+    if len(set(given)) < len(given):
+        problems.append(Problem("y", f"got {y!r} on both axes; give another one"))
+    if problems:
+        raise ParameterError(problems)
+    names = given or own[:2] or list(found.parameters)[:1]
+    if x is None and y is not None:
+        names = [next(n for n in (*own, *found.parameters) if n != given[0]), given[0]]
+    if y is None and x is not None:
+        names = [given[0], *[n for n in own if n != given[0]][:1]] if given[0] in own else given
+    sampled = [n not in found.dims for n in names]
+    if any(sampled) and not all(sampled):
+        raise ParameterError([Problem("y", "one parameter is sampled and the other on a grid; choose two of one kind")])
+    return tuple(names)
+
+
+def take(found: MapResult, names: Sequence[str], results: Sequence[str], at: Mapping[str, Any] | None = None) -> View:
+    """Read a view.
+
+    Parameters
+    ----------
+    found : MapResult
+    names : sequence of str
+        Full names of one or two parameters.
+    results : sequence of str
+    at : mapping of str to float or str, optional
+        Where to hold other parameters; nearest to the rig's own values unless given.
+
+    Raises
+    ------
+    ParameterError
+        If a name or value is wrong.
+    """
+    with _damage_told(found):
+        return _taken(found, found.dataset, names, results, at or {})
+
+
+@contextmanager
+def _damage_told(found: MapResult) -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, RuntimeError) as error:
+        if isinstance(error, SteadyslipError):
+            raise
+        raise found.store.damage("results", error) from error
+
+
+def _taken(found: MapResult, data: Any, names: Sequence[str], results: Sequence[str], at: Mapping[str, Any]) -> View:
+    held, place = _held(found, data, names, at)
+    scattered = names[0] not in found.dims
+    steps: dict[str, slice] = {}
+    free = [n for n in names if n in found.dims]
+    for name in free:
+        steps[name] = slice(None, None, -(-data.sizes[name] // MOST))
+    if SAMPLE in found.dims:
+        others = int(np.prod([len(range(data.sizes[n])[steps[n]]) for n in free], dtype=int))
+        most = MOST_SCATTERED if scattered else max(100, MOST_IN_ALL // max(others, 1))
+        steps[SAMPLE] = slice(None, None, -(-data.sizes[SAMPLE] // most))
+    with_status = ["status"] if "status" in data and "status" not in results else []
+    part = data[[*results, *with_status, *(n for n in names if scattered)]].isel(place | steps)
+    places = tuple(np.asarray(part[name].values) for name in names)
+    values, bands, shares, missing = {}, {}, {}, {}
+    for result in results:
+        order = [*(names[::-1] if not scattered else ()), *((SAMPLE,) if SAMPLE in found.dims else ())]
+        numbers = np.asarray(part[result].transpose(*order, ...).values)
+        if SAMPLE not in found.dims or scattered:
+            values[result] = numbers
+            continue
+        axis = len(order) - 1
+        words = found.words(result)
+        if words:
+            known = np.sum(numbers >= 0, axis=axis)
+            counts = np.stack([np.sum(numbers == code, axis=axis) for code in range(len(words))])
+            with np.errstate(invalid="ignore"):  # NaN where nothing is computed yet
+                shares[result] = counts / known
+            values[result] = np.where(known > 0, np.argmax(counts, axis=0), -1)
+        else:
+            absent = np.mean(~np.isfinite(numbers), axis=axis)
+            if result in FAILING:
+                numbers, absent = _with_failures(numbers, _always(found, part, order), result)
+            bands[result] = _quantiles(numbers, axis)
+            values[result] = np.where(np.isinf(bands[result][1]), np.nan, bands[result][1])
+            missing[result] = absent
+    return View(tuple(names), places, values, bands, shares, held, scattered, missing)
+
+
+def _always(found: MapResult, part: Any, order: Sequence[str]) -> Array | None:
+    """Where samples are stable; None where the map does not tell."""
+    if "status" not in part:
+        return None
+    stable: Array = np.asarray(part["status"].transpose(*order).values) == STABLE
+    return stable
+
+
+def _with_failures(numbers: Array, stable: Array | None, result: str) -> tuple[Array, Array]:
+    """Samples without a value made comparable: failures below all others, stable ones without an edge above."""
+    none = ~np.isfinite(numbers)
+    always = np.zeros_like(none) if stable is None else none & stable
+    failed = none & ~always
+    least = -np.inf if result == "margin" else 0.0  # margin is the logarithm of the safety factor
+    return np.where(always, np.inf, np.where(failed, least, numbers)), np.mean(failed, axis=-1)
+
+
+def _quantiles(numbers: Array, axis: int) -> Array:
+    """Of what exists, infinite values included; NaN where nothing does."""
+    empty = np.all(np.isnan(numbers), axis=axis, keepdims=True)
+    # where some are infinite, one of the samples: there is nothing between a number and infinity
+    method: Any = "closest_observation" if np.isinf(numbers).any() else "linear"
+    found = np.nanquantile(np.where(empty, 0.0, numbers), BAND, axis=axis, method=method)
+    return np.asarray(np.where(np.squeeze(empty, axis), np.nan, found))
+
+
+def _held(
+    found: MapResult, data: Any, names: Sequence[str], at: Mapping[str, Any]
+) -> tuple[dict[str, float], dict[str, int]]:
+    """Values and positions along the dimensions that are not shown."""
+    others = [dim for dim in found.dims if dim not in (*names, SAMPLE)]
+    known, problems, wanted = dict.fromkeys(others), [], {}
+    if not isinstance(at, Mapping):
+        raise ParameterError([Problem("at", f"got {at!r}; allowed: names of parameters and values")])
+    for name, value in at.items():
+        try:
+            full = resolve(name, known)
+            wanted[full] = parse(value, found.unit(full)) if isinstance(value, str) else float(value)
+        except UnknownNameError:
+            problems.append(Problem("at", unknown_name("parameter", name, others)))
+        except (ValueError, TypeError) as error:
+            problems.append(Problem(f"at.{name}", str(error)))
+    if problems:
+        raise ParameterError(problems)
+    held, place = {}, {}
+    for dim in others:
+        values = np.asarray(data[dim].values)
+        value = wanted.get(dim, own_value(found, dim))
+        target = values[len(values) // 2] if value is None else value
+        place[dim] = int(np.argmin(np.abs(values - target)))
+        held[dim] = float(values[place[dim]])
+    return held, place
+
+
+def own_value(found: MapResult, name: str) -> float | None:
+    """The base rig's own value of a parameter; None if it is unknown."""
+    try:
+        rig = found.rig
+        return rig.value(name)
+    except (NotAvailable, ParameterError, UnknownNameError):
+        return None

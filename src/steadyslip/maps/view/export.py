@@ -1,0 +1,128 @@
+"""A map as one netCDF or Parquet file, written chunk by chunk so that memory stays small."""
+
+from __future__ import annotations
+
+import itertools
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.files.output import whole_file
+from steadyslip.maps.store.arrays import Store
+
+if TYPE_CHECKING:
+    from steadyslip.maps.view.result import MapResult
+
+FROM_STORE = ("title", "rig", "definition", "steadyslip", "versions")
+
+
+def to_netcdf(found: MapResult, path: str | PathLike[str]) -> None:
+    """Write netCDF-4 with the map's dimensions, coordinates, units, rig and versions."""
+    import netCDF4
+
+    store = found.store
+
+    with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
+        for name in FROM_STORE:
+            file.setncattr(name, str(store.group.attrs[name]))
+        file.setncattr("finished_chunks", f"{store.marked()} of {store.count}")
+        for dim, size in zip(store.dims, store.shape, strict=True):
+            file.createDimension(dim, size)
+        for name in store.coordinates:
+            variable = _variable(file, store, name)
+            variable[:] = found.read(name)
+        for name in store.results:
+            _variable(file, store, name)
+        for number in range(store.count):
+            region = store.region(number)
+            for name in store.results:
+                file[name][region] = found.read(name, region)
+
+
+def _variable(file: Any, store: Store, name: str) -> Any:
+    array = store.array(name)
+    dims = tuple(array.metadata.dimension_names)
+    for dim, size in zip(dims, array.shape, strict=True):
+        if dim not in file.dimensions:
+            file.createDimension(dim, size)
+    options = {"zlib": True, "complevel": 1} if array.ndim == len(array.chunks) and array.size > 1 else {}
+    variable = file.createVariable(
+        name,
+        np.dtype(array.dtype).newbyteorder("="),
+        dims,
+        fill_value=array.fill_value,
+        chunksizes=_within(array.chunks),
+        **options,
+    )
+    for key, value in array.attrs.items():
+        variable.setncattr(key, np.array(value, dtype=np.int8) if key == "flag_values" else value)
+    return variable
+
+
+def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
+    """Chunks of a size that readers of netCDF cope with."""
+    found: list[int] = []
+    for size in reversed(chunks):
+        found.append(max(1, min(size, most)))
+        most //= found[-1]
+    return tuple(reversed(found))
+
+
+def to_parquet(found: MapResult, path: str | PathLike[str]) -> None:
+    """Write one row for each point, parameters first; words for what is one of several kinds.
+
+    Raises
+    ------
+    NotAvailable
+        If pyarrow is not installed, or the file cannot be written.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise NotAvailable("Parquet files need pyarrow; install it with pip install 'steadyslip[lab]'") from error
+    store = found.store
+    notes = {name: str(store.group.attrs[name]) for name in FROM_STORE}
+    writer = None
+    with whole_file(path) as temporary:
+        try:
+            for number in range(store.count):
+                table = _rows(found, number, pa, notes)
+                writer = writer or pq.ParquetWriter(temporary, table.schema, compression="zstd")
+                writer.write_table(table)
+        finally:
+            if writer is not None:
+                writer.close()
+
+
+def _rows(found: MapResult, number: int, pa: Any, notes: dict[str, str]) -> Any:
+    store = found.store
+    region = store.region(number)
+    shape = tuple(part.stop - part.start for part in region)
+    names, columns, units = [], [], []
+
+    def add(name: str, column: Any, unit: str) -> None:
+        names.append(name)
+        columns.append(column)
+        units.append(unit)
+
+    for name, column in store.parameters(region, generated=True).items():
+        add(name, pa.array(np.broadcast_to(column, shape).reshape(-1)), str(store.array(name).attrs["units"]))
+    for name in store.results:
+        array: Any = store.array(name)
+        values: Any = found.read(name, region).reshape(*[int(np.prod(shape))], *array.shape[len(shape) :])
+        unit = str(array.attrs["units"])
+        if "flag_meanings" in array.attrs:
+            words = [word.replace("_", " ") for word in str(array.attrs["flag_meanings"]).split()]
+            indices = pa.array(values.astype(np.int8) + 1)
+            add(name, pa.DictionaryArray.from_arrays(indices, pa.array(words)), unit)
+            continue
+        for place in itertools.product(*(range(n) for n in array.shape[len(shape) :])):
+            add("_".join([name, *(str(i + 1) for i in place)]), pa.array(values[(slice(None), *place)]), unit)
+    fields = [
+        pa.field(name, column.type, metadata={"units": unit})
+        for name, column, unit in zip(names, columns, units, strict=True)
+    ]
+    return pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=notes))

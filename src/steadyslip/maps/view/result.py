@@ -1,0 +1,247 @@
+"""A map that is computed, or partly so: its numbers, what they say in short, files and pictures of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown, shown_range
+from steadyslip.machine.slider import Slider
+from steadyslip.maps.store.arrays import Store
+from steadyslip.maps.view import export
+
+BLOCK = 2**22  # points read at a time
+
+
+class MapResult:
+    """A map on disk.
+
+    Opening it reads no results; `dataset` reads what is asked of it. A map that is still being computed can be opened
+    as well, and shows what is finished.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    @property
+    def path(self) -> Path:
+        return self._store.path
+
+    @property
+    def store(self) -> Store:
+        """How it lies on disk."""
+        return self._store
+
+    @property
+    def rig(self) -> Slider:
+        """The base rig; NotAvailable if it has a law that no file can refer to."""
+        return self._store.rig()
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions: parameters, and ``sample`` for those that vary together."""
+        return self._store.dims
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self._store.shape
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return int(np.prod(self.shape, dtype=int))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Parameters that vary, by full name."""
+        return self._store.coordinates
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """Names of the arrays computed."""
+        return self._store.results
+
+    @property
+    def finished(self) -> tuple[int, int]:
+        """Number of chunks that are done, and of all."""
+        return self._store.marked(), self._store.count
+
+    @property
+    def complete(self) -> bool:
+        """Whether every chunk is done."""
+        done, count = self.finished
+        return done == count
+
+    def damaged(self) -> list[int]:
+        """Chunks whose files are not those that were written; `run_map` computes them again."""
+        return self._store.damaged()
+
+    @property
+    def dataset(self) -> Any:
+        """An xarray.Dataset that reads from disk what is used of it; units are in the attributes."""
+        import xarray as xr
+
+        try:
+            return xr.open_zarr(
+                self._store.folder.with_read_only(True),
+                chunks=None,
+                consolidated=True,
+                decode_times=False,
+                mask_and_scale=False,
+            )
+        except (ValueError, RuntimeError, OSError) as error:  # coordinates are read at once
+            raise self._store.damage("coordinates", error) from error
+
+    def words(self, name: str) -> tuple[str, ...]:
+        """What the numbers 0, 1, ... of an array of kinds stand for; empty for other arrays."""
+        meanings = str(self._store.layout.arrays[self._known(name)].attributes.get("flag_meanings", ""))
+        return tuple(word.replace("_", " ") for word in meanings.split()[1:])
+
+    def _known(self, name: str) -> str:
+        if name not in self.results:
+            raise ParameterError([Problem("show", unknown_name("result", name, self.results))])
+        return name
+
+    def unit(self, name: str) -> str:
+        """SI unit of a result or parameter."""
+        if name not in (*self.results, *self.parameters):
+            raise ParameterError([Problem("name", unknown_name("array", name, (*self.results, *self.parameters)))])
+        return str(self._store.layout.arrays[name].attributes["units"])
+
+    @property
+    def area(self) -> float | None:
+        """Contact area of the rig, m^2; None where it has none, or is not known any more."""
+        try:
+            return self.rig.area
+        except (NotAvailable, ParameterError):
+            return None
+
+    def statistics(self) -> dict[str, dict[str, float]]:
+        """What the finished chunks hold: shares of kinds; of numbers the least, the greatest and how many exist."""
+        store = self._store
+        pending = store.pending()
+        total = self.size - sum(store.points(number) for number in pending)
+        found: dict[str, dict[str, float]] = {}
+        for name in self.results if total else ():
+            words = self.words(name)
+            counts, low, high, exist = np.zeros(len(words) + 1), np.inf, -np.inf, 0
+            for values in self._blocks(name):
+                if words:
+                    counts += np.bincount(values.reshape(-1).astype(int) + 1, minlength=len(counts))
+                    continue
+                finite = np.isfinite(values)
+                exist += int(np.count_nonzero(finite.any(axis=tuple(range(len(self.dims), values.ndim)))))
+                low = min(low, float(np.min(values, initial=np.inf, where=finite)))
+                high = max(high, float(np.max(values, initial=-np.inf, where=finite)))
+            if words:
+                found[name] = {word: float(n / total) for word, n in zip(words, counts[1:], strict=True) if n}
+            else:
+                found[name] = {"share": exist / total} | ({"low": low, "high": high} if exist else {})
+        return found
+
+    def _blocks(self, name: str) -> Iterator[np.ndarray]:
+        """A result in pieces of many chunks; those of which nothing is computed are left out."""
+        store = self._store
+        marks = store.marks_of_grid() != 0
+        extra = int(np.prod(store.layout.arrays[name].shape[len(self.dims) :], dtype=int))
+        rest = [int(np.prod(self.shape[axis + 1 :], dtype=int)) * extra for axis in range(len(self.dims))]
+        axis = next(i for i, n in enumerate(rest) if n * store.chunks[i] <= BLOCK or i + 1 == len(rest))
+        several = max(1, BLOCK // (store.chunks[axis] * rest[axis]))  # chunks along that axis
+        for outer in np.argwhere(marks.any(axis=tuple(range(axis, marks.ndim)))):
+            before = tuple(slice(int(i) * c, (int(i) + 1) * c) for i, c in zip(outer, store.chunks, strict=False))
+            own = marks[tuple(outer)]
+            for start in range(0, own.shape[0], several):
+                if own[start : start + several].any():
+                    along = slice(start * store.chunks[axis], (start + several) * store.chunks[axis])
+                    yield self.read(name, (*before, along))
+
+    def read(self, name: str, region: Any = ...) -> np.ndarray:
+        """Values of a result or parameter.
+
+        Raises
+        ------
+        NotAvailable
+            If a file is damaged.
+        """
+        return self._store.read(name, region)
+
+    def __str__(self) -> str:
+        (done, count), area = self.finished, self.area
+        lines = [self._store.layout.title]
+        state = "complete" if done == count else f"{done} of {count} chunks; run it again for the rest"
+        lines.append(f"  {'in ' + str(self.path):<24}{state}")
+        for name, found in self.statistics().items():
+            if self.words(name):
+                text = ", ".join(f"{word} {_percent(share)}" for word, share in found.items())
+            elif "low" in found:
+                low, high, unit = found["low"], found["high"], self.unit(name)
+                text = shown_range(low, high, unit, area) if low < high else shown(low, unit, area=area)
+                text += "" if found["share"] == 1 else f", for {_percent(found['share'])} of the points"
+            else:
+                text = "nowhere"
+            lines.append(f"  {name:<24}{text}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        done, count = self.finished
+        return f"<MapResult: {self._store.layout.title}, {done} of {count} chunks>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units: what is computed, how far, and its statistics."""
+        done, count = self.finished
+        return {
+            "path": str(self.path),
+            "dims": dict(zip(self.dims, self.shape, strict=True)),
+            "parameters": {name: self.unit(name) for name in self.parameters},
+            "results": {name: self.unit(name) for name in self.results},
+            "chunks": {"finished": done, "all": count},
+            "statistics": self.statistics(),
+        }
+
+    def to_netcdf(self, path: str | PathLike[str]) -> None:
+        """Write one netCDF file; what is not computed yet is missing there.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        export.to_netcdf(self, path)
+
+    def to_parquet(self, path: str | PathLike[str]) -> None:
+        """Write one Parquet file with a row for each point.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written, or pyarrow is missing.
+        """
+        export.to_parquet(self, path)
+
+    def plot(self, x: str | None = None, y: str | None = None, show: str | None = None, **options: Any) -> Any:
+        """Draw it; see `steadyslip.figures.map_figure`."""
+        return draw(self, x=x, y=y, show=show, **options)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"
+
+
+def open_map(path: str | PathLike[str]) -> MapResult:
+    """Open a map that `run_map` made, finished or not.
+
+    Raises
+    ------
+    NotAvailable
+        If there is none.
+    """
+    target = Path(path)
+    if not target.exists():
+        raise NotAvailable(f"there is no map {str(path)!r}")
+    return MapResult(Store(target))

@@ -1,0 +1,117 @@
+"""Chunks on the cores of this machine: worker processes that may die without harm."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.maps.work.chunk import Done, Job, do_chunk, keep_memory
+
+PATIENCE = 8  # times that workers may die without a single chunk being finished in between
+WATCH = 0.5  # seconds between a worker's looks at whether its driver lives
+
+
+def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) -> None:
+    """All chunks, one after the other, in this process; Ctrl-C takes effect between them."""
+    with _interrupts_held() as interrupted:
+        for number in chunks:
+            done = do_chunk(job, number)
+            report(done)
+            if interrupted:
+                raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[list[int]]:
+    """Collect Ctrl-C instead of raising: a simulation that sees it would hand back half its runs."""
+    received: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
+    before = signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], workers: int) -> None:
+    """All chunks on a number of processes; `report` may raise to stop.
+
+    Raises
+    ------
+    NotAvailable
+        If workers die again and again.
+    """
+    left, deaths = list(chunks), 0
+    while left:
+        before = len(left)
+        try:
+            with _workers(min(workers, len(left))) as pool:
+                for done in _flow(pool, job, left):
+                    left.remove(done.number)
+                    report(done)
+        except BrokenProcessPool as error:
+            deaths = deaths + 1 if len(left) == before else 0
+            if deaths == PATIENCE:
+                message = (
+                    f"worker processes die on chunks {', '.join(map(str, sorted(left)[:workers]))}: killed, or out of "
+                    "memory. Finished chunks are kept; try fewer workers, or another map with a smaller chunk"
+                )
+                raise NotAvailable(message) from error
+
+
+def _flow(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
+    """Chunks as they are finished; no more are handed out than keep the workers busy."""
+    waiting = iter(list(chunks))
+    ahead: set[Future[Done]] = set()
+    while True:
+        while len(ahead) < 2 * pool._max_workers and (number := next(waiting, None)) is not None:
+            ahead.add(pool.submit(do_chunk, job, number))
+        if not ahead:
+            return
+        finished, ahead = wait(ahead, return_when=FIRST_COMPLETED)
+        broken = None
+        for future in finished:
+            if (error := future.exception()) is not None:
+                broken = error
+                continue
+            yield future.result()
+        if broken is not None:
+            raise broken
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[Any]:
+    """Processes that need no guard in the caller's script, and take functions typed at a prompt."""
+    from loky import ProcessPoolExecutor
+
+    pool = ProcessPoolExecutor(count, initializer=_prepared, initargs=(os.getpid(),))
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=True, kill_workers=True)
+        raise
+    pool.shutdown(wait=True)
+
+
+def _prepared(driver: int) -> None:
+    """Set up a worker. Ctrl-C is for the driver, which ends the workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keep_memory()
+    threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
+
+
+def _end_with(driver: int) -> None:
+    """End this worker soon after its driver was killed; it would wait for work forever."""
+    while os.getppid() == driver:
+        time.sleep(WATCH)
+    os._exit(1)

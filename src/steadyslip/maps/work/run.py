@@ -1,0 +1,145 @@
+"""Compute a map: lay out or open its store, and have the missing chunks done."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.progress import progress_bar
+from steadyslip.maps.plan.map import Map
+from steadyslip.maps.store.arrays import Store, check_path, open_or_create
+from steadyslip.maps.store.layout import versions
+from steadyslip.maps.view.result import MapResult
+from steadyslip.maps.work.chunk import Done, job_of
+from steadyslip.maps.work.cluster import run_cluster
+from steadyslip.maps.work.local import run_here, run_local
+from steadyslip.motion.engine import available_cores
+
+SHORT = 2.0  # seconds of work for which no processes are started
+
+
+def run_map(
+    plan: Map,
+    path: str | PathLike[str],
+    *,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: bool | None = None,
+) -> MapResult:
+    """Compute a map, or what is missing of it.
+
+    Every finished chunk is on disk with a mark. After Ctrl-C, a kill or a power failure the same call goes on;
+    chunks that are damaged are found and computed again.
+
+    Parameters
+    ----------
+    plan : Map
+    path : path
+        Folder ending in ``.zarr``, made if missing.
+    workers : int, optional
+        Processes; all cores unless given, and none besides this one where the work is too short for them.
+    cluster : str, optional
+        Compute on Dask: address of a scheduler such as ``tcp://host:8786``, or ``local`` for workers on this machine.
+        All of them must see `path`, and have this package.
+    progress : bool, optional
+        Whether to show a progress bar; on a terminal unless given.
+
+    Returns
+    -------
+    MapResult
+        After Ctrl-C, with part of the map missing.
+
+    Raises
+    ------
+    NotAvailable
+        If the path holds another map or something else, or cannot be written; if a chunk fails. What is finished is
+        kept.
+    ParameterError
+        If an argument is wrong.
+    """
+    target = Path(path)
+    _check(plan, workers, cluster)
+    check_path(target)
+    store = open_or_create(target, plan)
+    with store.held():
+        store.restore(plan)
+        _remark(store, plan)
+        for number in store.damaged():
+            store.forget(number)
+        missing = store.pending()
+        if missing:
+            _check_space(store, missing)
+            _compute(plan, store, missing, workers, cluster, progress)
+        if store.marked() == store.count:
+            store.tidy()
+    return MapResult(store)
+
+
+def _check(plan: Map, workers: int | None, cluster: str | None) -> None:
+    problems = []
+    if not isinstance(plan, Map):
+        problems.append(Problem("plan", f"got {plan!r}; allowed: a Map, such as read_map gives"))
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        problems.append(Problem("workers", f"got {workers!r}; allowed: a whole number >= 1"))
+    if cluster is not None and not (cluster == "local" or re.fullmatch(r"\w+://[^\s:/]+.*", str(cluster))):
+        problems.append(Problem("cluster", f"got {cluster!r}; allowed: 'local', or an address such as tcp://host:8786"))
+    if problems:
+        raise ParameterError(problems)
+
+
+def _remark(store: Store, plan: Map) -> None:
+    """Say what does not hinder, but should be known."""
+    then = store.versions
+    for name, now in versions().items():
+        if then.get(name) != now and store.marked() < store.count:
+            _note(f"{name} was {then.get(name)}, is {now}; last digits of new chunks may differ from those of old ones")
+    size = int(np.prod(store.chunks, dtype=int))
+    if plan.chunk is not None and plan.chunks != store.chunks:
+        _note(f"the map has chunks of {size} points already; they stay as they are")
+
+
+def _check_space(store: Store, missing: list[int]) -> None:
+    """Refuse to begin where not even one chunk would fit; how well a whole map packs is not known before."""
+    free = shutil.disk_usage(store.path).free
+    if free < 2**16:
+        raise NotAvailable(f"cannot write {str(store.path)!r}: the disk is full")
+
+
+def _compute(
+    plan: Map, store: Store, missing: list[int], workers: int | None, cluster: str | None, progress: bool | None
+) -> None:
+    job = job_of(plan, store.path)
+    count = min(workers or available_cores(), len(missing))
+    if workers is None and plan.seconds * plan.size < SHORT:
+        count = 1
+    finished = sum(store.points(n) for n in set(range(store.count)) - set(missing))
+    with progress_bar(plan.size, progress, "points", finished) as advanced:
+
+        def report(done: Done) -> None:
+            if done.problem:
+                left = len(store.pending())
+                kept = f"{store.count - left} of {store.count} chunks are finished and kept; the same command goes on"
+                raise NotAvailable(f"{done.problem}\n{kept}")
+            if advanced is not None:
+                advanced(done.points)
+
+        try:
+            if cluster is not None:
+                _note(f"computing on Dask, {cluster}")
+                run_cluster(job, store, missing, report, cluster, workers or available_cores(), _note)
+            elif count == 1:
+                run_here(job, missing, report)
+            else:
+                run_local(job, missing, report, count)
+        except KeyboardInterrupt:
+            pass
+
+
+def _note(text: str) -> None:
+    print(f"note: {text}", file=sys.stderr)

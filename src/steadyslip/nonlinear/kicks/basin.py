@@ -1,0 +1,144 @@
+"""From where in the phase plane motion returns to steady sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.pictures import draw
+from steadyslip.core.progress import progress_bar
+from steadyslip.core.results import ReadOnly
+from steadyslip.machine.slider import Slider
+from steadyslip.motion import History, simulate
+from steadyslip.motion.setup import prepare
+from steadyslip.nonlinear.kicks.kicks import options_for
+from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
+from steadyslip.nonlinear.kicks.outcomes import OUTCOMES, Runs, outcomes_of
+from steadyslip.nonlinear.kicks.rest import rest_of
+from steadyslip.nonlinear.orbits.branch import Cycle
+from steadyslip.nonlinear.orbits.cycles import cycles
+from steadyslip.steady import steady_states
+from steadyslip.values import model_values
+
+Array = np.ndarray
+POINTS = 81
+
+
+@dataclass(frozen=True, eq=False)
+class Basin(ReadOnly):
+    """What comes of every starting point on a grid.
+
+    Attributes
+    ----------
+    rig : Slider
+    x : ndarray (n,)
+        Slip ahead of the load point at the start, m.
+    v : ndarray (m,)
+        Velocity at the start, m/s.
+    outcome : ndarray of str (m, n)
+        ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``.
+    cycles : tuple of History
+        One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
+        the plane of a rig with two variables.
+    """
+
+    rig: Slider
+    x: Array = field(repr=False)
+    v: Array = field(repr=False)
+    outcome: Array = field(repr=False)
+    cycles: tuple[History, ...] = field(repr=False)
+
+    @property
+    def share(self) -> float:
+        """Share of the grid's points that return."""
+        return float(np.mean(self.outcome == "returns"))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the basin; see `steadyslip.figures.basin`."""
+        return draw(self, ax=ax)
+
+
+def basin(
+    rig: Slider,
+    x: Sequence[float] | None = None,
+    v: Sequence[float] | None = None,
+    *,
+    along: str = "stiffness",
+    rtol: float = 1e-8,
+    threads: int | None = None,
+    progress: bool | None = None,
+    branch: int = 0,
+) -> Basin:
+    """Start everywhere in the phase plane and see what returns to steady sliding.
+
+    Parameters
+    ----------
+    rig : Slider
+    x : array_like, optional
+        Slip ahead of the load point, m (negative: the spring is stretched); 81 values unless given, over the width
+        of what a displacement kick survives.
+    v : array_like, optional
+        Velocity, m/s; 81 values unless given, four decades to each side of the drive. Without mass, the first
+        memory variable follows from it; other memory variables start as in steady sliding.
+    along : str, optional
+        The parameter along which unstable cycles of this rig are looked for.
+    rtol, threads, progress, branch
+        As for `threshold_map`. After Ctrl-C, points that were not finished are ``interrupted``.
+
+    Returns
+    -------
+    Basin
+    """
+    steady_states(rig)  # raises, and says why
+    drive = rig.drive.velocity
+    options = options_for(model_values(rig, branch=branch).model.inertial, rtol)
+    own = prepare(rig, None, 1.0, {}, {}, options, branch)
+    rest = rest_of(own, np.full(1, drive), np.zeros(1))
+    length = float(rest.scales[0, own.reduction.names.index("x")])
+    x = length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
+    v = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else v  # type: ignore[assignment]
+    across, up = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, v))
+    if across.ndim != 1 or up.ndim != 1 or not (np.all(np.isfinite(across)) and np.all(np.isfinite(up))):
+        raise ParameterError([Problem("x, v", "allowed: one-dimensional arrays of finite numbers, m and m/s")])
+    width = np.broadcast_to(across, (len(up), len(across)))
+    height = np.broadcast_to(up[:, None], width.shape)
+    jobs = prepare(rig, None, 1.0, {}, {"x": width.ravel(), "v": height.ravel()}, options, branch)
+    count = width.size
+    near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
+    near.computed()
+    runs = Runs(replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every)
+    with progress_bar(count, progress) as advanced:
+        found = outcomes_of(runs, threads, advanced)
+    outcome = np.array(OUTCOMES)[found].reshape(width.shape)
+    return Basin(rig, across, up, outcome, _unstable_cycles(rig, along, branch))
+
+
+def _unstable_cycles(rig: Slider, along: str, branch: int) -> tuple[History, ...]:
+    """One period of each unstable cycle at the rig's own parameter; none where no branch can be followed."""
+    try:
+        found = cycles(rig, along, doublings=0, branch=branch)
+    except NotAvailable:
+        return ()
+    own = float(rig.parameters()[found.along].value)  # type: ignore[arg-type]
+    return tuple(orbit(rig, cycle) for cycle in found.at(own) if not cycle.stable)
+
+
+def orbit(rig: Slider, cycle: Cycle, periods: float = 1.0) -> History:
+    """A cycle as a history, for drawing: simulated from its start.
+
+    Parameters
+    ----------
+    rig : Slider
+        The rig that has this cycle (its parameter at ``cycle.value``).
+    cycle : Cycle
+    periods : float
+        How many; unstable cycles leave themselves after a few.
+    """
+    names = dict(cycle.start)
+    if rig.friction.memory() and not model_values(rig).model.inertial:
+        names.pop("v")  # follows from the memory
+    return simulate(rig, until=periods * cycle.period, initial=names, rtol=1e-10)

@@ -1,0 +1,201 @@
+"""Thresholds of many rigs at once, as a map over two parameters for instance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.progress import progress_bar
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.many import broadcast_arrays, regimes
+from steadyslip.nonlinear.kicks.kicks import Kicked
+from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.threshold import edges
+from steadyslip.protocol import Protocol
+
+Array = np.ndarray
+COARSE = 48  # sizes of the first scan of each rig
+WIDE = 0.1  # relative width of an undecided bracket beyond which its middle is no threshold
+BEYOND = (*OUTCOMES, "edge", "unstable", "no steady sliding")
+"""What limits the kicks of a rig: what comes of the smallest that fails, or another reason; `RETURNS`: none fails."""
+EDGE, UNSTABLE, ABSENT = range(len(OUTCOMES), len(OUTCOMES) + 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Brackets:
+    """Thresholds of many rigs, arrays of one shape.
+
+    Attributes
+    ----------
+    size : ndarray
+        As `threshold_map` gives it.
+    low, high : ndarray
+        Size up to which all kicks that were tried return, and smallest known not to.
+    beyond : ndarray of int
+        What limits, an index into `BEYOND`.
+    """
+
+    size: Array
+    low: Array
+    high: Array
+    beyond: Array
+
+
+def threshold_map(
+    rig: Slider,
+    vary: Mapping[str, Any],
+    kick: str = "velocity",
+    *,
+    direction: int = 1,
+    reference: str = "before",
+    precision: float = 1e-4,
+    rtol: float = 1e-8,
+    threads: int | None = None,
+    progress: bool | None = None,
+    branch: int = 0,
+) -> Any:
+    """Thresholds of many rigs, as a map over two parameters for instance.
+
+    Parameters
+    ----------
+    rig, kick, direction, reference, precision, rtol, branch
+        As for `threshold`.
+    vary : mapping of str to array_like or xarray.DataArray
+        Parameters by dotted name, SI units; arrays broadcast, DataArrays by dimension name.
+    threads : int, optional
+        All cores unless given.
+    progress : bool, optional
+        Whether to show a progress bar; on a terminal unless given.
+
+    Returns
+    -------
+    ndarray or xarray.DataArray
+        Sizes without unit, as in `Threshold`: 0 where steady sliding is unstable, inf where no kick in the
+        range fails, NaN where there is no steady sliding, and where kicks over more than a tenth of the size are
+        undecided (`Threshold` of a single rig says more). After Ctrl-C, NaN too where nothing is known yet, and the
+        middle of the bracket reached where something is.
+    """
+    found, dims, coords = threshold_brackets(
+        rig, vary, kick, direction=direction, reference=reference, precision=precision, rtol=rtol, threads=threads,
+        progress=progress, branch=branch,
+    )  # fmt: skip
+    if not dims:
+        return found.size if found.size.ndim else float(found.size)
+    import xarray as xr
+
+    return xr.DataArray(found.size, dims=dims, coords=coords, name=f"{kick}_threshold", attrs={"units": "1"})
+
+
+def threshold_brackets(
+    rig: Slider,
+    vary: Mapping[str, Any],
+    kick: str = "velocity",
+    *,
+    direction: int = 1,
+    reference: str = "before",
+    precision: float = 1e-4,
+    rtol: float = 1e-8,
+    threads: int | None = None,
+    progress: bool | None = None,
+    branch: int = 0,
+) -> tuple[Brackets, Any, Any]:
+    """`threshold_map` with brackets and reasons, as bare arrays; dimensions and coordinates of DataArrays beside."""
+    flat, _, shape, dims, coords = broadcast_arrays(rig, Protocol(), vary, {})
+    size = int(np.prod(shape, dtype=int))
+    columns = [np.full(size, np.nan) for _ in range(3)] + [np.full(size, INTERRUPTED)]
+    rounds = COARSE + int(np.ceil(np.log2(0.35 / precision)))
+    with progress_bar(size * rounds, progress) as advanced:
+        for group_rig, chosen, index in regimes(rig, flat, size):
+            part = {name: np.broadcast_to(np.asarray(a, dtype=float), (size,)) for name, a in chosen.items()}
+            part = {name: a if index is None else a[index] for name, a in part.items()}
+            kicked = Kicked(group_rig, kick, direction, reference, part, branch, rtol)
+            where = slice(None) if index is None else index
+            search = _Search(kicked, size if index is None else len(index), threads, advanced)
+            search.run(precision)
+            for column, own in zip(columns, search.result(), strict=True):
+                column[where] = own
+    return Brackets(*(column.reshape(shape) for column in columns)), dims, coords
+
+
+class _Search:
+    """Brackets of all rigs of one kind, narrowed together: first a scan of sizes, then bisection."""
+
+    def __init__(self, kicked: Kicked, count: int, threads: int | None, advanced: Any) -> None:
+        self.kicked, self.threads, self.advanced = kicked, threads, advanced
+        self.stable, self.exists = (np.broadcast_to(a, (count,)) for a in (kicked.stable, kicked.exists))
+        self.rig = np.arange(count) if kicked.size > 1 else np.zeros(count, dtype=int)
+        self.low, self.high = np.zeros(count), np.full(count, np.inf)
+        self.doubt = np.full((count, 2), np.nan)  # ends of what is undecided inside the bracket
+        self.beyond = np.where(self.exists, np.where(self.stable, INTERRUPTED, UNSTABLE), ABSENT)
+        self.whole = True
+
+    def run(self, precision: float) -> None:
+        """Narrow all brackets to a relative precision, or until Ctrl-C."""
+        kicked, alive = self.kicked, np.flatnonzero(self.stable)
+        sizes = np.geomspace(max(kicked.kick.low, kicked.highest * 1e-4), kicked.highest, COARSE)
+        edge = np.full(len(self.low), np.inf)
+        edge[alive] = edges(kicked, self.rig[alive], sizes)
+        going = alive
+        for size in sizes:  # rising sizes, for the rigs in which no smaller one has failed
+            over = size >= edge[going]
+            self.high[going[over]], self.beyond[going[over]] = edge[going[over]], EDGE
+            going = going[~over]
+            going = going[self._tried(going, np.full(len(going), size))]
+            if not len(going) or not self.whole:
+                break
+        if self.whole:
+            self.beyond[going] = np.where(np.isnan(self.doubt[going, 0]), RETURNS, UNDECIDED)
+        while self.whole:
+            point, wide = self._next(precision)
+            if not len(wide):
+                break
+            self._tried(wide, point)
+
+    def _next(self, precision: float) -> tuple[Array, Array]:
+        """Sizes to try next, of the rigs whose brackets are too wide: in the middle, or beside what is undecided."""
+        low, high, (left, right) = self.low, self.high, self.doubt.T
+        with np.errstate(invalid="ignore"):
+            clear = np.isnan(left)
+            enough = np.maximum(precision * high, np.where(clear, 0.0, 0.1 * (right - left)))
+            below = np.where(clear, high - low, left - low)
+            above = np.where(clear, 0.0, high - right)
+            wide = np.flatnonzero(np.isfinite(high) & (np.maximum(below, above) > enough))
+            beside = np.where(below >= above, 0.5 * (low + left), 0.5 * (right + high))
+            point = np.where(clear, 0.5 * (low + high), beside)
+        return point[wide], wide
+
+    def _tried(self, which: Array, sizes: Array) -> Array:
+        """Try kicks of rigs `which`, note what comes of them; whether each rig is still without one that fails."""
+        if not len(which):
+            return np.zeros(0, dtype=bool)
+        found = self.kicked.outcomes(self.rig[which], sizes, self.threads, self.advanced, effort=1.0)
+        self.whole = self.whole and not np.any(found == INTERRUPTED)
+        failed, back, doubtful = np.isin(found, CERTAIN), found == RETURNS, found == UNDECIDED
+        rig, size = which[failed], sizes[failed]
+        self.high[rig], self.beyond[rig] = size, found[failed]
+        self.doubt[rig[self.doubt[rig, 0] >= size]] = np.nan
+        self.doubt[rig, 1] = np.minimum(self.doubt[rig, 1], size)
+        rig, size = which[doubtful], sizes[doubtful]
+        self.doubt[rig, 0] = np.fmin(self.doubt[rig, 0], size)
+        self.doubt[rig, 1] = np.fmax(self.doubt[rig, 1], size)
+        rig, size = which[back], sizes[back]
+        beyond_doubt = self.doubt[rig, 0] < size
+        self.doubt[rig[beyond_doubt], 1] = np.fmax(self.doubt[rig[beyond_doubt], 1], size[beyond_doubt])
+        self.low[rig[~beyond_doubt]] = size[~beyond_doubt]
+        return np.asarray(~failed & (found != INTERRUPTED))
+
+    def result(self) -> tuple[Array, Array, Array, Array]:
+        """Size, low, high, beyond."""
+        with np.errstate(invalid="ignore"):
+            middle = np.where(self.beyond == EDGE, self.high, 0.5 * (self.low + self.high))
+            known = np.isfinite(self.high) & (~self.whole | (self.high - self.low <= WIDE * self.high))
+        size = np.where(known, middle, np.nan)
+        size = np.where(self.beyond == RETURNS, np.inf, size)
+        size = np.where(self.beyond == UNSTABLE, 0.0, size)
+        low, high = (np.where(self.beyond == ABSENT, np.nan, a) for a in (self.low, self.high))
+        high = np.where(self.beyond == UNSTABLE, 0.0, high)
+        low = np.where(self.beyond == INTERRUPTED, np.where(low > 0, low, np.nan), low)
+        return size, low, high, self.beyond

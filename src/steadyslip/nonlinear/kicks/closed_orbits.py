@@ -1,0 +1,120 @@
+"""Closed orbits near the ends of many runs at once, found by Newton's method and judged by their multipliers.
+
+The flow over one period and its derivative come from runs side by side: one from the state itself, two for each
+variable beside it (central differences). That is coarser than the variational equations of `flow`, enough to tell
+attraction from repulsion, and it needs no other kernel than the runs themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.kernels.program import STATUSES
+from steadyslip.nonlinear.kicks.neighbourhood import rates_at
+from steadyslip.nonlinear.kicks.outcomes import Runs, advanced_runs
+
+Array = np.ndarray
+BESIDE = 1e-4  # distance of the runs beside, in natural sizes
+ROUNDS = 8  # of Newton's method
+CLOSED = 1e-6  # distance after a period, in natural sizes, below which an orbit is closed,
+LOOSE = 1e3  # or this many integration tolerances
+ATTRACTS = 1e-3  # distance of multipliers from one that finite differences can tell
+WORTH = 0.1  # error of the multiplier of the motion itself beyond which they tell nothing
+ON = 0.05  # distance of the run from the orbit, in sizes of the orbit, at which its multipliers speak for the run
+PRECISE = 0.01  # error of the orbit, in sizes of it, that is allowed
+AWAY = 1e-3  # distance from steady sliding below which a closed orbit is not told from it
+DONE = STATUSES.index("done")
+
+
+@dataclass
+class _Turn:
+    """One period of k runs: where it ends (k, n) and its derivative (k, n, n), in natural sizes."""
+
+    end: Array
+    derivative: Array
+    good: Array
+
+
+def attracted(runs: Runs, which: Array, states: Array, period: Array, threads: int | None = None) -> Array:
+    """Whether runs `which` (k,), now at `states` (k, n), are on an attracting closed orbit of about `period` (k,)."""
+    rest = runs.rest.part(which)
+    scale, n = rest.scales, states.shape[1]
+    y, log_period = states / scale, np.log(period)
+    speed = rates_at(rest, states[:, None, :])[:, 0] / scale
+    size = np.linalg.norm(speed, axis=1)
+    alive = np.isfinite(size) & (size > 0)
+    ahead = np.where(alive[:, None], speed / np.where(alive, size, 1.0)[:, None], 0.0)
+    found = np.zeros(len(which), dtype=bool)
+    tolerance = max(CLOSED, LOOSE * runs.jobs.options.rtol)
+    start, steady = y.copy(), rest.state / scale
+    for _ in range(ROUNDS):
+        here = np.flatnonzero(alive)
+        if not len(here):
+            break
+        turn = _turned(runs, which[here], y[here] * scale[here], scale[here], np.exp(log_period[here]), threads)
+        arrival = rates_at(rest.part(here), (turn.end * scale[here])[:, None, :])[:, 0] / scale[here]
+        missed = turn.end - y[here]
+        weight = 1 + np.abs(y[here])
+        off = np.max(np.abs(missed) / weight, axis=1)
+        margin = _attraction(turn.derivative, arrival)
+        size = np.max(np.abs(y[here] - steady[here]), axis=1)
+        size = np.where(np.isfinite(size), np.minimum(size, 1.0), 1.0)
+        close = turn.good & (off < tolerance) & ((off < PRECISE * margin * size) | (margin <= 0))
+        found[here[close]] = (margin > 0)[close] & (size > AWAY)[close]
+        near = np.max(np.abs(y[here] - start[here]) / (1 + np.abs(start[here])), axis=1) < ON * size
+        found[here[close & ~near]] = False
+        alive[here[close | ~turn.good]] = False
+        go = np.flatnonzero(turn.good & ~close)
+        if not len(go):
+            break
+        matrix = np.zeros((len(go), n + 1, n + 1))
+        matrix[:, :n, :n] = turn.derivative[go] - np.eye(n)
+        matrix[:, :n, n] = arrival[go] * np.exp(log_period[here[go]])[:, None]
+        matrix[:, n, :n] = ahead[here[go]]
+        right = np.zeros((len(go), n + 1))
+        right[:, :n] = -missed[go]
+        right[:, n] = -np.sum(ahead[here[go]] * (y[here[go]] - start[here[go]]), axis=1)
+        usable = np.all(np.isfinite(matrix), axis=(1, 2))
+        change = np.zeros((len(go), n + 1))
+        for i in np.flatnonzero(usable):
+            change[i] = np.linalg.lstsq(matrix[i], right[i], rcond=None)[0]
+        usable &= np.all(np.abs(change) < 1, axis=1)
+        y[here[go]] += change[:, :n]
+        log_period[here[go]] += change[:, n]
+        alive[here[go[~usable]]] = False
+    return found
+
+
+def _turned(runs: Runs, which: Array, states: Array, scale: Array, period: Array, threads: int | None) -> _Turn:
+    """One period from k states, and its derivative by central differences."""
+    count, n = states.shape
+    beside = BESIDE * np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)])  # (2n+1, n)
+    many = (states[:, None, :] + scale[:, None, :] * beside[None]).reshape(-1, n)
+    repeat = np.repeat(np.arange(count), 2 * n + 1)
+    ended = advanced_runs(runs, which[repeat], many, period[repeat], False, threads)
+    ends = ended.state.reshape(count, 2 * n + 1, n) / scale[:, None, :]
+    good = np.all(ended.status.reshape(count, -1) == DONE, axis=1) & np.all(np.isfinite(ends), axis=(1, 2))
+    derivative = (ends[:, 1 : n + 1] - ends[:, n + 1 :]).transpose(0, 2, 1) / (2 * BESIDE)
+    return _Turn(ends[:, 0], derivative, good)
+
+
+def _attraction(derivative: Array, ahead: Array) -> Array:
+    """How far all multipliers but the one of the motion itself lie inside the unit circle (k,); 0 if not certain.
+
+    `ahead` (k, n) are the rates. That direction, which the flow carries into itself, is split off first: beside it a
+    second multiplier near one would be a double one, and lose half of its digits. How well it is met tells what
+    finite differences are worth here.
+    """
+    found = np.zeros(len(derivative))
+    for i, (matrix, rate) in enumerate(zip(derivative, ahead, strict=True)):
+        if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(matrix)) and np.any(rate)):
+            continue
+        basis = np.linalg.qr(rate[:, None] / np.linalg.norm(rate), mode="complete")[0]
+        turned = basis.T @ matrix @ basis
+        error = max(abs(turned[0, 0] - 1), float(np.max(np.abs(turned[1:, 0]), initial=0.0)))
+        largest = np.max(np.abs(np.linalg.eigvals(turned[1:, 1:])), initial=0.0)
+        if error < WORTH and largest < 1 - max(ATTRACTS, error):
+            found[i] = 1 - largest
+    return found

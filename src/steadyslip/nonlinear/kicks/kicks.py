@@ -1,0 +1,227 @@
+"""Kicks: what is done to a rig in steady sliding at time zero, and what comes of it.
+
+A kick has a size without unit, from nothing upwards; all of them change the state or the inputs once, after which
+the inputs are constant, so that one kernel runs them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.setup import Jobs, Options, initial_values, prepare
+from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
+from steadyslip.nonlinear.kicks.outcomes import Runs, continuous_at, outcomes_of
+from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
+from steadyslip.values import model_values
+
+Array = np.ndarray
+PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself
+
+
+@dataclass(frozen=True)
+class Kick:
+    """One kind of kick.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        Of `amount`.
+    low, high : float
+        Range of sizes that is searched.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    doc: str
+
+
+KICKS = {
+    kick.name: kick
+    for kick in (
+        Kick("velocity", "m/s", 1e-3, 46.0, "step of the load-point velocity; size ln(new/old)"),
+        Kick("displacement", "m", 1e-4, 1e5, "step of the load point; size in natural lengths (d_c)"),
+        Kick("normal-stress", "Pa", 1e-6, 1e2, "step of the normal stress; size as a share of the steady one"),
+        Kick("impulse", "Pa s", 1e-4, 1e12, "blow on a block with mass; size as change of velocity over the drive's"),
+    )
+}
+
+
+def options_for(inertial: bool, rtol: float | None) -> Options:
+    """How kicked motion is integrated."""
+    return Options(rtol=rtol or (1e-8 if inertial else 1e-10), most_steps=400_000)
+
+
+class Kicked:
+    """A rig, or many, about to be kicked.
+
+    Parameters
+    ----------
+    rig : Slider
+    kick : str
+        A name in `KICKS`.
+    direction : int
+        1 or -1: faster, forward, pressed harder; or the reverse.
+    reference : str
+        For ``velocity``: ``before`` if the rig's drive is the velocity before the step, ``after`` if it is
+        the velocity after it. Everything the rig says of itself, such as a steady normal stress, holds at its drive.
+    vary : mapping of str to ndarray
+        Parameters of the rig, flat arrays of equal length.
+
+    Attributes
+    ----------
+    size : int
+        Number of rigs.
+    rest : Rest
+        The rigs' own steady sliding.
+    exists, neutral, stable : ndarray of bool (size,)
+        Whether there is steady sliding; whether small motions about it neither grow nor decay; whether they decay
+        or are neutral.
+    """
+
+    def __init__(
+        self, rig: Slider, kick: str, direction: int, reference: str, vary: Mapping[str, Any], branch: int,
+        rtol: float | None,
+    ) -> None:  # fmt: skip
+        problems = []
+        if kick not in KICKS:
+            problems.append(Problem("kick", unknown_name("kick", kick, KICKS)))
+        if direction not in (1, -1):
+            problems.append(Problem("direction", f"got {direction!r}; allowed: 1 or -1"))
+        if reference not in ("before", "after"):
+            problems.append(Problem("reference", f"got {reference!r}; allowed: 'before' or 'after'"))
+        if problems:
+            raise ParameterError(problems)
+        self.kick, self.sign = KICKS[kick], float(direction)
+        self.from_other = kick == "velocity" and reference == "after"
+        values = model_values(rig, vary, branch=branch)
+        if kick == "impulse" and "slider.mass" not in values.named():
+            raise NotAvailable(
+                "an impulse needs a mass: without it the block takes any velocity at once; use a displacement or "
+                "normal-stress kick, or give the slider a mass"
+            )
+        if values.model.imposed != 0:
+            raise NotAvailable("a rig whose normal stress is prescribed in time has no steady sliding to return to")
+        self.size = max(values.size, 1)
+        self.jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model.inertial, rtol), branch)
+        named = values.named()
+        self.drive = np.broadcast_to(np.asarray(named["drive.velocity"], dtype=float), (self.size,))
+        self.mass = np.broadcast_to(np.asarray(named.get("slider.mass", 0.0), dtype=float), (self.size,))
+        self.sigma = np.broadcast_to(self.jobs.sigma, (self.size,))
+        self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))
+        self.near = Neighbourhood(self.rest)
+        self.exists, self.neutral = self.rest.exists, self.rest.exists & self.rest.neutral
+        self.stable = (self.rest.stable | self.neutral) & np.broadcast_to(self.jobs.posed, (self.size,))
+        self.length = self.rest.scales[:, self.jobs.reduction.names.index("x")]
+
+    # -- sizes
+
+    @property
+    def highest(self) -> float:
+        """Largest size that makes sense."""
+        if self.sign < 0 and self.kick.name in ("normal-stress", "impulse"):
+            return 0.999
+        return self.kick.high
+
+    def amount(self, size: Any, which: Any = slice(None)) -> Array:
+        """The kick in SI units: velocity beside the rig's own drive, displacement, stress, or impulse; signed."""
+        size = np.asarray(size, dtype=float)
+        with np.errstate(over="ignore"):
+            if self.kick.name == "velocity":
+                sign = -self.sign if self.from_other else self.sign
+                return np.asarray(self.drive[which] * np.exp(sign * size))
+            if self.kick.name == "displacement":
+                return np.asarray(self.sign * size * self.length[which])
+            if self.kick.name == "normal-stress":
+                return np.asarray(self.sign * size * self.sigma[which])
+            return np.asarray(self.sign * size * self.mass[which] * self.drive[which])
+
+    def size_of(self, amount: float) -> float:
+        """The size of a kick given in SI units (of the first rig); negative if against `direction`."""
+        if self.kick.name == "velocity":
+            sign = -self.sign if self.from_other else self.sign
+            return float(sign * np.log(amount / self.drive[0]))
+        unit = {"displacement": self.length, "normal-stress": self.sigma, "impulse": self.mass * self.drive}
+        return float(self.sign * amount / unit[self.kick.name][0])
+
+    # -- where kicks lead
+
+    @property
+    def moves_rest(self) -> bool:
+        """Whether the steady sliding after the kick is another than the rig's own."""
+        return self.kick.name == "normal-stress" or (self.kick.name == "velocity" and not self.from_other)
+
+    def inputs(self, which: Array, sizes: Array) -> tuple[Array, Array]:
+        """Load-point velocity and added normal stress after kicks (n,)."""
+        velocity, nothing = self.drive[which], np.zeros(len(which))
+        if not self.moves_rest:
+            return velocity, nothing
+        amount = self.amount(sizes, which)
+        return (amount, nothing) if self.kick.name == "velocity" else (velocity, amount)
+
+    def rest_after(self, which: Array, sizes: Array) -> Rest:
+        """The steady sliding that kicks of `sizes` (n,) of rigs `which` (n,) lead to."""
+        if not self.moves_rest:
+            return self.rest.part(which)
+        return rest_of(self._jobs(which), *self.inputs(which, sizes))
+
+    def may_return(self, which: Array, sizes: Array) -> Array:
+        """Whether there is stable (or neutral) steady sliding to return to after kicks, (n,)."""
+        rest = self.rest_after(which, sizes)
+        return np.asarray(rest.exists & (rest.stable | rest.neutral))
+
+    def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> Runs:
+        """Motions of rigs `which` (n,) after kicks of `sizes` (n,)."""
+        jobs, amount = self._jobs(which), self.amount(sizes, which)
+        if self.moves_rest:
+            rest = self.rest_after(which, sizes)
+            near, group = Neighbourhood(rest), np.arange(len(which))
+        else:
+            self.near.computed(np.unique(which))
+            rest, near = self.rest.part(which), self.near.part(which)
+            _, one, back = np.unique(which, return_index=True, return_inverse=True)
+            group = one[back]
+        if self.from_other:
+            jobs = self._started_at(jobs, amount)
+        if self.kick.name == "impulse":
+            jobs = self._struck(jobs, amount / self.mass[which], which)
+        jump = amount if self.kick.name == "displacement" else np.zeros(len(which))
+        return Runs(jobs, rest, near, jump, group, effort)
+
+    def outcomes(
+        self, which: Array, sizes: Array, threads: int | None = None,
+        advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
+    ) -> Array:  # fmt: skip
+        """What comes of kicks: indices into `OUTCOMES`, (n,); see `Runs` for `effort`."""
+        return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
+
+    def _jobs(self, which: Array) -> Jobs:
+        """The rigs `which` in steady sliding."""
+        values = self.jobs.values
+        cut = replace(values, arguments=tuple(picked(a, which) for a in values.arguments))
+        return replace(
+            self.jobs, values=cut, sigma=self.sigma[which], initial=picked(self.jobs.initial, which),
+            velocity=picked(self.jobs.velocity, which), size=len(which),
+        )  # fmt: skip
+
+    def _started_at(self, jobs: Jobs, velocity: Array) -> Jobs:
+        """The same rigs in steady sliding at another velocity of the load point."""
+        nothing = np.zeros(len(velocity))
+        before = rest_of(jobs, velocity, nothing)
+        arguments, sigma = jobs.values.arguments, jobs.sigma
+        initial, speed = continuous_at(jobs.reduction, arguments, sigma, before.state, velocity, nothing)
+        return replace(jobs, initial=initial, velocity=speed)
+
+    def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
+        """The same rigs with another velocity of the block."""
+        given = {"v": self.drive[which] + change}
+        initial, speed = initial_values(jobs.reduction, jobs.values, jobs.sigma, given)
+        return replace(jobs, initial=initial, velocity=speed)

@@ -1,0 +1,200 @@
+"""Close to an edge of stability: which way motion drifts, read off single turns instead of waiting for thousands.
+
+There, the distance |q| (see `neighbourhood`) changes by parts in thousands or millions a turn, and swings by more
+within it.
+
+Where all modes but the slowest pair die out within a turn, motion takes place on a surface. It is followed from points
+on a ray out of steady sliding until it comes back to the ray (once before, to get onto the surface). Up to the first
+point that does not come back nearer, every motion returns: orbits on a surface do not cross. Points that come back
+farther form a band through which everything in it is carried outwards; if motion from one turn's worth of points at its
+outer end comes to the same, so does all that is in the band.
+
+Elsewhere distances after one turn are compared on whole shells |q| = R. Inside the largest ball on all of whose shells
+the distance falls, every motion returns; nothing is said of motion outside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steadyslip.kernels.program import STATUSES
+from steadyslip.nonlinear.kicks.neighbourhood import LARGEST, directions, rates_at
+from steadyslip.nonlinear.kicks.outcomes import CERTAIN, OPEN, RETURNS, Runs, advanced_runs, outcomes_of
+
+Array = np.ndarray
+DONE = STATUSES.index("done")
+COUNT = 32  # shells, from the ball of `neighbourhood` to a few natural sizes,
+FINE = 24  # and between the last that falls and the first that rises,
+REFINED = 2  # so many times
+SHARE = 0.02  # of the linear decay a turn: what a change must exceed to count
+POINTS = 16  # from which it is seen what comes of a band
+ROUNDS = 12  # of Newton's method for the time of a turn
+FLAT = 2.0  # decay per radian of the other modes from which motion takes place on a surface
+SLOW = 0.02  # decay per radian above which waiting is as quick
+
+
+class Shells:
+    """Shells around the steady sliding of some runs, computed for each steady sliding when first asked for.
+
+    Parameters
+    ----------
+    runs : Runs
+    threads : int, optional
+    """
+
+    def __init__(self, runs: Runs, threads: int | None) -> None:
+        self.runs, self.threads = runs, threads
+        count = len(runs.rest.velocity)
+        roots = runs.rest.roots
+        with np.errstate(invalid="ignore"):
+            others = np.sort(roots.real, axis=1)[:, :-2]
+            self.flat = np.all(others < -FLAT * np.abs(runs.rest.leading.imag)[:, None], axis=1)
+        self.known = np.zeros(count, dtype=bool)
+        self.inner = np.zeros(count)  # radius of the ball,
+        self.band = np.tile([np.inf, -np.inf], (count, 1))  # and of both rims of the band,
+        self.beyond = np.full(count, OPEN)  # and what comes of that
+
+    def outcomes(self, which: Array, states: Array) -> Array:
+        """What shells tell of runs `which` (k,) at `states` (k, n): an outcome, or OPEN."""
+        group = self.runs.group[which]
+        self._ask(np.unique(group))
+        useful = (self.inner[group] > 0) | (self.beyond[group] != OPEN)
+        away = self.runs.near.distance(which, states)
+        flat = self.flat[group]
+        away[flat & ~useful] = np.inf
+        if (flat & useful).any():
+            away[flat & useful] = self._on_ray(which[flat & useful], states[flat & useful])
+        found = np.where(away < self.inner[group], RETURNS, OPEN)
+        inside = (away > self.band[group, 0]) & (away < self.band[group, 1])
+        return np.where(inside, self.beyond[group], found)
+
+    def _ask(self, group: Array) -> None:
+        rest, near = self.runs.rest, self.runs.near
+        group = group[~self.known[group]]
+        self.known[group] = True
+        leading = rest.leading[group]
+        with np.errstate(invalid="ignore"):
+            slow = rest.stable[group] & (np.abs(leading.real) < SLOW * np.abs(leading.imag))
+        group = group[slow]
+        group = group[near.computed(group) > 0]
+        for part in (group[self.flat[group]], group[~self.flat[group]]):
+            if len(part):
+                self._compute(part)
+
+    def _compute(self, group: Array) -> None:
+        """Ball and band of rigs that are all alike: on a surface, or not."""
+        near = self.runs.near
+        radii = np.geomspace(near.radius[group], LARGEST, COUNT, axis=1)
+        falls, rises = self._drift(group, radii)
+        falls[:, 0] = True  # the neighbourhood itself
+        inner, begin, end = _drifts(radii, falls, rises)
+        for _ in range(REFINED):
+            top = np.where(np.isfinite(begin), begin, np.minimum(2 * inner, LARGEST))
+            fine = np.geomspace(inner, top, FINE, axis=1)
+            falls, rises = self._drift(group, fine[:, 1:-1])
+            ends = np.ones((len(group), 1), dtype=bool)
+            falls = np.hstack([ends, falls, ~ends])
+            rises = np.hstack([~ends, rises, np.isfinite(begin)[:, None]])
+            inner, nearer, to = _drifts(fine, falls, rises)
+            begin = np.where(to == fine[:, -1], nearer, begin)
+        self.inner[group] = inner
+        if self.flat[group[0]]:
+            for one, low, high in zip(group, begin, end, strict=True):
+                if low < high and (fate := self._fate(one, high)) in CERTAIN:
+                    self.band[one], self.beyond[one] = (low, high), fate
+
+    def _drift(self, group: Array, radii: Array) -> tuple[Array, Array]:
+        """Whether distances fall, and whether they rise, over a turn from radii (k, r)."""
+        rest, near = self.runs.rest, self.runs.near
+        n = rest.state.shape[1]
+        flat = self.flat[group[0]]
+        around = np.eye(n)[:1] if flat else directions(n)[::3]
+        q = radii[:, :, None, None] * around
+        away = np.einsum("kij,krdj->krdi", near.basis[group], q)
+        states = (rest.state[group][:, None, None] + rest.scales[group][:, None, None] * away).reshape(-1, n)
+        turn = 2 * np.pi / np.abs(rest.leading[group].imag)
+        lane = np.repeat(group, radii.shape[1] * len(around))
+        each = np.repeat(turn, radii.shape[1] * len(around))
+        begin = np.broadcast_to(radii[:, :, None], q.shape[:3])
+        if flat:
+            end, states = self._to_ray(lane, states, each)
+            if n > 2:  # on the surface now
+                begin = end.reshape(q.shape[:3])
+                end, _ = self._to_ray(lane, states, each)
+        else:
+            ended = advanced_runs(self.runs, lane, states, each, False, self.threads)
+            end = near.distance(lane, ended.state)
+        least = SHARE * np.abs(rest.leading[group].real * turn)[:, None, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.log(end.reshape(q.shape[:3]) / begin)
+        return np.all(change < -least, axis=2), np.all(change > least, axis=2)
+
+    def _to_ray(self, which: Array, states: Array, guess: Array) -> tuple[Array, Array]:
+        """Where runs from `states` (k, n) meet the ray after about as long as guessed (k,), and the states there.
+
+        NaN where they do not; distances count in the slowest two modes.
+        """
+        rest, near = self.runs.rest, self.runs.near
+        time, radius, found = guess.copy(), np.full(len(which), np.nan), np.full_like(states, np.nan)
+        todo = np.flatnonzero(np.all(np.isfinite(states), axis=1))
+        for _ in range(ROUNDS):
+            if not len(todo):
+                break
+            lane = which[todo]
+            ended = advanced_runs(self.runs, lane, states[todo], time[todo], False, self.threads)
+            q = near.coordinates(lane, ended.state)
+            speed = rates_at(rest.part(lane), ended.state[:, None, :])[:, 0] / rest.scales[lane]
+            back = np.einsum("kij,kj->ki", near.inverse[lane], speed)
+            with np.errstate(all="ignore"):
+                size = np.hypot(q[:, 0], q[:, 1])
+                angle = np.arctan2(q[:, 1], q[:, 0])
+                change = -angle * size**2 / (q[:, 0] * back[:, 1] - q[:, 1] * back[:, 0])
+                met = (np.abs(angle) < 1e-9) & (size > 0)
+                radius[todo[met]], found[todo[met]] = size[met], ended.state[met]
+                span = 0.5 * guess[todo]
+                good = np.isfinite(change) & ~met & (ended.status == DONE)
+                time[todo] += np.where(good, np.clip(change, -0.3 * span, 0.3 * span), 0.0)
+                good &= time[todo] > span
+            todo = todo[good]
+        return radius, found
+
+    def _on_ray(self, which: Array, states: Array) -> Array:
+        """|q| where runs at `states` (k, n) meet the ray after the next turn but a part."""
+        rest, near = self.runs.rest, self.runs.near
+        q = near.coordinates(which, states)
+        sense = self._sense(which)
+        angle = np.mod(-sense * np.arctan2(q[:, 1], q[:, 0]), 2 * np.pi)  # still to go
+        found, _ = self._to_ray(which, states, (angle + 2 * np.pi) / np.abs(rest.leading[which].imag))
+        return np.where(np.isnan(found), np.inf, found)
+
+    def _sense(self, which: Array) -> Array:
+        """1 where motion turns from the first mode to the second, else -1."""
+        rest, near = self.runs.rest, self.runs.near
+        turned = near.inverse[which] @ rest.matrix[which] @ near.basis[which]
+        return np.asarray(np.sign(turned[:, 1, 0]))
+
+    def _fate(self, one: int, radius: float) -> int:
+        """What comes of motion from the end of a band, one turn's worth of it; OPEN where that differs."""
+        rest, near = self.runs.rest, self.runs.near
+        turn = 2 * np.pi / np.abs(rest.leading[one : one + 1].imag)
+        ray = near.basis[one][:, 0]
+        start = (rest.state[one] + rest.scales[one] * radius * ray)[None]
+        after = float(self._to_ray(np.array([one]), start, turn)[0][0])
+        if not after > radius:
+            return OPEN
+        states = rest.state[one] + rest.scales[one] * np.geomspace(radius, after, POINTS)[:, None] * ray
+        found = outcomes_of(self.runs.repeated(one, POINTS), self.threads, start=states)
+        return int(found[0]) if np.all(found == found[0]) else OPEN
+
+
+def _drifts(radii: Array, falls: Array, rises: Array) -> tuple[Array, Array, Array]:
+    """Up to where distances fall, and from where to where they rise beyond; inf where they do not. Arrays (k, r)."""
+    count, each = radii.shape[1], np.arange(len(radii))
+    last = np.argmin(np.column_stack([falls, np.zeros(len(radii), dtype=bool)]), axis=1) - 1
+    beyond = rises & (np.arange(count) > last[:, None])
+    first = np.argmax(beyond, axis=1)
+    after = np.column_stack([beyond, np.zeros(len(radii), dtype=bool)]) | (np.arange(count + 1) < first[:, None])
+    end = np.argmin(after, axis=1) - 1
+    some = beyond.any(axis=1)
+    begin = np.where(some, radii[each, first], np.inf)
+    return radii[each, np.maximum(last, 0)], begin, np.where(some, radii[each, end], np.inf)

@@ -1,0 +1,327 @@
+"""The smallest kick after which sliding does not become steady again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.quantities import shown
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
+from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
+from steadyslip.steady import steady_states
+
+Array = np.ndarray
+COARSE = 240  # sizes of the first scan of a single rig,
+BLOCK = 48  # so many at a time
+FINE = 47  # sizes between the ends of a bracket, at each step of narrowing
+BEYOND = 1.01  # edges over this: where it is looked what happens beyond
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """How large a kick steady sliding survives.
+
+    Attributes
+    ----------
+    rig : Slider
+    kick : str
+    direction : int
+    size : float
+        Smallest kick that does not return, without unit: ln(new/old velocity), natural lengths, share of the steady
+        normal stress, or change of velocity over the drive's. 0 if steady sliding is unstable, inf if every
+        kick in the range searched returns, NaN if nothing in it is known to fail and not all is known to return.
+    bracket : tuple of float
+        Sizes of the largest kick up to which all that were tried return, and of the smallest known not to.
+    amount : float
+        The same in SI units: velocity after the step (or before it, with ``reference="after"``), displacement,
+        change of normal stress, or impulse.
+    unit : str
+    outcome : str
+        What happens beyond: ``blow-up``, ``oscillation`` (that does not die out), ``contact lost``, ``no solution``,
+        or ``undecided``.
+    searched : float
+        Largest size tried.
+    edge : bool
+        Whether the limit is the edge of stability of the steady sliding that the kick leads to: beyond, there is none
+        to return to. `size` is that edge then.
+    decided : bool
+        Whether the bracket is as narrow as was asked for. If not, kicks inside it were followed for the longest time
+        allowed without coming to an end.
+    """
+
+    rig: Slider = field(repr=False)
+    kick: str
+    direction: int
+    size: float
+    bracket: tuple[float, float]
+    amount: float
+    unit: str
+    outcome: str
+    searched: float
+    edge: bool = False
+    decided: bool = True
+
+    def __str__(self) -> str:
+        what = f"{self.kick} kick"
+        low, high = self.bracket
+        if self.size == 0:
+            return f"{what}: none survived, steady sliding is unstable"
+        if np.isinf(self.size):
+            return f"{what}: none is large enough, up to {self.searched:.4g} (size without unit)"
+        if np.isnan(self.size):
+            return f"{what}: all that were tried are survived up to size {low:.4g}; undecided beyond"
+        edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
+        doubt = "" if self.decided else f"; undecided between {low:.6g} and {high:.6g}"
+        return (
+            f"{what}: survives up to {shown(self.amount, self.unit, 7, self.rig.area)} (size {self.size:.7g}, bracket "
+            f"{low:.9g} to {high:.9g}){edge}{doubt}; beyond: {self.outcome}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units."""
+
+        def plain(x: float) -> float | None:
+            return float(x) if np.isfinite(x) else None
+
+        return {
+            "kick": self.kick,
+            "direction": self.direction,
+            "size": plain(self.size),
+            "bracket": [plain(x) for x in self.bracket],
+            "amount": plain(self.amount),
+            "unit": self.unit,
+            "outcome": self.outcome,
+            "searched": self.searched,
+            "edge": self.edge,
+            "decided": self.decided,
+        }
+
+
+def threshold(
+    rig: Slider,
+    kick: str = "velocity",
+    *,
+    direction: int = 1,
+    reference: str = "before",
+    precision: float = 1e-8,
+    rtol: float | None = None,
+    branch: int = 0,
+) -> Threshold:
+    """The smallest kick of a given kind that does not return to steady sliding.
+
+    Parameters
+    ----------
+    rig : Slider
+    kick : str, optional
+        ``velocity`` (step of the load-point velocity), ``displacement`` (step of the load point), ``normal-stress``
+        (step of the normal stress) or ``impulse`` (blow on a block with mass).
+    direction : int, optional
+        1: faster, forward, pressed harder; -1: the reverse.
+    reference : str, optional
+        For ``velocity``: whether the rig's drive is the velocity ``before`` or ``after`` the step. After is right
+        for comparing with results that take normal stress and critical stiffness at the new velocity.
+    precision : float, optional
+        Relative width of the bracket.
+    rtol : float, optional
+        Error allowed per step of integration; 1e-10, with mass 1e-8, unless given.
+    branch : int, optional
+        Which steady sliding, where there are several.
+
+    Returns
+    -------
+    Threshold
+
+    Raises
+    ------
+    NoSteadySliding
+        If there is none to kick.
+    NotAvailable
+        If the kick is not possible, or the motion ill-posed.
+    ParameterError
+        If an argument is wrong.
+
+    Notes
+    -----
+    Kicks of rising size are tried side by side, and the bracket of the first that fails is narrowed. What comes of a
+    motion is decided by `steadyslip.nonlinear.kicks.outcomes`: it has returned when it is in a neighbourhood of steady
+    sliding that is never left, it has not when it blows up, loses contact or is on a closed orbit that attracts; it may
+    also be undecided. Where the steady sliding that a kick leads to is not stable nothing returns, and the search ends
+    there. At the edge of stability itself small motions persist; there all that stays bounded counts as returning.
+    """
+    if not 1e-12 <= precision <= 0.1:
+        raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
+    steady_states(rig)  # raises, and says why
+    kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol)
+    if not kicked.stable[0]:
+        return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), float(kicked.amount(0.0)[0]), kicked.kick.unit,
+                         "unstable", kicked.highest)  # fmt: skip
+    sizes = np.geomspace(kicked.kick.low, kicked.highest, COARSE)
+    edge = float(edges(kicked, np.zeros(1, dtype=int), sizes)[0])
+    bracket = _scanned(kicked, sizes[sizes < edge], edge)
+    while bracket[1] - bracket[0] > precision * bracket[1] and np.isfinite(bracket[1]):
+        low, high, _ = bracket
+        inside = low + (high - low) * np.arange(1, FINE + 1) / (FINE + 1)
+        bracket = _narrowed(kicked, inside, bracket, PATIENCE)
+        if bracket[1] - bracket[0] > 0.5 * (high - low):
+            break
+    return _result(rig, kicked, bracket, edge, precision)
+
+
+Bracket = tuple[float, float, int]
+"""Largest size up to which all return, smallest known not to (inf: none), and what comes of that."""
+
+
+def _scanned(kicked: Kicked, sizes: Array, edge: float) -> Bracket:
+    """The bracket of the first of rising sizes that fails; a block beyond the first doubt is the last."""
+    bracket: Bracket = (0.0, edge, RETURNS)
+    for start in range(0, len(sizes), BLOCK):
+        block, low = sizes[start : start + BLOCK], bracket[0]
+        doubt = bracket[2] == UNDECIDED
+        bracket = _narrowed(kicked, block[:: 2 if doubt else 1], bracket, 1.0)
+        if doubt:
+            bracket = (low, *bracket[1:])
+        if doubt or bracket[2] in CERTAIN:
+            break
+    return bracket
+
+
+def _narrowed(kicked: Kicked, sizes: Array, bracket: Bracket, effort: float) -> Bracket:
+    """A bracket after rising sizes inside it have been tried."""
+    if not len(sizes):
+        return bracket
+    found = kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, effort=effort)
+    if np.any(found == INTERRUPTED):
+        raise KeyboardInterrupt
+    low, high, outcome = bracket
+    others = np.flatnonzero(found != RETURNS)
+    survived = int(others[0]) if len(others) else len(sizes)
+    failed = np.flatnonzero(np.isin(found, CERTAIN))
+    if len(failed):
+        high, outcome = float(sizes[failed[0]]), int(found[failed[0]])
+    elif len(others) and outcome == RETURNS:
+        outcome = UNDECIDED
+    return (float(sizes[survived - 1]) if survived else low), high, outcome
+
+
+def _result(rig: Slider, kicked: Kicked, bracket: Bracket, edge: float, precision: float) -> Threshold:
+    low, high, outcome = bracket
+    at_edge = bool(np.isfinite(high) and high == edge)
+    if at_edge and high * BEYOND <= kicked.highest:
+        found = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([high * BEYOND]))[0])
+        outcome = found if found in CERTAIN else UNDECIDED
+    decided = bool(high - low <= precision * high) if np.isfinite(high) else outcome == RETURNS
+    size = high if at_edge else 0.5 * (low + high)
+    if np.isinf(high):
+        size = np.inf if outcome == RETURNS else np.nan
+    amount = float(kicked.amount(size)[0]) if np.isfinite(size) else size
+    word = "" if outcome == RETURNS else OUTCOMES[outcome]
+    return Threshold(rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word,
+                     kicked.highest, at_edge, decided)  # fmt: skip
+
+
+def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
+    """Smallest size beyond which rigs `which` (n,) have no stable steady sliding to return to; inf if none is found.
+
+    Looked for between rising `sizes`, then bisected to rounding.
+    """
+    found = np.full(len(which), np.inf)
+    if not kicked.moves_rest:
+        return found
+    low, high = np.zeros(len(which)), np.full(len(which), np.inf)
+    going = np.arange(len(which))
+    for size in sizes:
+        good = kicked.may_return(which[going], np.full(len(going), size))
+        high[going[~good]] = size
+        low[going[good]] = size
+        going = going[good]
+        if not len(going):
+            break
+    open_ = np.flatnonzero(np.isfinite(high))
+    for _ in range(60):
+        middle = 0.5 * (low[open_] + high[open_])
+        good = kicked.rest_after(which[open_], middle).leading.real < 0
+        low[open_[good]], high[open_[~good]] = middle[good], middle[~good]
+    found[open_] = high[open_]
+    return found
+
+
+@dataclass(frozen=True)
+class KickMargin:
+    """How far an expected disturbance is from the limit.
+
+    Attributes
+    ----------
+    step : object
+        The protocol piece.
+    threshold : Threshold
+    ratio : float
+        Threshold over the step's own size; NaN where there is no threshold to compare with.
+    outcome : str
+        What comes of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
+        ``undecided``. Beyond the threshold larger kicks may return again.
+    """
+
+    step: Any
+    threshold: Threshold
+    ratio: float
+    outcome: str
+
+    @property
+    def survives(self) -> bool | None:
+        """Whether the step returns to steady sliding; None where that is undecided."""
+        return None if self.outcome == "undecided" else self.outcome == "returns"
+
+    def __str__(self) -> str:
+        words = {True: "survives it", False: f"does not survive it ({self.outcome})", None: "undecided"}
+        ratio = f": the limit is {self.ratio:.4g} times this step" if np.isfinite(self.ratio) else ""
+        return f"{words[self.survives]}{ratio}\n{self.threshold}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units."""
+        ratio = float(self.ratio) if np.isfinite(self.ratio) else None
+        return {"survives": self.survives, "outcome": self.outcome, "ratio": ratio,
+                "threshold": self.threshold.to_dict()}  # fmt: skip
+
+
+def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
+    """Distance of an expected disturbance from the smallest that is not survived, and what comes of itself.
+
+    Parameters
+    ----------
+    rig : Slider
+    step : VelocityStep, DisplacementStep or NormalStressStep
+        Its time does not matter.
+    precision, branch
+        As for `threshold`.
+
+    Raises
+    ------
+    NotAvailable
+        If the step is of another kind.
+    """
+    kinds: dict[type, tuple[str, str]] = {
+        VelocityStep: ("velocity", "to"),
+        DisplacementStep: ("displacement", "by"),
+        NormalStressStep: ("normal-stress", "by"),
+    }
+    if type(step) not in kinds:
+        names = ", ".join(kind.__name__ for kind in kinds)
+        raise NotAvailable(f"a margin is known for {names}, not for {step!r}; simulate it instead")
+    kick, attribute = kinds[type(step)]
+    amount = float(getattr(step, attribute))
+    if kick == "velocity" and not amount > 0:
+        raise NotAvailable("a stop or reversal of the drive is no step from one steady sliding to another; simulate it")
+    up = amount >= (rig.drive.velocity if kick == "velocity" else 0)
+    found = threshold(rig, kick, direction=1 if up else -1, precision=precision, branch=branch)
+    kicked = Kicked(rig, kick, found.direction, "before", {}, branch, None)
+    size = kicked.size_of(amount)
+    outcome = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([size]))[0])
+    if outcome == INTERRUPTED:
+        raise KeyboardInterrupt
+    ratio = found.size / size if size else np.inf
+    return KickMargin(step, found, float(ratio), OUTCOMES[outcome])

@@ -1,0 +1,1 @@
+"""The kind of onset at an edge of stability, and the edge in two parameters."""

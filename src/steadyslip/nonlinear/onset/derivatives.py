@@ -1,0 +1,148 @@
+"""Second and third derivatives of a Model at steady sliding, exact and symbolic.
+
+The Model is taken as it stands: variables, unknown and the stresses T, τ, σ are all unknowns of one system
+M Y' = F(Y), whose last rows (balance and definitions) have no derivative. Every equation then stays short and so
+do its derivatives; nothing has to be solved for first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.expressions import array_function
+from steadyslip.model import Model
+from steadyslip.values import Values
+
+Array = np.ndarray
+Index = tuple[int, ...]
+"""(equation, variable, ...), variables in rising order."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The equations of a Model with everything that appears in them as unknowns.
+
+    Attributes
+    ----------
+    unknowns : tuple of sympy.Symbol
+        Variables, then the algebraic unknown, T, τ and σ.
+    dynamic : int
+        How many of them have a time derivative (the first ones).
+    entries : tuple of (Index, ...)
+        For orders one, two and three: where derivatives do not vanish.
+    """
+
+    model: Model
+    unknowns: tuple[sp.Symbol, ...]
+    dynamic: int
+    entries: tuple[tuple[Index, ...], ...]
+    function: Callable[..., list[Any]]
+
+    @property
+    def velocity(self) -> int:
+        """Index of the block's velocity."""
+        return self.unknowns.index(self.model.symbols["v"])
+
+
+@lru_cache(maxsize=64)
+def system(model: Model) -> System:
+    """Differentiate a model three times at steady sliding."""
+    variables = [item.symbol for item in model.variables]
+    unknowns = [*variables, model.unknown, *model.definitions]
+    equations = [*model.rates, model.balance]
+    equations += [definition - symbol for symbol, definition in model.definitions.items()]
+    inputs = {model.inputs[name]: model.steady[model.inputs[name]] for name in model.inputs if name != "time"}
+    entries: tuple[list[Index], ...] = ([], [], [])
+    expressions: tuple[list[sp.Expr], ...] = ([], [], [])
+    for row, equation in enumerate(equations):
+        equation = equation.xreplace(inputs)
+        present = [i for i, symbol in enumerate(unknowns) if equation.has(symbol)]
+        derivatives: dict[Index, sp.Expr] = {(): equation}
+        for order in (1, 2, 3):
+            for index in combinations_with_replacement(present, order):
+                below = derivatives.get(index[:-1], sp.Integer(0))
+                derivative = sp.diff(below, unknowns[index[-1]]) if below != 0 else sp.Integer(0)
+                if derivative == 0:
+                    continue
+                derivatives[index] = derivative
+                value = _at_steady(derivative, model)
+                if value != 0:
+                    entries[order - 1].append((row, *index))
+                    expressions[order - 1].append(value)
+    function = array_function([*model.parameters.values(), model.sigma_ss], [e for part in expressions for e in part])
+    return System(model, tuple(unknowns), len(variables), tuple(map(tuple, entries)), function)
+
+
+def _at_steady(expression: sp.Expr, model: Model) -> sp.Expr:
+    """Steady values put in; unevaluated derivatives of |v| and sign v are worked out there."""
+    found = expression.xreplace(model.steady)
+    return found.doit() if found.has(sp.sign, sp.Derivative, sp.Abs, sp.DiracDelta) else found
+
+
+@dataclass(frozen=True, eq=False)
+class Taylor:
+    """Derivatives of F in numbers, for one rig or `m` of them.
+
+    Attributes
+    ----------
+    gradient : ndarray (m, n, n)
+    second, third : list of (Index, ndarray (m,))
+    mass : ndarray (n,)
+        Ones for equations with a time derivative, zeros for the others.
+    """
+
+    system: System
+    gradient: Array
+    second: list[tuple[Index, Array]]
+    third: list[tuple[Index, Array]]
+    mass: Array
+
+    def quadratic(self, u: Array, v: Array) -> Array:
+        """Second derivative applied to two directions (m, n), symmetric."""
+        out: Array = np.zeros_like(u * v)
+        for (row, j, k), value in self.second:
+            out[:, row] += value * (u[:, j] * v[:, k] + (u[:, k] * v[:, j] if j != k else 0))
+        return out
+
+    def cubic(self, u: Array, v: Array, w: Array) -> Array:
+        """Third derivative applied to three directions (m, n), symmetric."""
+        out: Array = np.zeros_like(u * v * w)
+        for (row, *index), value in self.third:
+            for a, b, c in _arrangements(*index):
+                out[:, row] += value * u[:, a] * v[:, b] * w[:, c]
+        return out
+
+
+@lru_cache(maxsize=1024)
+def _arrangements(i: int, j: int, k: int) -> tuple[Index, ...]:
+    return tuple({(i, j, k), (i, k, j), (j, i, k), (j, k, i), (k, i, j), (k, j, i)})
+
+
+def taylor(values: Values, sigma: Any) -> Taylor:
+    """Derivatives of every rig of `values` (flat arrays) at its steady normal stress."""
+    found = system(values.model)
+    with np.errstate(all="ignore"):
+        numbers = found.function(*map(np.asarray, values.arguments), np.asarray(sigma, dtype=float))
+    size = max([1, *(np.size(x) for x in numbers)])
+    columns = [np.broadcast_to(np.asarray(x, dtype=float), (size,)) for x in numbers]
+    n = len(found.unknowns)
+    gradient = np.zeros((size, n, n))
+    first, second, third = (len(part) for part in found.entries)
+    for (row, j), column in zip(found.entries[0], columns, strict=False):
+        gradient[:, row, j] = column
+    mass = np.zeros(n)
+    mass[: found.dynamic] = 1.0
+    return Taylor(
+        found,
+        gradient,
+        list(zip(found.entries[1], columns[first : first + second], strict=True)),
+        list(zip(found.entries[2], columns[first + second : first + second + third], strict=True)),
+        mass,
+    )

@@ -1,0 +1,363 @@
+"""The kind of onset: what small oscillations near an edge of stability do.
+
+At an oscillatory edge the amplitude ρ of ln(v/v0) obeys, to lowest order,
+
+    ρ' = Re(dλ/dp) (p − p_edge) ρ + c1 ρ³
+
+(theory 6). c1 < 0: supercritical, a small stable oscillation grows out of the edge on its unstable side.
+c1 > 0: subcritical, an unstable one shrinks onto steady sliding on its stable side, so that small kicks throw it out.
+c1 is local: it says nothing about large kicks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.quantities import shown
+from steadyslip.linear.boundary import boundary
+from steadyslip.linear.polynomials import stable_set
+from steadyslip.linear.search import Boundary
+from steadyslip.linear.stiffness import characteristic, in_chunks, stiffness_polynomials
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.onset.derivatives import Taylor, taylor
+from steadyslip.steady import steady_stress
+from steadyslip.values import Values, model_values
+
+Array = np.ndarray
+ROUNDING = 1e-9
+"""c1 below this share of the terms that it is the sum of cannot be told from zero."""
+
+
+@dataclass(frozen=True)
+class Onset:
+    """What happens at an oscillatory edge of stability.
+
+    Attributes
+    ----------
+    rig : Slider
+    along : str
+        The parameter that is varied.
+    value : float
+        Its value at the edge, SI units.
+    unit : str
+    kind : str
+        ``supercritical``, ``subcritical`` or ``degenerate``.
+    coefficient : float
+        c1, growth rate of amplitude per squared amplitude of ln v, 1/s.
+    share : float
+        |c1| as a share of the terms that it is the sum of; below 1e-9 it is zero to within rounding: degenerate.
+    angular_frequency : float
+        rad/s.
+    growth_slope : float
+        Re(dλ/dp), 1/s per unit of the parameter.
+    stress_ratio : float
+        Amplitude of the spring stress (Pa) for unit amplitude of ln v.
+    stable : str
+        ``above`` or ``below``: the side of the edge on which sliding is stable.
+    """
+
+    rig: Slider
+    along: str
+    value: float
+    unit: str
+    kind: str
+    coefficient: float
+    share: float
+    angular_frequency: float
+    growth_slope: float
+    stress_ratio: float
+    stable: str
+
+    @property
+    def normalised(self) -> float:
+        """c1 in units of the angular frequency: growth per radian at unit amplitude of ln v."""
+        return self.coefficient / self.angular_frequency
+
+    def velocity_amplitude(self, value: Any) -> Any:
+        """Amplitude of ln(v/v0) of the small cycle at values of the parameter; NaN on the side without one.
+
+        Lowest order: the error grows with the distance from the edge.
+        """
+        if self.kind == "degenerate":
+            return np.full(np.shape(value), np.nan)[()]
+        with np.errstate(invalid="ignore"):
+            squared = -self.growth_slope * (np.asarray(value, dtype=float) - self.value) / self.coefficient
+            return np.sqrt(np.where(squared >= 0, squared, np.nan))[()]
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the rig itself is so near the edge that the small cycle predicted for it is small.
+
+        Friction knows velocity by ln v, so that small is an amplitude of ln v below one, a factor below e in velocity.
+        """
+        own = self.rig.parameters()[self.along].value
+        return own is not None and bool(self.velocity_amplitude(own) < 1.0)
+
+    def stress_amplitude(self, value: Any) -> Any:
+        """Amplitude of the spring stress of the small cycle, Pa; as `velocity_amplitude`."""
+        return self.stress_ratio * self.velocity_amplitude(value)
+
+    @property
+    def meaning(self) -> str:
+        """What the kind of onset means, in a sentence."""
+        return MEANINGS[self.kind]
+
+    def __str__(self) -> str:
+        lines = [f"{self.kind} onset at {self.along} = {shown(self.value, self.unit, 6, self.rig.area)}"]
+        lines.append(f"  {self.meaning}")
+        size = f"{self.normalised:.4g} of the frequency per squared amplitude of ln v"
+        lines.append(f"  cubic coefficient {size}, period {shown(2 * np.pi / self.angular_frequency, 's')}")
+        return "\n".join(lines)
+
+
+MEANINGS = {
+    "supercritical": "just beyond the edge a small steady oscillation appears and grows with the distance; "
+    "this says nothing about large kicks",
+    "subcritical": "just on the stable side a small unstable oscillation surrounds steady sliding, "
+    "and a small kick is enough to throw it out; farther from the edge this says nothing",
+    "degenerate": "the cubic coefficient vanishes to rounding: at the edge small oscillations neither grow nor decay "
+    "to lowest order, and larger ones decide",
+}
+
+
+def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
+    """Kind of onset at the oscillatory edge of stability nearest to the rig.
+
+    Parameters
+    ----------
+    rig : Slider
+    along : str, optional
+        Dotted name, or unique last part, of the parameter whose edge is meant.
+    branch : int, optional
+        Which steady sliding, by rising normal stress, where a rig has several.
+
+    Returns
+    -------
+    Onset
+
+    Raises
+    ------
+    NotAvailable
+        If stability has no oscillatory edge in that parameter; says which edges there are.
+    UnknownNameError, ParameterError
+        If the parameter is unknown.
+
+    Notes
+    -----
+    First Lyapunov coefficient by projection on the critical eigenvectors (Kuznetsov, Elements of Applied
+    Bifurcation Theory, eq. 5.62), for the Model as a differential-algebraic system; theory 6 has closed forms.
+    """
+    name = parameter_along(rig, along)
+    edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]
+    oscillatory = [edge for edge in edges if edge.kind == "oscillatory"]
+    if not oscillatory:
+        found = "; ".join(str(edge) for edge in edges) or "stability does not change at all"
+        raise NotAvailable(f"no oscillatory edge of stability along {name}: {found}")
+    own = float(rig.parameters()[name].value)  # type: ignore[arg-type]  # boundary() refuses None
+    return onset_at(rig, min(oscillatory, key=lambda edge: abs(edge.value - own)), branch)
+
+
+def parameter_along(rig: Slider, along: str) -> str:
+    """Full name of a parameter; for the stiffness, the one that the rig has: a spring's, a press's, or a gain kp."""
+    name = rig.resolve(along)
+    if name != "slider.stiffness" or rig.stiffness is not None:
+        return name
+    return "drive.kp" if rig.axial_stiffness is None else "slider.axial_stiffness"
+
+
+def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
+    """Kind of onset at an oscillatory edge found before.
+
+    Raises
+    ------
+    NotAvailable
+        If the numbers of the rig are so far apart that rounding hides it.
+    """
+    name = edge.parameter
+    values = _flat(rig, name, [edge.value], branch)
+    found = coefficients(values, np.array([edge.angular_frequency]))
+    if not np.isfinite(found["c1"][0]):
+        raise NotAvailable(f"the kind of onset at {name} = {edge.value:.4g} is lost in rounding")
+    return Onset(
+        rig=rig,
+        along=name,
+        value=edge.value,
+        unit=edge.unit,
+        kind=str(kinds(found)[0]),
+        coefficient=float(found["c1"][0]),
+        share=float(found["share"][0]),
+        angular_frequency=edge.angular_frequency,
+        growth_slope=_growth_slope(rig, name, edge, branch),
+        stress_ratio=float(found["stress_ratio"][0]),
+        stable=edge.stable,
+    )
+
+
+def _flat(rig: Slider, name: str, at: Any, branch: int) -> Values:
+    present = (name,) if rig.parameters()[name].role.structural else ()
+    return model_values(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
+
+
+def _growth_slope(rig: Slider, name: str, edge: Boundary, branch: int) -> float:
+    """Re(dλ/dp) from the characteristic polynomial: central differences of its coefficients, Richardson's rule."""
+    size = abs(edge.value) or 1e-3
+    steps = np.array([1e-3, -1e-3, 5e-4, -5e-4]) * size
+    c = characteristic(_flat(rig, name, edge.value + steps, branch))
+    slope = (4 * (c[2] - c[3]) / (2 * steps[2]) - (c[0] - c[1]) / (2 * steps[0])) / 3
+    middle = characteristic(_flat(rig, name, [edge.value], branch))[0]
+    s = 1j * edge.angular_frequency
+    powers = s ** np.arange(len(middle))
+    down = np.arange(1, len(middle)) * middle[1:] @ powers[:-1]
+    return float((-(slope @ powers) / down).real)
+
+
+def kinds(found: dict[str, Array]) -> Array:
+    """Words for coefficients."""
+    named = np.where(found["c1"] < 0, "supercritical", "subcritical").astype(object)
+    named[~(found["share"] > ROUNDING)] = "degenerate"
+    return named
+
+
+NO_EDGE, SUPERCRITICAL, SUBCRITICAL, DEGENERATE = range(4)
+
+
+def onset_map(rig: Slider, vary: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Kinds of onset of many rigs, each at the oscillatory edge in stiffness nearest to its own.
+
+    Parameters
+    ----------
+    rig : Slider
+    vary : mapping of str to array_like or xarray.DataArray, optional
+        Parameters by dotted name, SI units; they broadcast.
+
+    Returns
+    -------
+    dict of str to ndarray or xarray.DataArray
+        ``kind`` (0 where there is no such edge, 1 supercritical, 2 subcritical, 3 degenerate),
+        ``edge`` (Pa/m, of the gain kp for a rig without spring) and ``coefficient`` (c1, 1/s), both NaN there.
+
+    Raises
+    ------
+    ParameterError
+        If a name or value is not allowed.
+    """
+    values = model_values(rig, vary)
+    along = parameter_along(rig, "slider.stiffness")
+    place = list(values.model.parameters).index("drive.kp" if along == "drive.kp" else "slider.stiffness")
+    found = in_chunks(values, lambda part: _onsets(part, place))
+    kind, edge, coefficient = np.moveaxis(np.asarray(found), -1, 0)
+    return {
+        "kind": values.wrap(kind.astype(np.int8), "onset", "1"),
+        "edge": values.wrap(edge, "onset_edge", "Pa/m"),
+        "coefficient": values.wrap(coefficient, "onset_coefficient", "1/s"),
+    }
+
+
+def _onsets(values: Values, place: int) -> Array:
+    """Kind, edge and c1 of each rig, (..., 3), along the stiffness or gain that is argument number `place`."""
+    arguments = list(values.arguments)
+    own = np.broadcast_to(arguments[place], values.shape).reshape(-1)
+    if list(values.model.parameters)[place] == "drive.kp":  # a gain acts as a spring would
+        arguments[place] = 0.0
+    bare = replace(values, arguments=tuple(arguments))
+    found = stable_set(*(np.broadcast_to(c, (*values.shape, c.shape[-1])) for c in stiffness_polynomials(bare)))
+    count = values.size
+    edges, frequencies, changes = (a.reshape(count, -1) for a in (found.edges, found.frequencies, found.changes))
+    usable = changes.astype(bool) & (frequencies > 0) & np.isfinite(frequencies)
+    distance = np.where(usable, np.abs(edges - own[:, None]), np.inf)
+    nearest = np.argmin(distance, axis=1)
+    rows = np.flatnonzero(usable.any(axis=1))
+    result = np.full((count, 3), np.nan)
+    result[:, 0] = NO_EDGE
+    if len(rows):
+        flat = [np.broadcast_to(a, values.shape).reshape(-1)[rows] if np.ndim(a) else a for a in arguments]
+        flat[place] = edges[rows, nearest[rows]]
+        at_edge = replace(values, arguments=tuple(flat), shape=(len(rows),))
+        numbers = coefficients(at_edge, frequencies[rows, nearest[rows]])
+        words = np.array(["", "supercritical", "subcritical", "degenerate"])
+        known = np.isfinite(numbers["c1"])
+        kind = np.argmax(kinds(numbers)[:, None] == words, axis=1)
+        result[rows, 0] = np.where(known, kind, NO_EDGE)
+        result[rows, 1] = np.where(known, flat[place], np.nan)
+        result[rows, 2] = numbers["c1"]
+    return result.reshape(*values.shape, 3)
+
+
+def coefficients(values: Values, omega: Array) -> dict[str, Array]:
+    """First Lyapunov coefficients of rigs on an oscillatory edge.
+
+    Parameters
+    ----------
+    values : Values
+        Flat arrays, (m,).
+    omega : ndarray (m,)
+        Angular frequency there, rad/s.
+
+    Returns
+    -------
+    dict
+        ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa), each (m,).
+    """
+    sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
+    expansion = taylor(values, sigma)
+    size = max(len(omega), len(expansion.gradient))
+    omega = np.broadcast_to(omega, (size,))
+    drive = np.broadcast_to(np.asarray(values.named()["drive.velocity"], dtype=float), (size,))
+    return _projected(expansion, omega, drive)
+
+
+def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array]:
+    n = len(expansion.mass)
+    gradient = np.broadcast_to(expansion.gradient, (len(omega), n, n))
+    mass = np.diag(expansion.mass)
+    rows, columns = _equilibrated(np.abs(gradient) + omega[:, None, None] * mass)
+
+    def scaled(matrix: Array) -> Array:
+        return np.asarray(rows[:, :, None] * matrix * columns[:, None, :])
+
+    def solve(matrix: Array, right: Array) -> Array:
+        """matrix⁻¹ right, in scaled rows and columns; NaN where rounding has made the matrix singular."""
+        balanced = scaled(matrix)
+        singular = np.linalg.cond(balanced) > 1 / np.finfo(float).eps
+        balanced = np.where(singular[:, None, None], np.eye(n), balanced)
+        found: Array = columns * np.linalg.solve(balanced, (rows * right)[:, :, None])[:, :, 0]
+        return np.where(singular[:, None], np.nan, found)
+
+    critical = scaled(gradient - 1j * omega[:, None, None] * mass)
+    left, _, right = np.linalg.svd(critical)
+    q = columns * right[:, -1].conj()
+    p = rows * left[:, :, -1]
+    v = expansion.system.velocity
+    q = q * (0.5 * drive / q[:, v])[:, None]
+    p = p / np.sum(p.conj() * (q @ mass), axis=1)[:, None].conj()
+    steady = -solve(gradient.astype(complex), expansion.quadratic(q, q.conj()))
+    double = solve(2j * omega[:, None, None] * mass - gradient, expansion.quadratic(q, q))
+    terms = [
+        0.5 * np.sum(p.conj() * part, axis=1)
+        for part in (
+            expansion.cubic(q, q, q.conj()),
+            2 * expansion.quadratic(q, steady),
+            expansion.quadratic(q.conj(), double),
+        )
+    ]
+    c1 = np.real(sum(terms))
+    spring = expansion.system.unknowns.index(expansion.system.model.symbols["spring"])
+    with np.errstate(all="ignore"):
+        share = np.abs(c1) / sum(np.abs(term) for term in terms)
+    return {"c1": c1, "share": share, "stress_ratio": 2 * np.abs(q[:, spring])}
+
+
+def _equilibrated(size: Array) -> tuple[Array, Array]:
+    """Factors for rows and columns that bring the largest entries near one: units must not decide pivots."""
+    rows, columns = np.ones(size.shape[:2]), np.ones(size.shape[:2])
+    for _ in range(6):
+        scaled = rows[:, :, None] * size * columns[:, None, :]
+        rows = rows / np.sqrt(np.maximum(scaled.max(axis=2), 1e-300))
+        scaled = rows[:, :, None] * size * columns[:, None, :]
+        columns = columns / np.sqrt(np.maximum(scaled.max(axis=1), 1e-300))
+    return rows, columns

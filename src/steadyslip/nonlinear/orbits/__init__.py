@@ -1,0 +1,1 @@
+"""Cycles: equations, continuation along a parameter, special points, branches."""

@@ -1,0 +1,261 @@
+"""Cycles along a parameter: what is known of each, of special points, and of where a branch ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import outside, shown, stress_name
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.onset.hopf import Onset
+from steadyslip.nonlinear.orbits.shooting import Orbit
+
+Array = np.ndarray
+UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "stress_drop": "Pa",
+         "lowest_normal_stress": "Pa", "highest_normal_stress": "Pa", "slip": "m", "growth": "1"}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """One periodic motion.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter, SI units.
+    period : float
+        s.
+    peak_velocity, lowest_velocity : float
+        m/s, located.
+    amplitude : float
+        Half of ln(peak velocity/lowest velocity); infinite where the block stops or turns round.
+    stress_drop : float
+        Highest less lowest spring stress, Pa.
+    lowest_normal_stress, highest_normal_stress : float
+        Pa.
+    multipliers : tuple of complex
+        Floquet multipliers by falling size, the trivial one (1) left out.
+    trivial : float
+        The one that should be 1; its distance from 1 is a measure of precision.
+    stable : bool
+        Whether the cycle attracts: all multipliers inside the unit circle.
+    start : dict of str to float
+        State where the block, speeding up, is as fast as the load point: x, v and memory, SI units, for
+        ``simulate(rig, initial=...)``.
+    """
+
+    value: float
+    period: float
+    peak_velocity: float
+    lowest_velocity: float
+    amplitude: float
+    stress_drop: float
+    lowest_normal_stress: float
+    highest_normal_stress: float
+    multipliers: tuple[complex, ...]
+    trivial: float
+    stable: bool
+    start: dict[str, float]
+    _orbit: Orbit | None = field(default=None, repr=False)
+
+    @property
+    def growth(self) -> float:
+        """Size of the largest multiplier: factor by which a small deviation grows in one period."""
+        return max((abs(m) for m in self.multipliers), default=0.0)
+
+    @property
+    def slip(self) -> float:
+        """Slip per period, m: the load point's advance."""
+        return self.start["v"] * self.period
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialCycle:
+    """A cycle at which the branch changes.
+
+    Attributes
+    ----------
+    kind : str
+        ``fold``, ``period doubling``, ``torus`` or ``range`` (the end of the range asked for).
+    cycle : Cycle
+    bracket : tuple of float
+        Values of the parameter on both sides (at a fold: of neighbouring cycles).
+    precision : float
+        Estimated error of the parameter's value there, relative.
+    index : int
+        Place in the branch: it lies before the cycle of this number.
+    """
+
+    kind: str
+    cycle: Cycle
+    bracket: tuple[float, float]
+    precision: float
+    index: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class CycleBranch:
+    """Cycles that are born at an oscillatory edge of stability, in the order in which they were followed.
+
+    Attributes
+    ----------
+    rig : Slider
+    along, unit : str
+        The parameter and its SI unit.
+    onset : Onset
+        The edge at which the branch begins.
+    cycles : tuple of Cycle
+    special : tuple of SpecialCycle
+    end : str
+        Why the branch stops.
+    doubled : CycleBranch or None
+        The branch of twice the period that begins at the first period doubling.
+    gaps : tuple of int
+        Numbers of the cycles before which the branch is not continuous: a sheet broke off, and simulation found
+        another beyond it.
+    broken : tuple of str
+        For each gap, why the sheet before it was not followed any further.
+    steady : int
+        Which steady sliding, where there are several.
+    rtol : float or None
+        Error allowed per step, as asked for.
+    """
+
+    rig: Slider = field(repr=False)
+    along: str
+    unit: str
+    onset: Onset = field(repr=False)
+    cycles: tuple[Cycle, ...] = field(repr=False)
+    special: tuple[SpecialCycle, ...] = field(repr=False)
+    end: str
+    doubled: CycleBranch | None = field(default=None, repr=False)
+    gaps: tuple[int, ...] = ()
+    broken: tuple[str, ...] = ()
+    steady: int = 0
+    rtol: float | None = None
+
+    def __len__(self) -> int:
+        return len(self.cycles)
+
+    def __getitem__(self, name: str) -> Array:
+        """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ..."""
+        return np.array([getattr(cycle, name) for cycle in self.cycles])
+
+    def at(self, value: float) -> tuple[Cycle, ...]:
+        """The cycles that exist at one value of the parameter, corrected to full precision."""
+        from steadyslip.nonlinear.orbits.cycles import cycles_at
+
+        return cycles_at(self, value)
+
+    def _stretches(self) -> list[list[Cycle]]:
+        """Cycles from gap to gap, folds among them."""
+        starts = (0, *self.gaps, len(self.cycles))
+        folds = {point.index: point.cycle for point in self.special if point.kind == "fold"}
+        found = []
+        for start, stop in pairwise(starts):
+            stretch = []
+            for i in range(start, stop):
+                stretch += [folds[i]] if i in folds and i > start else []
+                stretch.append(self.cycles[i])
+            found.append(stretch)
+        return found
+
+    def to_xarray(self) -> Any:
+        """An xarray.Dataset over ``point``."""
+        import xarray as xr
+
+        names = {"value": self.unit} | UNITS
+        data = {name: ("point", self[name].astype(float), {"units": unit}) for name, unit in names.items()}
+        data["stable"] = ("point", self["stable"], {})
+        attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind, "gaps": list(self.gaps)}
+        return xr.Dataset(data, attrs=attributes)
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write one row for each cycle, units in the header."""
+        names = {"value": self.unit} | UNITS
+        written = {name: outside(unit, self.rig.area) for name, unit in names.items()}
+        columns = [self[name].astype(float) * factor for name, (factor, _) in written.items()]
+        table = np.column_stack([*columns, self["stable"].astype(float)])
+        header = ",".join([*(f"{name} ({unit})" for name, (_, unit) in written.items()), "stable"]).replace(
+            "value", self.along, 1
+        )
+        np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.12g")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units, as ``steadyslip cycles --json`` prints it."""
+
+        def plain(cycle: Cycle) -> dict[str, Any]:
+            found = {name: getattr(cycle, name) for name in ("value", *UNITS)}
+            found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
+            found |= {"stable": cycle.stable, "start": cycle.start}
+            return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
+
+        return {
+            "parameter": self.along,
+            "unit": self.unit,
+            "onset": {"kind": self.onset.kind, "value": self.onset.value},
+            "end": self.end,
+            "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
+            "cycles": [plain(cycle) for cycle in self.cycles],
+            "special": [
+                {"kind": s.kind, "bracket": list(s.bracket), "precision": s.precision} | plain(s.cycle)
+                for s in self.special
+            ],
+            "doubled": None if self.doubled is None else self.doubled.to_dict(),
+        }
+
+    def plot(self, kind: str = "branch", ax: Any = None) -> Any:
+        """Draw the branch; see `steadyslip.figures.cycle_branch`."""
+        return draw(self, kind, ax=ax)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended the branch early."""
+        return self.end.startswith("interrupted")
+
+    def __str__(self) -> str:
+        area = self.rig.area
+        edge = shown(self.onset.value, self.unit, 6, area)
+        lines = [f"cycles along {self.along} from a {self.onset.kind} onset at {edge}: {len(self.cycles)} cycles"]
+        if self.cycles:
+            v = self["peak_velocity"], self["lowest_velocity"]
+            period, drop = self["period"], self["stress_drop"]
+            lines += [
+                f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}",
+                f"  period       {shown(float(period.min()), 's')} to {shown(float(period.max()), 's')}",
+                f"  {stress_name('stress drop', area):<13}up to {shown(float(drop.max()), 'Pa', area=area)}",
+                f"  stable       {_stretches(self)}",
+            ]
+        for point in self.special:
+            lines.append(
+                f"  {point.kind} at {shown(point.cycle.value, self.unit, 7, area)} "
+                f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
+            )
+        for i, why in zip(self.gaps, self.broken, strict=True):
+            before = shown(self.cycles[i - 1].value, self.unit)
+            after = shown(self.cycles[i].value, self.unit)
+            lines += [f"  gap: at {before} {why};", f"    another sheet, found by simulation, from {after} on"]
+        lines.append(f"  ends: {self.end}")
+        if self.doubled is not None:
+            lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]
+        return "\n".join(lines)
+
+
+def _stretches(branch: CycleBranch) -> str:
+    """Where along the branch cycles are stable, in words."""
+    stable = branch["stable"]
+    if stable.all():
+        return "all"
+    if not stable.any():
+        return "none"
+    changes = np.flatnonzero(stable[1:] != stable[:-1]) + 1
+    pieces = np.split(np.arange(len(stable)), changes)
+    found = [piece for piece in pieces if stable[piece[0]]]
+    values, area = branch["value"], branch.rig.area
+    ends = [(float(values[p].min()), float(values[p].max())) for p in found]
+    return "; ".join(f"{shown(a, branch.unit, area=area)} to {shown(b, branch.unit, area=area)}" for a, b in ends)

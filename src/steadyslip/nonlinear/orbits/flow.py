@@ -1,0 +1,347 @@
+"""The motion over a given time as a smooth map of starting state and one parameter, with its derivative.
+
+Cycles are fixed points of this map. Inputs are constant: `Runs` takes them, and the rig, from prepared jobs, as they
+are; `Flow` leaves one parameter of a rig free, which is driven at its own velocity and not disturbed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import array_function
+from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.program import SETTINGS, Program, program
+from steadyslip.kernels.reduction import TIME, V_LP, P, Q, Reduction
+from steadyslip.kernels.variational import with_sensitivities
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
+from steadyslip.motion.observe import observe
+from steadyslip.motion.setup import Jobs, Options, automatic_method, initial_values, prepare
+from steadyslip.motion.status import WORDS, remedy
+from steadyslip.nonlinear.continuation import Failure
+from steadyslip.protocol import Segments
+from steadyslip.steady import steady_stress
+from steadyslip.values import Values, model_values
+
+Array = np.ndarray
+DONE = WORDS.index("done")
+NEVER = np.empty(0)
+NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
+DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
+
+
+class FlowFailure(Failure):
+    """A run that did not reach its end; `status` says why, in the words of `steadyslip.motion.status`."""
+
+    def __init__(self, status: str) -> None:
+        super().__init__(f"a run ended with: {status}")
+        self.status = status
+
+
+@lru_cache(maxsize=64)
+def _restored(reduction: Reduction) -> Any:
+    """Continuous variables from the state, for starting a kernel anywhere."""
+    model = reduction.model
+    arguments = [*model.parameters.values(), model.sigma_ss, *reduction.state, V_LP, Q, P, TIME]
+    return array_function(arguments, list(reduction.restored))
+
+
+@lru_cache(maxsize=64)
+def _with_sensitivities(reduction: Reduction, method: str) -> Program:
+    return Program(with_sensitivities(reduction), Choice(method, dense=False))
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A rig at one value of the free parameter, as kernels take it.
+
+    Attributes
+    ----------
+    value, unit : float
+        The parameter, and the size of change that derivatives in it refer to.
+    values : Values
+        Of the model, arrays of one number.
+    sigma : ndarray (1,)
+    inputs : ndarray (3,)
+        Load-point velocity (m/s), disturbance and added normal stress (Pa).
+    plain, varied : tuple of ndarray
+        Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
+    """
+
+    value: float
+    unit: float
+    values: Values
+    sigma: Array
+    inputs: Array
+    plain: tuple[Array, Array]
+    varied: tuple[Array, Array]
+
+    @property
+    def drive(self) -> float:
+        """Velocity of the load point, m/s."""
+        return float(self.inputs[0])
+
+
+class Runs:
+    """Runs of one rig under constant inputs.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Prepared, with one segment for each run.
+    which : int, optional
+        The run whose rig and inputs are meant.
+    rtol : float, optional
+        Error allowed per step; 1e-10 for explicit methods, 1e-9 for Rosenbrock methods unless given.
+
+    Attributes
+    ----------
+    noise : float
+        Smallest absolute error, in natural sizes, that integration can keep to.
+    size : int
+        Number of state variables n.
+    scales : ndarray (n,)
+        Their natural sizes, at the rig's own parameter.
+    time : float
+        Natural time, s.
+
+    Raises
+    ------
+    NotAvailable
+        If the rig's motion is ill-posed, or pressed by a force prescribed in time.
+    """
+
+    def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None) -> None:
+        if not jobs.posed[which if len(jobs.posed) > 1 else 0]:
+            raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
+        if jobs.values.model.imposed != 0:
+            raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
+        self.reduction, self.size = jobs.reduction, len(jobs.reduction.state)
+        method = automatic_method(self.reduction)
+        stiff = method != "tsit5"
+        self.options = Options(rtol=rtol or (1e-9 if stiff else 1e-10), most_steps=1_000_000)
+        self.base, self.which = replace(jobs, options=self.options), which
+        self.noise = 1e-13 if stiff else 1e-16
+        self.finest = self.noise / self.options.rtol
+        self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
+        self.sensitive = _with_sensitivities(self.reduction, method)
+        arguments, sigma = jobs.part(which, which + 1)
+        self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
+        own = replace(jobs.values, arguments=tuple(np.atleast_1d(a) for a in arguments), shape=(1,))
+        inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
+        self.own = self._set(own, np.atleast_1d(sigma), inputs)
+        self.scales = self.own.plain[1][0, -self.size :] / self.options.rtol
+        self.time = float(self.scales[0] / self.own.drive)
+
+    # -- one rig
+
+    def setting(self, value: float) -> Setting:
+        """The rig as it is: there is no parameter."""
+        return self.own
+
+    def _set(
+        self, values: Values, sigma: Array, inputs: Array, value: float = 0.0, unit: float = 1.0,
+        rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
+    ) -> Setting:  # fmt: skip
+        """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
+        constants = self.machine.constants(values.arguments, sigma)
+        settings = self._settings_at(values, sigma, value)
+        scales = settings[0, -self.size :]
+        ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
+        varied = np.concatenate([settings[0], ratio, scales])[None]
+        found = self.sensitive.constants(values.arguments, sigma)
+        varying = self.sensitive.kernel.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
+        return Setting(value, unit, values, sigma, inputs, (constants, settings), (varying, varied))
+
+    def _settings_at(self, values: Values, sigma: Array, value: float) -> Array:
+        """What kernels are told beside constants: sizes mostly, which hold in the neighbourhood of a parameter."""
+        at, settings = self._near
+        if not len(settings) or abs(value - at) > NEIGHBOURHOOD * abs(at):
+            jobs = replace(self.base, values=values, sigma=sigma)
+            settings = jobs.tables(self.machine, self.which, self.which + 1, True, True)[2]
+            self._near = value, settings
+        return settings
+
+    # -- runs
+
+    def run(self, setting: Setting, states: Array, times: Array, amplitude: float = 1.0) -> tuple[Array, Array, Array]:
+        """Runs from `states` (m, n) over `times` (m,).
+
+        Returns
+        -------
+        ends : ndarray (m, n)
+        sensitivities : ndarray (m, n, n)
+            In the starting state.
+        slopes : ndarray (m, n)
+            In the parameter, per ``setting.unit``.
+        """
+        count, n = len(states), self.size
+        initial = np.hstack([self._continuous(setting, states), self._unit(count)])
+        settings = self._finer(setting.varied[1], amplitude)
+        final = self._advanced(self.sensitive, setting.varied[0], settings, initial, setting.inputs, times)
+        matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
+        return final[:, :n], matrix, final[:, n + n * n :]
+
+    def _unit(self, count: int) -> Array:
+        """S and D where a run starts."""
+        return np.tile(np.append(np.eye(self.size).ravel(), np.zeros(self.size)), (count, 1))
+
+    def _finer(self, settings: Array, amplitude: float) -> Array:
+        """Settings for small motions: absolute errors allowed shrink with their size."""
+        finer = settings.copy()
+        atol = slice(len(SETTINGS), len(SETTINGS) + self.size)
+        finer[:, atol] *= max(min(1.0, amplitude), self.finest)
+        finer[:, SETTINGS.index("watch")] = finer[:, SETTINGS.index("record")] = 0.0
+        return finer
+
+    def _continuous(self, setting: Setting, states: Array) -> Array:
+        with np.errstate(all="ignore"):
+            found = _restored(self.reduction)(
+                *map(np.asarray, setting.values.arguments), setting.sigma, *states.T, *setting.inputs, 0.0
+            )
+        return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
+
+    def _advanced(
+        self, machine: Program, constants: Array, settings: Array, initial: Array, inputs: Array, times: Array
+    ) -> Array:
+        tables = (constants, np.ascontiguousarray(initial), settings, _rows(inputs, times))
+        call = Call(machine, tables, len(times), np.empty(0))
+        call.go(2**62)
+        if np.any(call.status != DONE):
+            raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
+        return call.final[:, 4:]
+
+    def field(self, setting: Setting, states: Array) -> tuple[Array, Array, Array]:
+        """Rates (m, n), their Jacobian (m, n, n) and their slopes in the parameter (m, n) at given states."""
+        count, n = len(states), self.size
+        full = np.hstack([states, self._unit(count)])
+        inputs = np.zeros((count, 7))
+        inputs[:, :3] = setting.inputs
+        values = np.empty_like(full)
+        own = np.zeros(count, dtype=np.int64)
+        self.sensitive.code.field(*setting.varied, full, inputs, own, values)
+        matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
+        return values[:, :n], matrix, values[:, n + n * n :]
+
+    def watched(
+        self, setting: Setting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER
+    ) -> Outcome:
+        """One run with its events and steps, and samples at given times.
+
+        Raises
+        ------
+        FlowFailure
+            If it does not reach its end.
+        KeyboardInterrupt
+            If it was interrupted.
+        """
+        initial = self._continuous(setting, state[None])
+        settings = self._finer(setting.plain[1], amplitude)
+        settings[:, SETTINGS.index("watch")] = settings[:, SETTINGS.index("record")] = 1.0
+        tables = (*setting.plain[:1], initial, settings, _rows(setting.inputs, np.array([time])))
+        outcome = run_tables(self.machine, tables, times)
+        if outcome.status[0] == INTERRUPTED:
+            raise KeyboardInterrupt
+        if outcome.status[0] != DONE:
+            raise FlowFailure(WORDS[int(outcome.status[0])])
+        return outcome
+
+    def observed(self, setting: Setting, times: Array, states: Array) -> dict[str, Array]:
+        """All observables at given states."""
+        rows = _rows(setting.inputs, np.array([float(times[-1]) or 1.0]))[0]
+        waves = np.zeros((1, 1, 3, 0))
+        segments = Segments(
+            rows[None, :, 0], rows[None, :, 1], rows[None, :, 2], rows[None, :, 3:6], rows[None, :, 6:9],
+            waves, waves, waves,
+        )  # fmt: skip
+        jobs = replace(self.base, values=setting.values, sigma=setting.sigma, segments=segments)
+        zero = np.zeros(len(times), dtype=int)
+        return observe(jobs, self.machine, 0, zero, zero, times, states)
+
+
+class Flow(Runs):
+    """Runs of a rig with one parameter left free.
+
+    Parameters
+    ----------
+    rig : Slider
+    name : str
+        Full name of the free parameter.
+    branch : int
+    rtol : float, optional
+        As for `Runs`.
+    """
+
+    def __init__(self, rig: Slider, name: str, branch: int = 0, rtol: float | None = None) -> None:
+        self.rig, self.name, self.branch = rig, name, branch
+        address = rig.parameters()[name]
+        self.present = (name,) if address.role.structural else ()
+        self.domain = address.role.domain
+        self._settings: dict[float, Setting] = {}
+        own = float(address.value)  # type: ignore[arg-type]
+        super().__init__(prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch), rtol=rtol)
+
+    def setting(self, value: float) -> Setting:
+        """The rig with the free parameter at a value.
+
+        Raises
+        ------
+        Failure
+            If the value is outside its domain, or steady sliding does not exist there.
+        """
+        if value not in self._settings:
+            if len(self._settings) > 64:
+                self._settings.clear()
+            self._settings[value] = self._made(value)
+        return self._settings[value]
+
+    def _made(self, value: float) -> Setting:
+        if not self.domain.contains(value):
+            raise Failure(f"{self.name} leaves its domain")
+        values = self._varied(np.array([value]))
+        sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
+        if not sigma[0] > 0:
+            raise Failure("lock-up or lift-off: steady sliding ceases to exist")
+        unit = abs(value) or 1.0
+        drive = np.ravel(values.named()["drive.velocity"])[0]
+        return self._set(values, sigma, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
+
+    def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
+        """How fast constants and inputs change with the parameter, per unit: central differences."""
+        beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
+        found = self.sensitive.constants(beside.arguments, steady_stress(beside))
+        if len(found) == 1:
+            found = np.repeat(found, 2, axis=0)
+        rates = (found[0] - found[1]) / (2 * DIFFERENCE)
+        drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
+        return rates[None, None], {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
+
+    def _varied(self, around: Array) -> Values:
+        """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
+        if self.rig.axial_stiffness is None:
+            named = self.base.values.named() | {self.name: around}
+            return replace(self.base.values, arguments=tuple(named.values()))
+        return model_values(self.rig, {self.name: around}, self.present, self.branch, scan=True)
+
+    def steady(self, value: float) -> Array:
+        """State in steady sliding."""
+        setting = self.setting(value)
+        continuous, _ = initial_values(self.reduction, setting.values, setting.sigma, {})
+        where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
+        guess = setting.plain[1][0, SETTINGS.index("guess")]
+        return np.array([where.get(symbol, guess) for symbol in self.reduction.state])
+
+
+def _rows(inputs: Array, times: Array) -> Array:
+    """One segment of constant inputs for each run, as kernels read it."""
+    rows = np.zeros((len(times), 1, 9))  # start, end, jump, values, slopes
+    rows[:, 0, 1] = times
+    rows[:, 0, 3:6] = inputs
+    return rows

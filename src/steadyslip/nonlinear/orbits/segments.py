@@ -1,0 +1,74 @@
+"""Where to cut a cycle into segments, so that deviations across the motion grow little in each.
+
+A deviation along the motion is a matter of time only: in a slip event of many decades it grows with the velocity and
+shrinks with it again. It is left out, and cuts are made where the motion is slow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
+
+Array = np.ndarray
+NODES = 48  # places at which a cut is considered
+MOST_GROWTH = 1e3  # of deviations within a segment
+QUICK = 30.0  # speed, in units of the mean along the cycle, beyond which it is not cut
+
+
+def cut(shooting: Shooting, u: Array) -> Orbit | None:
+    """The orbit of some unknowns in new segments; None if these would be no more than there are.
+
+    Raises
+    ------
+    Failure
+        If the motion cannot be run through.
+    """
+    flow, orbit = shooting.flow, shooting.orbit(u)
+    setting = flow.setting(orbit.value)
+    times, states = _nodes(shooting, orbit)
+    spans = np.diff(np.append(times, orbit.period))
+    _, sensitivity, _ = flow.run(setting, states, spans, shooting.amplitude)
+    stretch = np.hypot(flow.scales, states)
+    after = np.roll(stretch, -1, axis=0)
+    along = flow.field(setting, states)[0] / stretch
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    across = np.eye(flow.size) - along[:, :, None] * along[:, None, :]
+    steps = np.roll(across, -1, axis=0) @ (sensitivity * stretch[:, None, :] / after[:, :, None]) @ across
+    at = _cuts(steps)
+    if len(at) <= shooting.segments:
+        return None
+    return Orbit(states[at], orbit.period, orbit.value, np.diff(np.append(times[at], orbit.period)) / orbit.period)
+
+
+def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
+    """Times and states evenly spread along the cycle, as it looks in the unknowns, where it is slow."""
+    flow = shooting.flow
+    setting = flow.setting(orbit.value)
+    times, states = [], []
+    starts = np.cumsum(shooting.fractions) - shooting.fractions
+    for begin, share, state in zip(starts, shooting.fractions, orbit.states, strict=True):
+        record = flow.watched(setting, state, share * orbit.period, shooting.amplitude).recorded
+        times.append(begin * orbit.period + record[:-1, 0])
+        states.append(record[:-1, 2:])
+    time, every = np.concatenate(times), np.vstack(states)
+    place = np.arcsinh(every / flow.scales)
+    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
+    speed = np.linalg.norm(flow.field(setting, every)[0] / np.hypot(flow.scales, every), axis=1)
+    wanted = np.searchsorted(arc, np.linspace(0.0, arc[-1], NODES + 1)[:-1])
+    slow = speed * orbit.period < QUICK * arc[-1]
+    slow[0] = True
+    at = np.unique(wanted[slow[wanted]])
+    return time[at], every[at]
+
+
+def _cuts(steps: Array) -> list[int]:
+    """Indices of nodes at which segments start: each as long as nothing in it grows more than is allowed."""
+    found, running = [0], [steps[0]]
+    for k in range(1, len(steps)):
+        further = [steps[k] @ product for product in (*running, np.eye(len(steps[k])))]
+        if max(np.linalg.norm(product, 2) for product in further) > MOST_GROWTH:
+            found.append(k)
+            further = [steps[k]]
+        running = further
+    return found

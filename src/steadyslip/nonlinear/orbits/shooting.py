@@ -1,0 +1,175 @@
+"""Cycles as solutions of equations: shooting over one or several segments of the period.
+
+Unknowns are asinh(state/scale) at the start of each segment, the logarithm of the period, and the free parameter:
+linear for small motions, logarithmic for large ones, so that branches over many decades are nearly straight.
+The cycle starts where the block, speeding up, is as fast as the load point: every cycle
+passes there, whatever its size. Several segments are used where one would be too unstable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from steadyslip.nonlinear.continuation import Curve, Failure
+from steadyslip.nonlinear.orbits.flow import Runs
+
+Array = np.ndarray
+ONE = np.ones(1)
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A cycle: states at the starts of its segments (K, n), period, parameter, shares of the period (K,)."""
+
+    states: Array
+    period: float
+    value: float
+    fractions: Array = field(default_factory=lambda: np.ones(1))
+
+
+class Shooting:
+    """The equations of a cycle for `continuation.Curve`.
+
+    Parameters
+    ----------
+    flow : Runs
+    fractions : ndarray (K,)
+        Share of the period that each segment takes; they add up to one.
+    logarithmic : bool
+        Whether the parameter is positive and its logarithm the unknown.
+    size : float
+        Unit of the parameter otherwise.
+    """
+
+    def __init__(self, flow: Runs, fractions: Array, logarithmic: bool, size: float) -> None:
+        self.flow, self.fractions = flow, fractions
+        self.logarithmic, self.size = logarithmic, size
+        self.amplitude = 1.0
+        self._last: tuple[bytes, Array, Array] | None = None
+
+    def curve(self) -> Curve:
+        """The curve of these cycles, for continuation.
+
+        Its lengths and angles count the first state, period and parameter only: further segments are the same cycle.
+        """
+        weights = np.ones(self.segments * self.flow.size + 2)
+        weights[self.flow.size : -2] = 0.0
+        return Curve(self.equations, max(1e-9, 100 * self.flow.noise / self.amplitude), most_turn=0.8, weights=weights)
+
+    @property
+    def segments(self) -> int:
+        return len(self.fractions)
+
+    def packed(self, orbit: Orbit) -> Array:
+        """Unknowns of an orbit."""
+        value = np.log(orbit.value / self.size) if self.logarithmic else orbit.value / self.size
+        return np.append(
+            np.arcsinh(orbit.states / self.flow.scales).ravel(), [np.log(orbit.period / self.flow.time), value]
+        )
+
+    def orbit(self, u: Array) -> Orbit:
+        """The orbit of some unknowns."""
+        states = np.sinh(u[:-2].reshape(self.segments, self.flow.size)) * self.flow.scales
+        value = self.size * (np.exp(u[-1]) if self.logarithmic else u[-1])
+        return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value), self.fractions)
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        """Residuals and Jacobian; see `continuation.Equations`."""
+        flow, n, count = self.flow, self.flow.size, self.segments
+        if not np.all(np.isfinite(u)) or np.max(np.abs(u[:-1])) > 60 or (self.logarithmic and abs(u[-1]) > 60):
+            raise Failure("out of range")
+        orbit = self.orbit(u)
+        setting = flow.setting(orbit.value)
+        times = self.fractions * orbit.period
+        ends, sensitivity, slopes = flow.run(setting, orbit.states, times, self.amplitude)
+        start, gradient, across = flow.field(setting, orbit.states)
+        rates = np.einsum(
+            "kij,kj->ki", sensitivity, start
+        )  # where mass is small, less noisy than the rates at the ends
+        drive, to_unknown = setting.drive, (orbit.value if self.logarithmic else self.size) / setting.unit
+        residual = np.empty(count * n + 1)
+        jacobian = np.zeros((count * n + 1, count * n + 2))
+        stretch = self._stretch(orbit)
+        for k in range(count):
+            rows, after = slice(k * n, (k + 1) * n), (k + 1) % count
+            size = stretch[after]
+            residual[rows] = (ends[k] - orbit.states[after]) / size
+            jacobian[rows, rows] += sensitivity[k] * stretch[k] / size[:, None]
+            jacobian[rows, after * n : (after + 1) * n] -= np.eye(n)
+            jacobian[rows, -2] = rates[k] * times[k] / size
+            jacobian[rows, -1] = slopes[k] * to_unknown / size
+        residual[-1] = start[0, 0] / drive
+        jacobian[-1, :n] = gradient[0, 0] * stretch[0] / drive
+        jacobian[-1, -1] = across[0, 0] * to_unknown / drive
+        self._last = (u.tobytes(), ends, sensitivity)
+        return residual, jacobian
+
+    def _stretch(self, orbit: Orbit) -> Array:
+        """d(state)/d(unknown)."""
+        return np.asarray(np.hypot(self.flow.scales, orbit.states))
+
+    def multipliers(self, u: Array) -> tuple[float, Array]:
+        """The trivial Floquet multiplier and the others, see `multipliers`."""
+        orbit = self.orbit(u)
+        rates, _, _ = self.flow.field(self.flow.setting(orbit.value), orbit.states)
+        return multipliers(self.sensitivities(u), rates / self.flow.scales)
+
+    def sensitivities(self, u: Array) -> Array:
+        """∂(end)/∂(start) of every segment, in natural scales, (K, n, n)."""
+        return np.asarray(self._run(u)[1] * self.flow.scales[None, :] / self.flow.scales[:, None])
+
+    def _run(self, u: Array) -> tuple[Array, Array]:
+        """Ends and sensitivities, kept for the latest unknowns."""
+        if self._last is None or self._last[0] != u.tobytes():
+            orbit = self.orbit(u)
+            times = self.fractions * orbit.period
+            found = self.flow.run(self.flow.setting(orbit.value), orbit.states, times, self.amplitude)
+            self._last = (u.tobytes(), found[0], found[1])
+        return self._last[1:]
+
+
+def multipliers(sensitivities: Array, rates: Array) -> tuple[float, Array]:
+    """Floquet multipliers from the sensitivities of consecutive segments, and the rates where each starts.
+
+    Returns
+    -------
+    trivial : float
+        The multiplier of the direction of motion, 1 but for errors.
+    others : ndarray (n-1,), complex
+        By falling size.
+
+    Notes
+    -----
+    Sensitivities carry the rates of one segment's start to those of the next. That direction is split off first, so
+    that another multiplier near one keeps its digits. Where a cycle is very stable across (small mass), rounding in
+    the state is most of the rates, and rates carried along from the segment before are true; where it is unstable
+    they are worse. The multiplier tells which. Of what remains the block-cyclic matrix is formed, whose
+    eigenvalues are the K-th roots of the multipliers: large and small ones keep their digits.
+    """
+    count, n, _ = sensitivities.shape
+    carried = np.roll(np.einsum("kij,kj->ki", sensitivities, rates), 1, axis=0)
+    trivial, along = min(
+        ((_carried_round(sensitivities, way), way) for way in (rates, carried)), key=lambda found: abs(found[0] - 1)
+    )
+    bases = [np.linalg.qr(way[:, None], mode="complete")[0][:, 1:] for way in along]
+    cyclic = np.zeros((count * (n - 1), count * (n - 1)))
+    for k in range(count):
+        after = (k + 1) % count
+        rows, columns = (slice(i * (n - 1), (i + 1) * (n - 1)) for i in (after, k))
+        cyclic[rows, columns] = bases[after].T @ sensitivities[k] @ bases[k]
+    if count == 1:
+        found = np.linalg.eigvals(cyclic)
+    else:
+        powers = np.linalg.eigvals(cyclic) ** count
+        order = np.argsort(-np.abs(powers))
+        found = np.array([np.mean(powers[order[i * count : (i + 1) * count]]) for i in range(n - 1)])
+    return trivial, np.asarray(found[np.argsort(-np.abs(found))], dtype=complex)
+
+
+def _carried_round(sensitivities: Array, along: Array) -> float:
+    """By what factor one round multiplies the direction of motion."""
+    ends = np.einsum("kij,kj->ki", sensitivities, along)
+    starts = np.roll(along, -1, axis=0)
+    return float(np.prod(np.sum(starts * ends, axis=1) / np.sum(starts * starts, axis=1)))

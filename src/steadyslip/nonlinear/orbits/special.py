@@ -1,0 +1,89 @@
+"""Cycles at which a branch changes: folds, period doublings, tori, between two neighbours of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.nonlinear.continuation import Failure, Point
+from steadyslip.nonlinear.orbits.branch import Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.shooting import Shooting
+
+Array = np.ndarray
+NOISE = 3e-9  # relative differences of the parameter that cannot be told from rounding near the onset
+SMALL = 1e-2  # amplitude below which multipliers within rounding of one are judged by the kind of onset
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A point of a branch with what is derived from it.
+
+    `half` is how far the state has moved after half a period, in natural sizes: zero where that was a whole one.
+    """
+
+    point: Point
+    shooting: Shooting
+    cycle: Cycle
+    half: Array
+
+
+Made = Callable[[Shooting, Point], Known]
+
+
+def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCycle]:
+    """Folds, doublings and tori between two neighbouring points with the same unknowns.
+
+    Parameters
+    ----------
+    made : callable
+        What derives everything from a point.
+    index : int
+        Place in the branch of the later point.
+    """
+    pair = [np.array(known.cycle.multipliers) for known in (before, now)]
+    kinds: list[tuple[str, Callable[[Point], float]]] = []
+    if before.point.tangent[-1] * now.point.tangent[-1] < 0:
+        kinds.append(("fold", lambda point: float(point.tangent[-1])))
+    flips, turns = [doubling(m) for m in pair], [torus(m) for m in pair]
+    if now.shooting.flow.size > 2 and flips[0] * flips[1] < 0:
+        kinds.append(("period doubling", lambda point: doubling(now.shooting.multipliers(point.u)[1])))
+    if min(turns) > -1 and turns[0] * turns[1] < 0:
+        kinds.append(("torus", lambda point: torus(now.shooting.multipliers(point.u)[1])))
+    found = (_located(kind, before, now, measure, made, index) for kind, measure in kinds)
+    return [one for one in found if one is not None]
+
+
+def _located(
+    kind: str, before: Known, now: Known, measure: Callable[[Point], float], made: Made, index: int
+) -> SpecialCycle | None:
+    shooting = now.shooting
+    try:
+        ends = measure(before.point), measure(now.point)
+        low, high = shooting.curve().located(before.point, now.point, measure, *ends)
+        cycle = made(shooting, high).cycle
+    except Failure:
+        return None
+    other = shooting.orbit(low.u).value
+    size = abs(cycle.value) or 1.0
+    away = [abs(known.cycle.value - cycle.value) / size for known in (before, now)]
+    if kind == "fold" and (min(away) < NOISE or cycle.amplitude < SMALL):
+        return None
+    precision = max(abs(other - cycle.value) / size, abs(cycle.trivial - 1) * max(away), 1e-12)
+    beside = (before.cycle.value, now.cycle.value) if kind == "fold" else (other, cycle.value)
+    return SpecialCycle(kind, cycle, (min(beside), max(beside)), float(precision), index)
+
+
+def doubling(multipliers: Array) -> float:
+    """Changes sign where a multiplier passes −1: the product of 1 + μ, each kept of order one."""
+    return float(np.real(np.prod((1 + multipliers) / (1 + np.abs(multipliers)))))
+
+
+def torus(multipliers: Array) -> float:
+    """Positive where a pair of complex multipliers lies outside the unit circle; -1 where there is none.
+
+    Next to one a pair cannot be told from two real multipliers.
+    """
+    pairs = multipliers[np.abs(multipliers.imag) > 1e-3 * np.abs(multipliers)]
+    return float(np.max(np.abs(pairs) - 1, initial=-1.0))

@@ -1,0 +1,371 @@
+"""Following one sheet of cycles: a curve of solutions from a first one to where it ends, and why it ends there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from steadyslip.core.errors import InternalError
+from steadyslip.core.quantities import shown
+from steadyslip.nonlinear.continuation import Curve, Failure, Point
+from steadyslip.nonlinear.onset.hopf import Onset
+from steadyslip.nonlinear.orbits.branch import Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
+from steadyslip.nonlinear.orbits.measure import measured
+from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
+from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
+from steadyslip.nonlinear.orbits.special import SMALL, Known, changes
+from steadyslip.nonlinear.orbits.verify import IMPRECISE
+
+Array = np.ndarray
+LARGEST_STEP = 0.5
+SMALLEST_STEP = 1e-9
+WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
+CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
+UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
+TOO_UNSTABLE = 1e8
+LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
+INTERRUPTED = "interrupted by the user"
+ENDS = {
+    "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the slider a mass or "
+    "radiation_damping to follow the cycles further",
+    "unbounded": "blow-up: the peak velocity grows without bound as the cycle nears the motions of the massless model "
+    "that reach infinite velocity; give the slider a mass or radiation_damping to follow the cycles further",
+    "growth": "the cycle is too unstable to matter: deviations grow 1e8-fold in each period",
+    "contact lost": "contact lost: the normal stress falls to zero in the cycle",
+    "stuck": "the equations have no solution in part of the cycle",
+    "no velocity": "the equations have no solution in part of the cycle",
+    "precision": "precision is lost; a smaller rtol may lead further",
+    "steady": "back at steady sliding, at another edge of stability",
+    "doubling": "back at a period doubling, where it joins the branch of half the period",
+    "winds": "folds close in on one value of the parameter while the period grows (a connection of a steady state with "
+    "itself, through ever longer spirals)",
+    "runs away": "the period runs away while the parameter stands still (a connection to another steady state)",
+}
+
+
+@dataclass(eq=False)
+class Sheet:
+    """Cycles in the order in which they were followed, and special ones with their places among them.
+
+    `whole` tells an end that lies in the matter from one where the cycles could not be followed any further.
+    """
+
+    known: list[Known] = field(default_factory=list)
+    special: list[SpecialCycle] = field(default_factory=list)
+    end: str = ""
+    whole: bool = False
+
+    def reversed(self) -> Sheet:
+        """The same cycles the other way round."""
+        count = len(self.known)
+        special = [replace(one, index=count - one.index) for one in reversed(self.special)]
+        return Sheet(self.known[::-1], special, self.end, self.whole)
+
+    def joined(self, more: Sheet) -> Sheet:
+        """This one, and another that begins where it ends."""
+        count = len(self.known)
+        special = [replace(one, index=one.index + count) for one in more.special]
+        return Sheet(self.known + more.known, self.special + special, more.end, more.whole)
+
+
+class Tracer:
+    """Follows sheets of cycles of one flow.
+
+    Parameters
+    ----------
+    flow : Flow
+    onset : Onset
+    limits : tuple of float
+        Range of the parameter.
+    most : int
+        Limit of cycles on a sheet.
+    progress : callable, optional
+        Called with the number of cycles found on all sheets and the latest.
+    """
+
+    def __init__(
+        self, flow: Flow, onset: Onset, limits: tuple[float, float], most: int,
+        progress: Callable[[int, Cycle], None] | None = None,
+    ) -> None:  # fmt: skip
+        self.flow, self.onset, self.limits, self.most, self.progress = flow, onset, limits, most, progress
+        self.logarithmic = flow.domain.low == 0 and onset.value > 0
+        self.unit_of_value = abs(onset.value) or 1.0
+        self.count, self.interrupted = 0, False
+
+    def shooting(self, fractions: Array = ONE, amplitude: float = 1.0) -> Shooting:
+        made = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value)
+        made.amplitude = amplitude
+        return made
+
+    def unknown(self, value: float) -> float:
+        """The parameter as it stands in the unknowns."""
+        return float(np.log(value / self.unit_of_value)) if self.logarithmic else value / self.unit_of_value
+
+    # -- where a sheet starts
+
+    def small(self, amplitude: float) -> tuple[Shooting, Point]:
+        """The cycle of a given small amplitude of ln v, from the critical eigenvector."""
+        flow, onset = self.flow, self.onset
+        setting = flow.setting(onset.value)
+        steady = flow.steady(onset.value)
+        _, jacobian, _ = flow.field(setting, steady[None])
+        ratio = flow.scales[None, :] / flow.scales[:, None]
+        roots, vectors = np.linalg.eig(jacobian[0] * ratio)
+        i = int(np.argmin(np.abs(roots - 1j * onset.angular_frequency)))
+        vector = vectors[:, i] * flow.scales
+        vector *= setting.drive / 2 / (1j * onset.angular_frequency * vector[0])  # unit amplitude of v/v0, in phase
+        start = 2 * vector.imag  # a quarter of a period before the peak
+        shooting = self.shooting(amplitude=amplitude)
+        guess = Orbit((steady + amplitude * start)[None], 2 * np.pi / onset.angular_frequency, onset.value)
+        tangent = np.append(start / np.hypot(flow.scales, steady), [0.0, 0.0])
+        return shooting, shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent))
+
+    def doubled(self, cycle: Cycle) -> tuple[Shooting, Point, float]:
+        """The first cycle of twice the period, along the eigenvector of the multiplier −1, and its distance."""
+        flow, orbit = self.flow, cycle._orbit
+        if orbit is None:
+            raise InternalError("orbit is not None")
+        setting, state = flow.setting(cycle.value), orbit.states[0]
+        _, pieces, _ = flow.run(setting, orbit.states, orbit.fractions * orbit.period)
+        whole = np.linalg.multi_dot([*pieces[::-1], np.eye(flow.size)])
+        roots, vectors = np.linalg.eig(whole * flow.scales[None, :] / flow.scales[:, None])
+        vector = np.real(vectors[:, int(np.argmin(np.abs(roots + 1)))])
+        rates, jacobian, _ = flow.field(setting, state[None])
+        gradient, along = jacobian[0, 0] * flow.scales, rates[0] / flow.scales
+        vector = vector - along * (gradient @ vector) / (gradient @ along)  # stay where v equals the drive
+        vector /= np.linalg.norm(vector)
+        shooting, size = self.shooting(), 1e-3
+        guess = Orbit((state + size * vector * flow.scales)[None], 2 * cycle.period, cycle.value)
+        tangent = np.append(vector * flow.scales / np.hypot(flow.scales, state), [0.0, 0.0])
+        return shooting, shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent)), size
+
+    def resumed(self, orbit: Orbit, amplitude: float, direction: Array | None = None, length: float = 0.0) -> Known:
+        """An orbit as a point of the curve, its tangent along `direction` of first state, period and parameter.
+
+        Raises
+        ------
+        Failure
+            If the orbit is not one.
+        """
+        shooting = self.shooting(orbit.fractions, amplitude)
+        u = shooting.packed(orbit)
+        _, jacobian = shooting.equations(u)
+        tangent = np.linalg.svd(jacobian)[2][-1]
+        curve = shooting.curve()
+        tangent /= curve.size(tangent)
+        if direction is not None and tangent[[*range(self.flow.size), -2, -1]] @ direction < 0:
+            tangent = -tangent
+        return self.known(shooting, curve.corrected(u, tangent, length, 0.1 * amplitude))
+
+    # -- the sheet
+
+    def followed(
+        self, shooting: Shooting, first: Point | Known, step: float, *, twice: bool = False,
+        met: Callable[[Known], bool] | None = None,
+    ) -> Sheet:  # fmt: skip
+        """All cycles from a first one on, as far as they can be followed.
+
+        Parameters
+        ----------
+        twice : bool
+            Whether these are cycles of twice a period, which end where that is halved.
+        met : callable, optional
+            Says that a cycle is known already; the sheet ends before it.
+        """
+        sheet = Sheet()
+        try:
+            start = self.known(shooting, first) if isinstance(first, Point) else first
+            self._add(sheet, start)
+            for before, here in self._points(start, step):
+                if met is not None and met(here):
+                    sheet.end, sheet.whole = "", True
+                    return sheet
+                sheet.end, keep = self._finished(before, here, sheet.known[0], twice)
+                if sheet.end.startswith("end of the range"):
+                    here = self._at_limit(before, here)
+                if keep:
+                    sheet.special += changes(before, here, self.known, len(sheet.known))
+                    self._add(sheet, here)
+                if not sheet.end and _winds(sheet.special):
+                    sheet.end = ENDS["winds"]
+                if sheet.end:
+                    break
+                if len(sheet.known) >= self.most:
+                    sheet.end = f"most_points = {self.most} reached"
+                    break
+            lost = {ENDS["growth"], ENDS["runs away"], ENDS["winds"]}
+            lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}
+            sheet.whole = sheet.end not in lost
+        except KeyboardInterrupt:
+            sheet.end, sheet.whole, self.interrupted = INTERRUPTED, True, True
+        except FlowFailure as failure:
+            sheet.end, sheet.whole = ENDS.get(failure.status, f"broke off: {failure}"), failure.status == "contact lost"
+        except (Failure, np.linalg.LinAlgError) as failure:
+            sheet.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
+        return sheet
+
+    def _add(self, sheet: Sheet, known: Known) -> None:
+        sheet.known.append(known)
+        self.count += 1
+        if self.progress is not None:
+            self.progress(self.count, known.cycle)
+
+    def _points(self, here: Known, step: float) -> Iterator[tuple[Known, Known]]:
+        """Each point with the one before it, in the same unknowns.
+
+        Cycles are cut into segments anew where they are too unstable, or cannot be followed any further.
+        """
+        limit, again, idle = MOST_GROWTH, True, 0
+        while True:
+            made: dict[int, Known] = {}
+            curve = self._curve(here)
+
+            def accept(point: Point, shooting: Shooting = here.shooting, made: dict[int, Known] = made) -> None:
+                made[0] = self.known(shooting, point)
+
+            finer = None
+            try:
+                for point in curve.follow(here.point, step, SMALLEST_STEP, LARGEST_STEP, accept):
+                    taken = point.length - here.point.length
+                    idle = idle + 1 if taken <= step and taken < 1e-3 * LARGEST_STEP else 0
+                    if idle > CREEP:
+                        raise Failure("steps stay tiny")
+                    before, here, step, again = here, made[0], taken, True
+                    curve.tolerance = self._curve(here).tolerance
+                    yield before, here
+                    if here.cycle.growth > limit**here.shooting.segments:
+                        finer = self._finer(here)
+                        if finer is not None:
+                            break
+                        limit *= 10.0
+            except Failure:
+                finer = self._finer(here) if again else None
+                if finer is None:
+                    raise
+                step, again = max(step, 1e-2 * LARGEST_STEP), False
+            if finer is not None:
+                here = finer
+
+    def _curve(self, known: Known) -> Curve:
+        curve = known.shooting.curve()
+        curve.tolerance = max(curve.tolerance, min(1e-6, 0.01 * abs(known.cycle.trivial - 1)))
+        return curve
+
+    def _finer(self, known: Known) -> Known | None:
+        """The same point in more segments; None if there is no use for them."""
+        try:
+            orbit = cut(known.shooting, known.point.u)
+            if orbit is None:
+                return None
+            direction = known.point.tangent[[*range(self.flow.size), -2, -1]]
+            return self.resumed(orbit, known.shooting.amplitude, direction, known.point.length)
+        except (Failure, np.linalg.LinAlgError):
+            return None
+
+    def known(self, shooting: Shooting, point: Point) -> Known:
+        """Everything about a cycle.
+
+        Raises
+        ------
+        Failure
+            If it is a shorter cycle, run through several times.
+        """
+        orbit = shooting.orbit(point.u)
+        away = np.abs(orbit.states - self.flow.steady(orbit.value)) / self.flow.scales
+        shooting.amplitude = float(min(1.0, away.max()))
+        found = measured(shooting, point.u)
+        if found.turns > 1:
+            raise Failure(f"a shorter cycle, run through {found.turns} times")
+        cycle = replace(found.cycle, stable=self._attracts(found.cycle))
+        return Known(point, shooting, cycle, found.half)
+
+    def _attracts(self, cycle: Cycle) -> bool:
+        """Whether all multipliers lie inside the unit circle; by the kind of onset where that is too close to tell."""
+        if self.onset.kind == "degenerate" and abs(cycle.growth - 1) < IMPRECISE:
+            return False
+        if cycle.amplitude < SMALL and abs(cycle.growth - 1) < UNRESOLVED:
+            return self.onset.kind == "supercritical"
+        return cycle.growth < 1
+
+    # -- where it ends
+
+    def _finished(self, before: Known, now: Known, first: Known, twice: bool) -> tuple[str, bool]:
+        """Why a sheet ends at this cycle, or nothing; and whether the cycle is still one of it."""
+        low, high = self.limits
+        cycle = now.cycle
+        if not low < cycle.value < high:
+            return f"end of the range, {shown(low if cycle.value <= low else high, self.onset.unit)}", True
+        if self._slows(now):
+            return ENDS["steady"], False
+        if twice and before.half @ now.half < -0.5 * np.linalg.norm(before.half) * np.linalg.norm(now.half):
+            return ENDS["doubling"], False
+        setting = self.flow.setting(cycle.value)
+        fast = cycle.peak_velocity > LARGE * setting.drive
+        bounded = bool(self.flow.reduction.model.inertial or self.flow.rig.radiation_damping)
+        if abs(cycle.trivial - 1) > IMPRECISE and cycle.amplitude > SMALL:
+            return ENDS["unbounded" if fast and not bounded else "precision"], True
+        if cycle.growth > TOO_UNSTABLE:
+            return ENDS["growth"], True
+        if self.onset.kind == "degenerate" and fast and not bounded:
+            return ENDS["unbounded"], True
+        longer = np.log(cycle.period / before.cycle.period)
+        further = abs(cycle.value - before.cycle.value) / (abs(before.cycle.value) or 1.0)
+        if cycle.period > 1e3 * first.cycle.period and longer > 1e3 * further:
+            return ENDS["runs away"], True
+        return "", True
+
+    def _slows(self, now: Known) -> bool:
+        """Whether the block no longer speeds up where the cycle starts: beyond one that has shrunk to nothing.
+
+        With mass rounding in the state is most of the acceleration; what is carried round once is true.
+        """
+        orbit = now.shooting.orbit(now.point.u)
+        rates, jacobian, _ = self.flow.field(self.flow.setting(orbit.value), orbit.states)
+        carried = rates[0]
+        for sensitivity in now.shooting.sensitivities(now.point.u):
+            carried = sensitivity @ (carried / self.flow.scales) * self.flow.scales
+        return bool(jacobian[0, 0] @ rates[0] <= 0 and jacobian[0, 0] @ carried <= 0)
+
+    def _at_limit(self, inside: Known, outside: Known) -> Known:
+        """The cycle on the limit of the range."""
+        low, high = self.limits
+        try:
+            return self.between(inside, outside, low if outside.cycle.value <= low else high)
+        except Failure:
+            return outside
+
+    def between(self, near: Known, far: Known, value: float) -> Known:
+        """The cycle at a value of the parameter between those of two neighbours with the same unknowns.
+
+        Raises
+        ------
+        Failure
+            If it is not found.
+        """
+        shooting, target = far.shooting, self.unknown(value)
+
+        def measure(point: Point) -> float:
+            return float(point.u[-1]) - target
+
+        ends = measure(near.point), measure(far.point)
+        if ends[0] * ends[1] > 0:
+            raise Failure("not between")
+        curve = shooting.curve()
+        close = curve.located(near.point, far.point, measure, *ends, width=1e-7)[1]
+        guess = np.append(close.u[:-1], target)
+        point = curve.corrected(guess, np.eye(len(guess))[-1], close.length, 0.1 * shooting.amplitude)
+        if point.tangent @ (curve.weights * close.tangent) < 0:
+            point = replace(point, tangent=-point.tangent)
+        return self.known(shooting, point)
+
+
+def _winds(special: list[SpecialCycle]) -> bool:
+    """Whether the last folds close in on one value while the period grows (Shilnikov)."""
+    folds = [point.cycle for point in special if point.kind == "fold"][-WINDINGS:]
+    if len(folds) < WINDINGS:
+        return False
+    apart = np.abs(np.diff([cycle.value for cycle in folds]))
+    return bool(np.all(apart[1:] < 0.8 * apart[:-1]) and np.all(np.diff([cycle.period for cycle in folds]) > 0))

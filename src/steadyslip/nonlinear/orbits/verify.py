@@ -1,0 +1,159 @@
+"""From a motion that seems to repeat itself to the cycle that it is on, or is near: found by Newton's method.
+
+Peaks that agree are no proof of a cycle: ringing after a kick, or a slow approach to something else, have them too. A
+cycle is believed only where the equations of a cycle are solved, next to the motion, by a state that does not return
+earlier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from steadyslip.kernels.program import LOG_KINDS
+from steadyslip.motion.setup import Jobs
+from steadyslip.nonlinear.continuation import Failure
+from steadyslip.nonlinear.orbits.branch import Cycle
+from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, Setting
+from steadyslip.nonlinear.orbits.measure import amplitude, measured
+from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
+
+Array = np.ndarray
+BEGINS = LOG_KINDS.index("slip begins")  # the block, speeding up, is as fast as the load point
+RETURNS = 17  # so many returns are compared: cycles with up to 16 of them in a period are found
+NEAR = 0.1  # distance, as a share of the cycle's size, to which Newton's method may go from the motion
+CLOSE = 0.05  # distance within which a return may be one to the same place
+SMALLEST = 1e-5  # range, in natural sizes, below which a motion is not told from steady sliding
+MOST_TRIES = 4
+IMPRECISE = 1e-3  # error of the trivial multiplier beyond which a cycle is not believed
+FIRST_SPAN = 60.0  # natural times
+MOST_STEPS = 40_000
+
+
+def verified(jobs: Jobs, which: int, state: Array, patience: int = 1, rtol: float | None = None) -> Cycle | None:
+    """The cycle that a run of prepared jobs has come to, under their inputs.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        With one segment of constant inputs for each run.
+    which : int
+        Index of the run.
+    state : ndarray (n,)
+        The kernel's state variables (``outcome.final[row, 4:]``), anywhere near the suspected cycle.
+    patience : int, optional
+        How many stretches of some returns each to go on for, as long as no cycle is close enough.
+    rtol : float, optional
+        Error allowed per step; 1e-10, with Rosenbrock methods 1e-9, unless given.
+
+    Returns
+    -------
+    Cycle or None
+        The primitive cycle next to the motion, with multipliers; ``cycle.stable`` says whether it attracts.
+        None if there is none: the motion grows, settles, wanders, or is still too far from any.
+
+    Raises
+    ------
+    NotAvailable
+        If the rig's motion is ill-posed, or its normal stress prescribed in time.
+    """
+    return cycle_near(Runs(jobs, which, rtol), state, patience=patience)
+
+
+def cycle_near(runs: Runs, state: Array, value: float = 0.0, patience: int = 1) -> Cycle | None:
+    """The cycle that a motion is on, or comes to; see `verified`.
+
+    Parameters
+    ----------
+    runs : Runs
+    state : ndarray (n,)
+    value : float
+        Of the free parameter, where `runs` has one.
+    patience : int
+        How many stretches of motion to look at.
+    """
+    with suppress(FlowFailure):
+        for seen in _stretches(runs, runs.setting(value), state, patience):
+            for back in _candidates(runs, seen):
+                found = _solved(runs, value, seen, int(back))
+                if found is not None:
+                    return found
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Returns of a motion: where and when the block, speeding up, is as fast as the load point; and their sizes.
+
+    `extent` is the largest range of a state variable, in its natural size, `amplitude` that of ln v.
+    """
+
+    times: Array
+    states: Array
+    extent: float
+    amplitude: float
+
+
+def _stretches(runs: Runs, setting: Setting, state: Array, patience: int) -> Iterator[_Stretch]:
+    """The motion, some returns at a time."""
+    span, spent = FIRST_SPAN * runs.time, 0
+    for _ in range(patience):
+        times: list[float] = []
+        states: list[Array] = []
+        low, high, speeds = [], [], []
+        now = 0.0
+        while len(times) < RETURNS and spent < MOST_STEPS * patience:
+            outcome = runs.watched(setting, state, span)
+            record, log = outcome.recorded, outcome.log
+            at = log[(log[:, 0] == BEGINS) & (log[:, 1] > 0), 1]
+            times += list(now + at)
+            states += list(_between(runs, setting, record, at))
+            low.append(np.arcsinh(record[:, 2:].min(axis=0) / runs.scales))
+            high.append(np.arcsinh(record[:, 2:].max(axis=0) / runs.scales))
+            if np.max(high[-1] - low[-1]) < SMALLEST:
+                return
+            speeds.append(np.append(log[:, 2], runs.observed(setting, record[:, 0], record[:, 2:])["v"]))
+            state, now, spent = outcome.final[0, 4:], now + span, spent + len(record)
+            span *= 2.0 if len(times) < RETURNS // 2 else 1.0
+        if len(times) < 2:
+            return
+        extent = float(np.max(np.max(high, axis=0) - np.min(low, axis=0)))
+        yield _Stretch(np.array(times), np.array(states), extent, amplitude(np.concatenate(speeds)))
+
+
+def _between(runs: Runs, setting: Setting, record: Array, at: Array) -> Array:
+    """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
+    time, states = record[:, 0], record[:, 2:]
+    i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    h = (time[i + 1] - time[i])[:, None]
+    s = (at - time[i])[:, None] / h
+    rates = runs.field(setting, states[np.append(i, i + 1)])[0]
+    first, last = rates[: len(i)] * h, rates[len(i) :] * h
+    value = states[i] * (1 + 2 * s) * (1 - s) ** 2 + states[i + 1] * s**2 * (3 - 2 * s)
+    return np.asarray(value + first * s * (1 - s) ** 2 - last * s**2 * (1 - s))
+
+
+def _candidates(runs: Runs, seen: _Stretch) -> Array:
+    """How many returns a period may have: those after which the motion was close to where it is now."""
+    places = np.arcsinh(seen.states / runs.scales)
+    away = np.abs(places[-2::-1] - places[-1]).max(axis=1)
+    return 1 + np.flatnonzero(away < CLOSE * min(1.0, seen.extent))[:MOST_TRIES]
+
+
+def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None:
+    """The cycle next to the last of some returns, with so many returns in its period."""
+    shooting = Shooting(runs, np.ones(1), False, abs(value) or 1.0)
+    shooting.amplitude = min(1.0, seen.extent)
+    guess = shooting.packed(Orbit(seen.states[-1:], seen.times[-1] - seen.times[-1 - back], value))
+    still = np.eye(len(guess))[-1]  # the parameter stays
+    try:
+        point = shooting.curve().corrected(guess, still, 0.0, NEAR * shooting.amplitude)
+        seen_once = measured(shooting, point.u)
+    except Failure:
+        return None
+    cycle = seen_once.cycle
+    shrunk = cycle.amplitude < 0.5 * seen.amplitude
+    return None if seen_once.turns > 1 or shrunk or abs(cycle.trivial - 1) > IMPRECISE else cycle

@@ -1,0 +1,289 @@
+"""Is steady sliding stable, what would make it, how far is the edge: the numbers of the verdict."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable, ParameterError, Problem
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown, stress_name
+from steadyslip.linear import formula as linear_formula
+from steadyslip.linear.boundary import Margin, margins, present_zeros
+from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
+from steadyslip.linear.search import Boundary
+from steadyslip.linear.status import on_edge
+from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
+from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
+from steadyslip.steady import SteadySliding, steady_states
+from steadyslip.values import Values, axial_projection, model_values
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from steadyslip.nonlinear.kicks.threshold import Threshold
+
+
+@dataclass(frozen=True, repr=False)
+class Analysis:
+    """Verdict on one rig; printing it gives the verdict in words.
+
+    Attributes
+    ----------
+    rig : Slider
+    stable : bool or None
+        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
+    reason : str
+        Why, in one sentence.
+    steady : SteadySliding or None
+    critical_stiffness : float or None
+        Edge of the stable set nearest to the rig's own stiffness (Pa/m along the sliding direction).
+    critical_side : str or None
+        ``above`` or ``below``: where, next to that edge, sliding is stable.
+    critical_angular_frequency : float or None
+        Of the oscillation at the critical stiffness (rad/s), 0 if it does not oscillate.
+    critical_axial_stiffness : float or None
+        The same edge as stiffness along the axis of spring, rod or press, where the rig gives one (Pa/m).
+    stable_stiffness : tuple of (float, float)
+        All stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
+    eigenvalues : tuple of complex
+        1/s, by falling real part.
+    characteristic_polynomial : tuple of float
+        Coefficients, lowest power first (theory 3: a0, a1, ...).
+    routh : tuple of float
+        First column of the Routh array; stable if all are positive.
+    growth_rate : float or None
+        Largest real part (1/s), inf if ill-posed.
+    period : float or None
+        Of the least damped oscillation (s).
+    damping_ratio : float or None
+        Of that oscillation; negative if it grows.
+    time_to_halve, time_to_double : float or None
+        Of the slowest decay, or of the fastest growth (s).
+    on_edge : bool
+        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
+    onset : Onset or None
+        Kind of onset at the oscillatory edge in stiffness nearest to the rig, None where there is none.
+    kicks : tuple of Threshold
+        Smallest kicks that are not survived, where asked for.
+    margins : tuple of Margin
+        Distance of each parameter to its nearest edge, the most critical first.
+    branch : int
+        Which steady sliding is judged.
+    warnings : tuple of str
+    """
+
+    rig: Slider
+    stable: bool | None
+    reason: str
+    steady: SteadySliding | None
+    margins: tuple[Margin, ...]
+    warnings: tuple[str, ...] = ()
+    critical_stiffness: float | None = None
+    critical_side: str | None = None
+    critical_angular_frequency: float | None = None
+    critical_axial_stiffness: float | None = None
+    stable_stiffness: tuple[tuple[float, float], ...] = ()
+    eigenvalues: tuple[complex, ...] = ()
+    characteristic_polynomial: tuple[float, ...] = ()
+    routh: tuple[float, ...] = ()
+    growth_rate: float | None = None
+    period: float | None = None
+    damping_ratio: float | None = None
+    time_to_halve: float | None = None
+    time_to_double: float | None = None
+    on_edge: bool = False
+    branch: int = 0
+    onset: Onset | None = None
+    kicks: tuple[Threshold, ...] = ()
+    version: str = field(default="", repr=False)
+
+    @property
+    def boundaries(self) -> tuple[Boundary, ...]:
+        """Every edge found, parameter by parameter."""
+        return tuple(edge for margin in self.margins for edge in margin.edges)
+
+    def formula(self) -> sp.Eq:
+        """Critical stiffness of this kind of rig as a SymPy equation; see `steadyslip.formula`."""
+        return linear_formula(self.rig)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Root locus in the stiffness; see `steadyslip.figures.root_locus`."""
+        return draw(self, ax=ax)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units per unit area (with an area, forces as well), as ``--json`` prints it."""
+        from steadyslip.verdict.export import as_dict
+
+        return as_dict(self)
+
+    def to_json(self) -> str:
+        """`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+    def __str__(self) -> str:
+        from steadyslip.verdict.words import verdict
+
+        return verdict(self)
+
+    def __repr__(self) -> str:
+        from steadyslip.verdict.words import headline
+
+        return f"<Analysis: {headline(self)}; print it for the whole verdict>"
+
+    def _repr_markdown_(self) -> str:
+        return f"```\n{self}\n```"
+
+
+def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:
+    """Verdict on a rig.
+
+    Parameters
+    ----------
+    rig : Slider
+    branch : int
+        Which steady sliding to judge where there are several, by rising normal stress.
+    kick : str or sequence of str
+        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived.
+
+    Returns
+    -------
+    Analysis
+        With ``stable = None`` and the reason if steady sliding does not exist.
+
+    Raises
+    ------
+    ParameterError
+        If `rig` is not a Slider.
+    NotAvailable
+        If `branch` does not exist, or the numbers of the rig leave the range of floating point.
+    """
+    from steadyslip import __version__
+
+    if not isinstance(rig, Slider):
+        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig gives")])
+    with np.errstate(all="ignore"):
+        try:
+            states = steady_states(rig)
+        except NoSteadySliding as error:
+            return Analysis(
+                rig, None, str(error).removeprefix("no steady sliding: "), None, margins(rig), version=__version__
+            )
+        if not 0 <= branch < len(states):
+            raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
+        values = model_values(rig, None, present_zeros(rig), branch)
+        numbers = _linear_numbers(rig, values)
+        on_the_edge = bool(on_edge(values))
+        distances = margins(rig, branch=branch)
+        found = Analysis(
+            rig=rig,
+            steady=states[branch],
+            reason="",
+            margins=distances,
+            onset=_onset(rig, distances, branch),
+            kicks=_kicks(rig, (kick,) if isinstance(kick, str) else tuple(kick), branch),
+            on_edge=on_the_edge,
+            branch=branch,
+            warnings=_warnings(rig, values, states, on_the_edge),
+            version=__version__,
+            **numbers,
+        )
+    from steadyslip.verdict.words import reason
+
+    return replace(found, reason=reason(found))
+
+
+def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | None:
+    """Kind of onset at the oscillatory edge in stiffness (or gain kp) nearest to the rig's own."""
+    name = parameter_along(rig, "slider.stiffness")
+    for margin in distances:
+        if margin.parameter == name:
+            edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]
+            if edges:
+                with suppress(NotAvailable):  # lost in rounding
+                    return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)
+    return None
+
+
+def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold, ...]:
+    if not kinds:
+        return ()
+    from steadyslip.nonlinear.kicks.threshold import threshold  # compiles; only where asked for
+
+    return tuple(threshold(rig, kind, branch=branch) for kind in kinds)
+
+
+def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:
+    """Everything that follows from the characteristic polynomial."""
+    c = characteristic(values)
+    if not np.all(np.isfinite(c)):
+        raise NotAvailable(OUT_OF_RANGE)
+    bad = bool(ill_posed(c))
+    while len(c) > 2 and c[-1] == 0:
+        c = c[:-1]
+    eigenvalues = roots(c)
+    if not np.all(np.isfinite(eigenvalues)):
+        raise NotAvailable(OUT_OF_RANGE)
+    numbers: dict[str, Any] = {
+        "stable": bool(is_hurwitz(c)) and not bad,
+        "eigenvalues": tuple(complex(s) for s in eigenvalues),
+        "characteristic_polynomial": tuple(float(x) for x in c),
+        "routh": tuple(float(x) for x in routh_column(c)),
+    }
+    growth = math.inf if bad else float(eigenvalues[0].real)
+    numbers["growth_rate"] = growth
+    if math.isfinite(growth) and growth != 0:
+        numbers["time_to_halve" if growth < 0 else "time_to_double"] = math.log(2) / abs(growth)
+    oscillation = next((s for s in eigenvalues if s.imag != 0), None)
+    if oscillation is not None:
+        numbers["period"] = float(2 * math.pi / abs(oscillation.imag))
+        numbers["damping_ratio"] = float(-oscillation.real / abs(oscillation))
+    return numbers | _stiffness_numbers(rig, values)
+
+
+def _stiffness_numbers(rig: Slider, values: Values) -> dict[str, Any]:
+    """The stable set in k and its edge nearest to the rig's own stiffness."""
+    found = set_of_one(values)
+    own = float(values.named()["slider.stiffness"])
+    intervals = found.intervals[np.all(np.isfinite(found.intervals[:, :1]), axis=-1)]
+    numbers: dict[str, Any] = {"stable_stiffness": tuple((float(a), float(b)) for a, b in intervals)}
+    at = np.flatnonzero(found.changes)
+    if at.size:
+        i = at[np.argmin(np.abs(found.edges[at] - own))]
+        critical, beta = float(found.edges[i]), float(found.frequencies[i])
+        numbers["critical_stiffness"] = critical
+        numbers["critical_angular_frequency"] = beta if math.isfinite(beta) else None
+        numbers["critical_side"] = "above" if np.any(intervals[:, 0] == critical) else "below"
+        if rig.axial_stiffness is not None:
+            contact = [v for name, v in rig.parameters().items() if name.startswith("contact.") and v.value is not None]
+            numbers["critical_axial_stiffness"] = critical / float(axial_projection(rig)(*(v.value for v in contact)))
+    return numbers
+
+
+def _warnings(rig: Slider, values: Values, states: tuple[SteadySliding, ...], on_the_edge: bool) -> tuple[str, ...]:
+    """What a reader must know beside the verdict."""
+    found = []
+    if on_the_edge:
+        found.append("the rig is on the edge of stability to within rounding; neither verdict should be relied on")
+    if len(states) > 1:
+        stresses = ", ".join(shown(s.normal_stress, "Pa", area=rig.area) for s in states)
+        found.append(
+            f"steady sliding is possible at {len(states)} values of {stress_name('normal stress', rig.area)} "
+            f"({stresses}); "
+            f"this verdict is for the one at {shown(states[values.branch].normal_stress, 'Pa', area=rig.area)}"
+        )
+    if not rig.friction.memory():
+        found.append(
+            "this friction law has no memory of sliding, so it cannot predict a critical stiffness; "
+            "use a law with memory (rate-state, lugre)"
+        )
+    if states[values.branch].friction <= 0:
+        found.append("the friction coefficient in steady sliding is not positive; check mu_ref and the velocity")
+    return tuple(found)

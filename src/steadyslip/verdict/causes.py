@@ -1,0 +1,124 @@
+"""Why sliding is stable at every stiffness, at none, or ill-posed: which condition of stability decides (theory 3).
+
+With one memory variable the conditions are a3 >= 0, a2 > 0, a0 > 0 and D k > N, all but a2 and a3 linear in k; each
+sentence here is said only where its condition decides alone.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from steadyslip.linear.cubic import coefficients, hopf_line
+from steadyslip.linear.polynomials import quietly
+from steadyslip.linear.response import Response, has_closed_form, response_numbers
+from steadyslip.linear.stiffness import stiffness_polynomials
+from steadyslip.values import model_values
+
+if TYPE_CHECKING:
+    from steadyslip.verdict.analyze import Analysis
+
+
+def _response(analysis: Analysis) -> Response | None:
+    """Numbers of the closed form at the branch judged; None where there are several memory variables or none."""
+    values = model_values(analysis.rig, branch=analysis.branch)
+    return response_numbers(values) if has_closed_form(values.model) else None
+
+
+@quietly
+def why_all(analysis: Analysis) -> str:
+    """The plain cause of stability at every stiffness, where there is one."""
+    known = _response(analysis)
+    if known is None or known.B3 != 0:
+        return ""
+    slope = known.S + known.mu * known.B1  # of the resistance in steady sliding, its normal stress included
+    if slope < 0:
+        return ""
+    parts = [word for word, there in (("dampings", _damped(analysis)), ("normal stress", known.B1 != 0)) if there]
+    with_all = f" ({' and '.join(parts)} included)" if parts else ""
+    return f": the resistance to steady sliding{with_all} {'rises' if slope > 0 else 'does not fall'} with velocity"
+
+
+def _damped(analysis: Analysis) -> bool:
+    rig = analysis.rig
+    return bool(rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
+
+
+@quietly
+def why_none(analysis: Analysis) -> str:
+    """Which condition of stability rules out every stiffness, where that can be told."""
+    known = _response(analysis)
+    if known is None:
+        return _why_none_in_general(analysis)
+    numbers = known.as_dict()
+    k = numbers.pop("k")
+    _, _, a2, _ = coefficients(**numbers, k=k)
+    if a2 <= 0:
+        return ": friction and normal stress together feed every motion, whatever the stiffness (a2 > 0 fails)"
+    gain = float(analysis.rig.drive.proportional())  # acts as a spring, below which the stiffness cannot go
+    if not _reachable(1 + known.mu * known.B2, -known.mu * known.B3, gain):
+        return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
+    numerator, denominator = hopf_line(**numbers)
+    if not np.isfinite(numerator) or not np.isfinite(denominator):
+        return ""  # products beyond floating point decide nothing
+    if _reachable(denominator, numerator, gain):
+        return ": where no oscillation grows, a disturbance grows without oscillating"
+    return f": an oscillation grows at every stiffness{_why_oscillating(known, denominator)}"
+
+
+def _reachable(slope: float, right: float, least: float) -> bool:
+    """Whether slope k > right for some k > least."""
+    return slope > 0 or slope * least > right or (slope == 0 and right < 0)
+
+
+def _why_oscillating(known: Response, denominator: float) -> str:
+    """Which of its terms makes D negative: D = (f + f1 B1)(1 + f1 B2) + r (μ − f1)(B0 − m B2)."""
+    coupling, memory = 1 + known.f1 * known.B2, known.r * (known.mu - known.f1)
+    direct = known.f + known.f1 * known.B1
+    if denominator >= 0:
+        return ""
+    if direct > 0 and coupling < 0 and memory * (known.B0 - known.m * known.B2) >= 0:
+        return (
+            "; when the block gets ahead, friction falls at once by more than the spring's pull, "
+            "because the spring relieves the normal stress (D < 0)"
+        )
+    if direct * coupling > 0 and known.B0 == 0 and known.m > 0 and memory * known.B2 > 0:
+        return "; with this mass the memory of normal stress drives it (D < 0, eq. 31)"
+    return " (D < 0)"
+
+
+def _why_none_in_general(analysis: Analysis) -> str:
+    p, q = stiffness_polynomials(model_values(analysis.rig, branch=analysis.branch))
+    if p[..., 0] <= 0 and q[..., 0] <= 0:
+        return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
+    if not analysis.rig.friction.memory() and p.shape[-1] == 3 and q[..., 1] == 0 and p[..., 1] <= 0:
+        return ": the resistance to sliding falls with velocity, and friction has no memory"
+    return ""
+
+
+@quietly
+def why_ill_posed(analysis: Analysis) -> str:
+    """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
+    known = _response(analysis)
+    if known is not None:
+        numbers = known.as_dict()
+        if known.m + known.f1 * known.B0 < 0:
+            return (
+                "the equations are ill-posed: acceleration changes the normal stress so that friction pushes more than "
+                "the mass resists (the effective mass is negative), so any small lag grows at once"
+            )
+        if numbers["f"] <= 0:
+            verb, size = ("falls", "negative") if numbers["f"] < 0 else ("does not rise", "zero")
+            return (
+                f"the equations are ill-posed: friction {verb} at once when velocity rises (its direct "
+                f"effect is {size}, dampings included), and there is no mass to slow that down"
+            )
+        return (
+            "the equations are ill-posed: velocity relieves the normal stress so that friction falls at once by more "
+            "than its direct effect and dampings provide, and there is no mass to slow that down"
+        )
+    return (
+        "the equations are ill-posed: friction, directly or by way of the normal stress, falls at once by more than "
+        "mass, direct effect and dampings provide, so any small lag grows at once"
+    )

@@ -1,0 +1,105 @@
+"""An Analysis as plain data."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from steadyslip.core.quantities import outside
+
+if TYPE_CHECKING:
+    from steadyslip.linear.boundary import Margin
+    from steadyslip.nonlinear.onset.hopf import Onset
+    from steadyslip.verdict.analyze import Analysis
+
+
+def as_dict(analysis: Analysis) -> dict[str, Any]:
+    """SI units per unit area; numbers that do not exist, and infinite ones, are None."""
+    steady = analysis.steady
+    data: dict[str, Any] = {
+        "version": analysis.version,
+        "stable": analysis.stable,
+        "on_edge": analysis.on_edge,
+        "reason": analysis.reason,
+        "steady": None
+        if steady is None
+        else {
+            "velocity": steady.velocity,
+            "normal_stress": steady.normal_stress,
+            "shear_stress": steady.shear_stress,
+            "friction": steady.friction,
+            "spring_stress": steady.spring_stress,
+            "states": steady.states,
+        },
+        "critical_stiffness": analysis.critical_stiffness,
+        "critical_side": analysis.critical_side,
+        "critical_angular_frequency": analysis.critical_angular_frequency,
+        "critical_axial_stiffness": analysis.critical_axial_stiffness,
+        "stable_stiffness": [[low, _finite(high)] for low, high in analysis.stable_stiffness],
+        "eigenvalues": [[s.real, s.imag] for s in analysis.eigenvalues],
+        "characteristic_polynomial": list(analysis.characteristic_polynomial),
+        "routh": list(analysis.routh),
+        "growth_rate": _finite(analysis.growth_rate),
+        "period": analysis.period,
+        "damping_ratio": analysis.damping_ratio,
+        "time_to_halve": analysis.time_to_halve,
+        "time_to_double": analysis.time_to_double,
+        "onset": None if analysis.onset is None else _onset(analysis.onset),
+        "kicks": [kick.to_dict() for kick in analysis.kicks],
+        "boundaries": [row for margin in analysis.margins for row in _edges(margin, analysis.rig.area)],
+        "warnings": list(analysis.warnings),
+    }
+    if analysis.rig.area is not None:
+        data["forces"] = _forces(analysis, analysis.rig.area)
+    return data
+
+
+def _onset(onset: Onset) -> dict[str, Any]:
+    return {
+        "kind": onset.kind,
+        "parameter": onset.along,
+        "value": onset.value,
+        "coefficient": onset.coefficient,
+        "normalised_coefficient": onset.normalised,
+        "growth_slope": onset.growth_slope,
+        "angular_frequency": onset.angular_frequency,
+        "meaning": onset.meaning,
+    }
+
+
+def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
+    """One row an edge; distances are from the rig's own value; with an area, totals stand beside."""
+    factor, unit = outside(margin.unit, area)
+    return [
+        {
+            "parameter": edge.parameter,
+            "unit": edge.unit,
+            "value": edge.value,
+            "bracket": list(edge.bracket),
+            "kind": edge.kind,
+            "angular_frequency": edge.angular_frequency,
+            "stable": edge.stable,
+            "own_value": margin.value,
+            "distance": edge.value - margin.value,
+            "relative_distance": (edge.value - margin.value) / abs(margin.value) if margin.value else None,
+            "nearest": edge is margin.edge,
+        }
+        | ({} if unit == edge.unit else {"total": edge.value * factor, "total_unit": unit})
+        for edge in margin.edges
+    ]
+
+
+def _forces(analysis: Analysis, area: float) -> dict[str, Any]:
+    """The main results for the whole contact area: N and N/m."""
+    steady = analysis.steady
+    return {
+        "area": area,
+        "normal_force": None if steady is None else steady.normal_stress * area,
+        "friction_force": None if steady is None else steady.shear_stress * area,
+        "critical_stiffness": None if analysis.critical_stiffness is None else analysis.critical_stiffness * area,
+        "stable_stiffness": [[low * area, _finite(high * area)] for low, high in analysis.stable_stiffness],
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

@@ -1,0 +1,277 @@
+"""An Analysis in words that a person can act on, or read aloud to a colleague."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING
+
+from steadyslip.core.errors import InternalError
+from steadyslip.core.quantities import shown
+from steadyslip.core.records import resolve
+from steadyslip.laws.friction import RateState
+from steadyslip.linear.status import ON_THE_EDGE
+from steadyslip.values import model_values
+from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
+
+if TYPE_CHECKING:
+    from steadyslip.linear.boundary import Margin
+    from steadyslip.machine.slider import Slider
+    from steadyslip.nonlinear.kicks.threshold import Threshold
+    from steadyslip.nonlinear.onset.hopf import Onset
+    from steadyslip.verdict.analyze import Analysis
+
+_ONSETS = {
+    "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
+    "subcritical": "just on the stable side of the edge in stiffness, small kicks already start oscillation",
+    "degenerate": "at the edge in stiffness, small oscillations neither grow nor decay to lowest order",
+}
+
+_BEYOND = {
+    "oscillatory": "an oscillation grows",
+    "divergence": "a disturbance grows without oscillating",
+    "ill-posed": "the equations become ill-posed",
+    "lock-up": "it locks up",
+    "lift-off": "it lifts off",
+    "no solution": "steady sliding ceases to exist",
+}
+
+
+def verdict(analysis: Analysis) -> str:
+    """The whole verdict as text, at most some 100 columns wide."""
+    lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
+    lines += _facts(analysis)
+    lines += _margin_table(analysis)
+    lines += _meaning(analysis)
+    for text in analysis.warnings:
+        lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
+    return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
+
+
+def _meaning(analysis: Analysis) -> list[str]:
+    """What the verdict does not say."""
+    if analysis.stable is None or analysis.on_edge:
+        return []
+    if analysis.stable:
+        kicked = "A large enough kick may still start an oscillation or a run-away."
+        lines = ["", f"Stable means: small disturbances die out. {kicked}"]
+        if not analysis.kicks:
+            lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
+        return lines if analysis.onset is not None or analysis.kicks else lines[:2]
+    if analysis.growth_rate != math.inf and isinstance(analysis.rig.friction, RateState) and not _limited(analysis.rig):
+        return [
+            "",
+            "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
+            "steadyslip simulate shows which.",
+        ]
+    return []
+
+
+def _limited(rig: Slider) -> bool:
+    """Whether mass or damping keeps velocity finite."""
+    return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
+
+
+def headline(analysis: Analysis) -> str:
+    """The first line: stable, unstable, on the edge, or no steady sliding."""
+    speed = shown(analysis.rig.drive.velocity, "m/s")
+    if analysis.stable is None:
+        return f"NO STEADY SLIDING at {speed}"
+    if analysis.on_edge:
+        return f"ON THE EDGE of stability to within rounding: steady sliding at {speed}"
+    return f"{'STABLE' if analysis.stable else 'UNSTABLE'}: steady sliding at {speed}"
+
+
+def reason(analysis: Analysis) -> str:
+    """Why, in one sentence."""
+    own = analysis.rig.parameters()["slider.stiffness"].value
+    critical, side = analysis.critical_stiffness, analysis.critical_side
+    if analysis.growth_rate == math.inf:
+        return why_ill_posed(analysis)
+    if critical is None:
+        if analysis.stable_stiffness:
+            if analysis.rig.drive.proportional():
+                return "with this controller sliding is stable whatever the stiffness beside it"
+            return "sliding is stable at every stiffness" + why_all(analysis)
+        return "no stiffness makes sliding stable" + why_none(analysis)
+    if own is None:
+        own = float(model_values(analysis.rig).named()["slider.stiffness"])
+    gain = float(analysis.rig.drive.proportional())
+    which = "stiffness and gain kp together, " if gain and own else "gain kp, " if gain else "stiffness "
+    ratio = (own + gain) / (critical + gain)
+    text = (
+        f"the {which}{_stiffness(analysis, own + gain)}{',' if gain else ''} is "
+        f"{'' if analysis.on_edge else f'{ratio:.3g} times '}the critical "
+        f"{'' if gain else 'stiffness '}{_stiffness(analysis, critical + gain)}"
+    )
+    if analysis.on_edge and abs(ratio - 1) > 1e-6:  # on another edge than that of the stiffness
+        return "neither verdict should be relied on: the least change of a number decides"
+    if analysis.on_edge:
+        text += " to within rounding, and neither verdict should be relied on"
+    if analysis.stable_stiffness == ((critical, math.inf) if side == "above" else (0.0, critical),):
+        return f"{text}, {side} which sliding is stable"
+    return f"{text}, the nearest edge of the stable set given below"
+
+
+def _quantity(analysis: Analysis, value: float, unit: str) -> str:
+    """A value per unit area, or for the whole area where the rig has one, as in its file."""
+    return shown(value, unit, area=analysis.rig.area)
+
+
+def _stiffness(analysis: Analysis, value: float) -> str:
+    return _quantity(analysis, value, "Pa/m")
+
+
+def _stress(analysis: Analysis, value: float) -> str:
+    area = analysis.rig.area
+    return shown(value, "Pa") if area is None else f"{shown(value * area, 'N')} ({shown(value, 'Pa')})"
+
+
+def _facts(analysis: Analysis) -> list[str]:
+    steady = analysis.steady
+    if steady is None:
+        return []
+    force = "force" if analysis.rig.area is not None else "stress"
+    rows = [
+        (
+            "steady sliding",
+            f"normal {force} {_stress(analysis, steady.normal_stress)}, "
+            f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}",
+        ),
+        ("a disturbance", _disturbance(analysis)),
+        ("stable for", _stable_set(analysis)),
+    ]
+    beta = analysis.critical_angular_frequency
+    if beta:
+        rows.append(("at the edge", f"oscillation with period {shown(2 * math.pi / beta, 's')}"))
+    if analysis.critical_axial_stiffness is not None:
+        rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
+    if analysis.onset is not None:
+        rows.append(("onset", _onset(analysis.onset)))
+    rows += [("a kick", _survived(kick)) for kick in analysis.kicks]
+    lines: list[str] = []
+    for name, text in rows:
+        lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
+    return lines
+
+
+def _onset(onset: Onset) -> str:
+    """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
+    text = f"{onset.kind}: {_ONSETS[onset.kind]}"
+    own = onset.rig.parameters()[onset.along].value
+    if onset.kind != "subcritical" or own is None:
+        return text
+    amplitude = float(onset.velocity_amplitude(own))
+    if onset.is_near:
+        return (
+            f"{text}; this rig is near: an unstable oscillation that changes velocity by a factor of about "
+            f"{math.exp(amplitude):.3g} surrounds steady sliding"
+        )
+    return f"{text}; this rig is too far from it to say" if math.isfinite(amplitude) else text
+
+
+def _survived(kick: Threshold) -> str:
+    """A threshold in a few words."""
+    if kick.size == 0:
+        return "none is survived: steady sliding is unstable"
+    if math.isinf(kick.size):
+        return f"every {kick.kick} step in the range searched is survived"
+    if math.isnan(kick.size):
+        return f"every {kick.kick} step tried up to size {kick.bracket[0]:.4g} is survived; undecided beyond"
+    what = {"velocity": "a velocity step to", "displacement": "a displacement step of",
+            "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
+    edge = ", the edge of the sliding that it leads to" if kick.edge else ""
+    doubt = "" if kick.decided else f" (undecided from size {kick.bracket[0]:.4g} to {kick.bracket[1]:.4g})"
+    amount = shown(kick.amount, kick.unit, area=kick.rig.area)
+    return f"survives {what} {amount}{edge}{doubt}; more leads to {kick.outcome}"
+
+
+def _disturbance(analysis: Analysis) -> str:
+    if analysis.growth_rate == math.inf:
+        return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
+    if analysis.on_edge:
+        text = "neither grows nor dies, to within rounding"
+    elif analysis.time_to_double is not None:
+        text = f"doubles in {shown(analysis.time_to_double, 's')}"
+    elif analysis.time_to_halve is not None:
+        text = f"halves in {shown(analysis.time_to_halve, 's')}"
+    else:
+        text = "neither grows nor dies"
+    leading = analysis.eigenvalues[0]
+    if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
+        text += f", oscillating with period {shown(analysis.period, 's')}"
+        return text if analysis.on_edge else f"{text} (damping ratio {analysis.damping_ratio:.3g})"
+    return f"{text} without oscillating"
+
+
+def _stable_set(analysis: Analysis) -> str:
+    parts = []
+    for low, high in analysis.stable_stiffness:
+        if low == 0 and high == math.inf:
+            parts.append("every stiffness")
+        elif high == math.inf:
+            parts.append(f"stiffness above {_stiffness(analysis, low)}")
+        elif low == 0:
+            parts.append(f"stiffness below {_stiffness(analysis, high)}")
+        else:
+            parts.append(f"stiffness from {_stiffness(analysis, low)} to {_stiffness(analysis, high)}")
+    return ", or ".join(parts) or "no stiffness"
+
+
+def _margin_table(analysis: Analysis) -> list[str]:
+    """The nearest edge of each parameter, the others unchanged."""
+    with_edge = [margin for margin in analysis.margins if margin.edge is not None]
+    without = [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
+    if not analysis.margins:
+        return []
+    lines = ["", "Nearest edge in each parameter, the others unchanged, and what happens beyond it"]
+    rows = [_margin_row(analysis, margin) for margin in with_edge]
+    widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
+    lines += [
+        "  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows
+    ]
+    if without:
+        lines += textwrap.wrap(
+            f"no edge within range: {', '.join(without)}", 98, initial_indent="  ", subsequent_indent="    "
+        )
+    return lines
+
+
+def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str]:
+    edge = margin.edge
+    if edge is None:
+        raise InternalError("edge is not None")
+    if margin.unit == "rad":
+        change = f"{math.degrees(margin.absolute):+.4g} deg"
+    elif not margin.value:
+        change = "from zero"
+    elif 0 < (ratio := edge.value / margin.value) < 0.1 or ratio > 10:
+        change = f"x {ratio:.4g}"
+    else:
+        change = f"{100 * margin.relative:+.4g} %"
+    towards = "above" if margin.absolute > 0 or (margin.absolute == 0 and edge.stable == "below") else "below"
+    if analysis.on_edge and abs(margin.absolute) <= ON_THE_EDGE * abs(margin.value):
+        change, words = "0", f"on the edge, stable {edge.stable} it" if edge.stable != "neither" else "on the edge"
+    elif edge.stable == towards:
+        words = "becomes stable"
+    elif analysis.stable is None:
+        words = "slides steadily, but unstable"
+    else:
+        words = _BEYOND.get(edge.kind, edge.kind)
+    return (
+        _short(analysis, margin.parameter),
+        _quantity(analysis, margin.value, margin.unit),
+        f"-> {_quantity(analysis, edge.value, margin.unit)}",
+        change,
+        words,
+    )
+
+
+def _short(analysis: Analysis, name: str) -> str:
+    """The dotted name without its middle: friction.alpha for friction.normal_memory.alpha."""
+    first, _, last = name.partition(".")[0], ".", name.rpartition(".")[2]
+    known = analysis.rig.parameters()
+    try:
+        return f"{first}.{last}" if resolve(last, known) == name else name
+    except LookupError:
+        return name

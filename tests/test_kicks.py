@@ -1,5 +1,7 @@
 """What comes of kicks is said only where it is certain: where they lead, neighbourhoods, cycles, doubt."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -201,6 +203,8 @@ def doubtful(low, high, limit):
     """Outcomes of a made-up rig: returns below `limit`, blow-up above, undecided in between."""
 
     def made(runs, threads=None, advanced=None):
+        if advanced is not None:
+            advanced(len(runs.jump))
         size = np.abs(runs.jump) / runs.rest.scales[:, 0]
         return np.where((size > low) & (size < high), UNDECIDED, np.where(size < limit, RETURNS, BLOW_UP))
 
@@ -238,6 +242,42 @@ def test_narrow_doubt_leaves_a_threshold_and_endless_doubt_none(monkeypatch):
     assert "undecided beyond" in str(found)
     assert found.to_dict()["size"] is None
     assert np.isnan(ss.threshold_map(a_rig, {"mass": np.zeros(1)}, "displacement")[0])
+
+
+@pytest.mark.parametrize("calls", [1, 3, 6])
+def test_ctrl_c_keeps_the_bracket_that_was_reached(monkeypatch, calls):
+    a_rig, seen = tilted(0.3, 1.2), []
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(5.5, 5.5, 5.5))
+
+    def progress(tried, low, high):
+        seen.append((tried, low, high))
+        if len(seen) == calls:
+            raise KeyboardInterrupt
+
+    found = ss.threshold(a_rig, "displacement", progress=progress)
+    assert (found.interrupted, found.decided) == (True, False)
+    assert found.bracket == seen[-1][1:]
+    assert found.bracket[0] < 5.5 < found.bracket[1]
+    assert [tried for tried, _, _ in seen] == sorted(tried for tried, _, _ in seen)
+    assert "stopped" in str(found)
+    assert found.to_dict()["interrupted"] is True
+    verdict = " ".join(str(replace(ss.analyze(a_rig), kicks=(found,))).split())
+    assert "stopped, not known" in verdict
+    if np.isinf(found.bracket[1]):
+        assert np.isnan(found.size)
+    whole = ss.threshold(a_rig, "displacement", progress=lambda *_: None)
+    assert (whole.interrupted, whole.decided) == (False, True)
+
+
+def test_all_kicks_of_a_threshold_share_their_steps(monkeypatch):
+    """With few steps altogether the rest is undecided, not followed for ever."""
+    a_rig = tilted(0.3, 1.02)
+    whole = ss.threshold(a_rig, precision=1e-4)
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.threshold.STEPS", 1e4)
+    found = ss.threshold(a_rig, precision=1e-4)
+    assert (whole.decided, found.decided, found.interrupted) == (True, False, False)
+    assert found.bracket[0] < whole.size < found.bracket[1]
+    assert "undecided" in str(found)
 
 
 def test_what_takes_too_long_is_undecided(monkeypatch):

@@ -89,6 +89,8 @@ def analyze(
         say(rest)
         if formula:
             _echo_formula(result)
+    if any(one.interrupted for one in result.kicks):
+        raise typer.Exit(130)
     if require_stable and not result.stable:
         raise typer.Exit(1)
 
@@ -287,13 +289,15 @@ def threshold(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON list in SI units")] = False,
 ) -> None:
-    """How large a kick does steady sliding survive?"""
+    """How large a kick does steady sliding survive? Ctrl-C keeps what there is."""
     from steadyslip.files.output import FIGURES, check_output
     from steadyslip.nonlinear.commands import thresholds_of_file, write_basin
 
     check_output(output or (), FIGURES)
     found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
-    _given(found, output or (), as_json, write_basin)
+    if found.interrupted and output:
+        typer.secho("stopped: the basin is not drawn", err=True)
+    _given(found, () if found.interrupted else output or (), as_json, write_basin)
 
 
 @app.command("map")
@@ -367,19 +371,23 @@ def sensitivity(
     _given(found, output or (), as_json, lambda result, path: write_by_ending(path, {}, result.plot))
 
 
-def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], None]) -> None:
-    """Print JSON or words, then write the files asked for: an answer is not lost with a file."""
+def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]) -> None:
+    """Print JSON or words, then write the files asked for: an answer is not lost with a file.
+
+    After Ctrl-C there is something to give as well. `write` says whether it was cut short itself.
+    """
     if as_json:
         import json
 
         say(json.dumps(result.to_dict(), indent=2, allow_nan=False))
     else:
         say(str(result))
+    interrupted = bool(getattr(result, "interrupted", False))
     for path in output:
-        write(result, path)
+        interrupted = bool(write(result, path)) or interrupted
         if not as_json:
             say(f"wrote {path}")
-    if getattr(result, "interrupted", False):
+    if interrupted:
         raise typer.Exit(130)
 
 

@@ -1,4 +1,4 @@
-"""A bar for long work: how much is done, how fast, how long it will still take."""
+"""A bar or a text for long work: how much is done, how fast, how long it will still take."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress_text(text: str) -> Iterator[Callable[[str], None]]:
-    """A turning mark and a text on a terminal while something of unknown length goes on; what it yields changes it."""
-    if not sys.stderr.isatty():
+def progress_text(text: str, wanted: bool | None = None) -> Iterator[Callable[[str], None]]:
+    """A turning mark and a text while something of unknown length goes on; what it yields changes it.
+
+    On a terminal unless `wanted` says otherwise.
+    """
+    if wanted is False or (wanted is None and not sys.stderr.isatty()):
         yield lambda changed: None
         return
     from rich.console import Console

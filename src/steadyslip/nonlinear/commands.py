@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
 from steadyslip.machine.slider import Slider
-from steadyslip.nonlinear.kicks.basin import basin
+from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
 from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch
 from steadyslip.nonlinear.orbits.cycles import cycles
@@ -61,30 +63,44 @@ class Thresholds:
         """One entry for each kind of kick."""
         return [one.to_dict() for one in self.found]
 
+    @cached_property
+    def basin(self) -> Basin:
+        """The basin of the same rig, computed once."""
+        return basin(self.rig)
+
 
 def thresholds_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str
 ) -> Thresholds:
-    """`steadyslip.threshold` for several kinds of kick and the rig of a file; shows progress on a terminal."""
-    rig = read_rig(path, changes)
+    """`thresholds_shown` for the rig of a file."""
+    return thresholds_shown(read_rig(path, changes), tuple(kicks), direction=-1 if reverse else 1, reference=reference)
+
+
+def thresholds_shown(rig: Slider, kicks: Sequence[str], **options: Any) -> Thresholds:
+    """`steadyslip.threshold` for several kinds of kick; shows progress on a terminal, and ends with Ctrl-C."""
     found: list[Threshold] = []
-    names = tuple(kicks)
-    try:
-        for kick in names:
-            with progress_text(f"{kick} kicks ({len(found) + 1} of {len(names)}); Ctrl-C keeps what there is"):
-                found.append(threshold(rig, kick, direction=-1 if reverse else 1, reference=reference))
-    except KeyboardInterrupt:
-        if not found:
-            raise
-    return Thresholds(rig, tuple(found), len(found) < len(names))
+    with progress_text("starting") as said:
+        for kick in kicks:
+            which = f"{kick} kicks ({len(found) + 1} of {len(kicks)})"
+
+            def told(tried: int, low: float, high: float, which: str = which) -> None:
+                bracket = f"survived up to size {low:.6g}" + (f", not at {high:.6g}" if math.isfinite(high) else "")
+                said(f"{which}: {tried} run, {bracket}; Ctrl-C keeps what there is")
+
+            told(0, 0.0, math.inf)
+            found.append(threshold(rig, kick, **options, progress=told))
+            if found[-1].interrupted:
+                break
+    return Thresholds(rig, tuple(found), found[-1].interrupted)
 
 
-def write_basin(thresholds: Thresholds, path: Path) -> None:
-    """Draw the basin of the same rig.
+def write_basin(thresholds: Thresholds, path: Path) -> bool:
+    """Draw the basin of the same rig; whether Ctrl-C cut it short.
 
     Raises
     ------
     NotAvailable
         If the ending is not that of a figure, or the file cannot be written.
     """
-    write_by_ending(path, {}, lambda: basin(thresholds.rig).plot())
+    write_by_ending(path, {}, thresholds.basin.plot)
+    return thresholds.basin.interrupted

@@ -151,7 +151,8 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
     branch : int
         Which steady sliding to judge where there are several, by rising normal stress.
     kick : str or sequence of str
-        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived.
+        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived; on a terminal
+        progress is shown. Ctrl-C leaves the kinds that were not begun out.
 
     Returns
     -------
@@ -215,9 +216,9 @@ def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | N
 def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold, ...]:
     if not kinds:
         return ()
-    from steadyslip.nonlinear.kicks.threshold import threshold  # compiles; only where asked for
+    from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
 
-    return tuple(threshold(rig, kind, branch=branch) for kind in kinds)
+    return thresholds_shown(rig, kinds, branch=branch).found
 
 
 def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:

@@ -176,12 +176,15 @@ def _survived(kick: Threshold) -> str:
         return "none is survived: steady sliding is unstable"
     if math.isinf(kick.size):
         return f"every {kick.kick} step in the range searched is survived"
+    why = "stopped, not known" if kick.interrupted else "undecided"
+    if math.isnan(kick.size) and kick.bracket[0] == 0:
+        return f"{why} from the smallest {kick.kick} step on"
     if math.isnan(kick.size):
-        return f"every {kick.kick} step tried up to size {kick.bracket[0]:.4g} is survived; undecided beyond"
+        return f"every {kick.kick} step tried up to size {kick.bracket[0]:.4g} is survived; {why} beyond"
     what = {"velocity": "a velocity step to", "displacement": "a displacement step of",
             "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
     edge = ", the edge of the sliding that it leads to" if kick.edge else ""
-    doubt = "" if kick.decided else f" (undecided from size {kick.bracket[0]:.4g} to {kick.bracket[1]:.4g})"
+    doubt = "" if kick.decided else f" ({why} from size {kick.bracket[0]:.4g} to {kick.bracket[1]:.4g})"
     amount = shown(kick.amount, kick.unit, area=kick.rig.area)
     return f"survives {what} {amount}{edge}{doubt}; more leads to {kick.outcome}"
 

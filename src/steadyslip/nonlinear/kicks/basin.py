@@ -10,14 +10,14 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pictures import draw
-from steadyslip.core.progress import progress_bar
+from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import History, simulate
 from steadyslip.motion.setup import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import OUTCOMES, Runs, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED, OUTCOMES, Budget, Runs, outcomes_of
 from steadyslip.nonlinear.kicks.rest import rest_of
 from steadyslip.nonlinear.orbits.branch import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
@@ -26,6 +26,7 @@ from steadyslip.values import model_values
 
 Array = np.ndarray
 POINTS = 81
+STEPS = 2e9  # of integration, of all motions of a basin
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Basin(ReadOnly):
     v : ndarray (m,)
         Velocity at the start, m/s.
     outcome : ndarray of str (m, n)
-        ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``.
+        ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``, ``interrupted``.
     cycles : tuple of History
         One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
         the plane of a rig with two variables.
@@ -56,6 +57,11 @@ class Basin(ReadOnly):
     def share(self) -> float:
         """Share of the grid's points that return."""
         return float(np.mean(self.outcome == "returns"))
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C came before all points were decided."""
+        return bool(np.any(self.outcome == OUTCOMES[INTERRUPTED]))
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the basin; see `steadyslip.figures.basin`."""
@@ -87,11 +93,17 @@ def basin(
     along : str, optional
         The parameter along which unstable cycles of this rig are looked for.
     rtol, threads, progress, branch
-        As for `threshold_map`. After Ctrl-C, points that were not finished are ``interrupted``.
+        As for `threshold_map`. After Ctrl-C, points that were not finished are ``interrupted``, and cycles those
+        found by then.
 
     Returns
     -------
     Basin
+
+    Notes
+    -----
+    All motions together take two billion steps of integration at most, some minutes on two cores; what is open then is
+    undecided.
     """
     steady_states(rig)  # raises, and says why
     drive = rig.drive.velocity
@@ -110,19 +122,27 @@ def basin(
     count = width.size
     near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
     near.computed()
-    runs = Runs(replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every)
-    with progress_bar(count, progress) as advanced:
+    runs = Runs(
+        replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every, budget=Budget(STEPS)
+    )
+    with progress_bar(count, progress, "starting points") as advanced:
         found = outcomes_of(runs, threads, advanced)
     outcome = np.array(OUTCOMES)[found].reshape(width.shape)
-    return Basin(rig, across, up, outcome, _unstable_cycles(rig, along, branch))
+    orbits = () if np.any(found == INTERRUPTED) else _unstable_cycles(rig, along, branch, progress)
+    return Basin(rig, across, up, outcome, orbits)
 
 
-def _unstable_cycles(rig: Slider, along: str, branch: int) -> tuple[History, ...]:
+def _unstable_cycles(rig: Slider, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:
     """One period of each unstable cycle at the rig's own parameter; none where no branch can be followed."""
-    try:
-        found = cycles(rig, along, doublings=0, branch=branch)
-    except NotAvailable:
-        return ()
+    with progress_text("following cycles", progress) as said:
+
+        def told(count: int, _: Cycle) -> None:
+            said(f"following cycles, {count} so far; Ctrl-C draws the basin with these")
+
+        try:
+            found = cycles(rig, along, doublings=0, branch=branch, progress=told)
+        except NotAvailable:
+            return ()
     own = float(rig.parameters()[found.along].value)  # type: ignore[arg-type]
     return tuple(orbit(rig, cycle) for cycle in found.at(own) if not cycle.stable)
 

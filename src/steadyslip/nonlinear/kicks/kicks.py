@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.setup import Jobs, Options, initial_values, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import Runs, continuous_at, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import Budget, Runs, continuous_at, outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
 from steadyslip.values import model_values
 
@@ -85,6 +85,8 @@ class Kicked:
     exists, neutral, stable : ndarray of bool (size,)
         Whether there is steady sliding; whether small motions about it neither grow nor decay; whether they decay
         or are neutral.
+    budget : Budget
+        Of all motions that are run.
     """
 
     def __init__(
@@ -100,7 +102,7 @@ class Kicked:
             problems.append(Problem("reference", f"got {reference!r}; allowed: 'before' or 'after'"))
         if problems:
             raise ParameterError(problems)
-        self.kick, self.sign = KICKS[kick], float(direction)
+        self.kick, self.sign, self.budget = KICKS[kick], float(direction), Budget()
         self.from_other = kick == "velocity" and reference == "after"
         values = model_values(rig, vary, branch=branch)
         if kick == "impulse" and "slider.mass" not in values.named():
@@ -194,7 +196,7 @@ class Kicked:
         if self.kick.name == "impulse":
             jobs = self._struck(jobs, amount / self.mass[which], which)
         jump = amount if self.kick.name == "displacement" else np.zeros(len(which))
-        return Runs(jobs, rest, near, jump, group, effort)
+        return Runs(jobs, rest, near, jump, group, effort, self.budget)
 
     def outcomes(
         self, which: Array, sizes: Array, threads: int | None = None,

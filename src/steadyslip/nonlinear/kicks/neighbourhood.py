@@ -144,7 +144,8 @@ def directions(n: int) -> Array:
         return np.column_stack([np.cos(angle), np.sin(angle)])
     from scipy.stats import qmc  # slow to import
 
-    normal = ndtri(qmc.Sobol(n, seed=1).random(64 * (n - 1)) * (1 - 2e-9) + 1e-9)
+    power = 6 + (n - 2).bit_length()  # 64 (n - 1), rounded up to a power of 2, which Sobol points need
+    normal = ndtri(qmc.Sobol(n, seed=1).random_base2(power) * (1 - 2e-9) + 1e-9)
     found = np.vstack([normal, np.eye(n), -np.eye(n)])
     return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,13 @@ NEUTRAL_TURNS = 100.0  # where small motions neither grow nor decay: what stays 
 ALIKE = 1e-2  # relative change of the time between slip events from span to span below which a cycle is looked for
 
 
+@dataclass
+class Budget:
+    """Steps of integration that a search may still take, all its motions together."""
+
+    steps: float = np.inf
+
+
 @dataclass(frozen=True, eq=False)
 class Runs:
     """Motions under constant inputs, about to be run.
@@ -57,6 +64,8 @@ class Runs:
         For each motion the first with the same rig and inputs.
     effort : float
         Multiplies how long a motion is followed before it is undecided.
+    budget : Budget
+        Motions that are open when it is used up are undecided.
     """
 
     jobs: Jobs
@@ -65,6 +74,7 @@ class Runs:
     jump: Array
     group: Array
     effort: float = 1.0
+    budget: Budget = field(default_factory=Budget)
 
     def repeated(self, one: int, count: int) -> Runs:
         """So many motions of one rig, to be started anywhere."""
@@ -74,7 +84,7 @@ class Runs:
         values = self.jobs.values
         values = replace(values, arguments=tuple(picked(a, which) for a in values.arguments))
         jobs = replace(self.jobs, values=values, sigma=rest.sigma, size=count)
-        return Runs(jobs, rest, near, nothing, which * 0, self.effort)
+        return Runs(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
 
     def times(self) -> tuple[Array, Array]:
         """Length of the first span, and the time after which a motion is undecided, s."""
@@ -115,9 +125,8 @@ class Spans:
 
 
 def advanced_runs(
-    runs: Runs, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
-    advanced: Callable[[int], None] | None = None,
-) -> Spans:  # fmt: skip
+    runs: Runs, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None
+) -> Spans:
     """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning."""
     jobs, rest = runs.jobs, runs.rest
     velocity, pressure = rest.velocity[which], rest.pressure[which]
@@ -144,7 +153,8 @@ def advanced_runs(
         found.status[begin:end], found.state[begin:end] = outcome.status, outcome.final[:, 4:]
         found.steps[begin:end], found.tally[begin:end] = outcome.final[:, 2] + outcome.final[:, 3], outcome.tally
 
-    found.whole = run_many(work, count, threads, advanced=advanced)
+    found.whole = run_many(work, count, threads)
+    runs.budget.steps -= float(np.nansum(found.steps))
     return found
 
 
@@ -165,7 +175,10 @@ def continuous_at(
 def outcomes_of(
     runs: Runs, threads: int | None = None, advanced: Callable[[int], None] | None = None, start: Array | None = None
 ) -> Array:
-    """Run motions and say what comes of them: indices into `OUTCOMES`, (m,); from states `start` (m, n) if given."""
+    """Run motions and say what comes of them: indices into `OUTCOMES`, (m,); from states `start` (m, n) if given.
+
+    `advanced` is told now and then how many more have been decided.
+    """
     from steadyslip.nonlinear.kicks.closed_orbits import attracted
     from steadyslip.nonlinear.kicks.shells import Shells
 
@@ -179,8 +192,7 @@ def outcomes_of(
     if start is not None:
         state = np.array(start)
     while len(open_):
-        ended = advanced_runs(runs, open_, None if first else state[open_], span[open_], not first, threads,
-                              advanced if first else None)  # fmt: skip
+        ended = advanced_runs(runs, open_, None if first else state[open_], span[open_], not first, threads)
         elapsed[open_] += span[open_]
         steps[open_] += ended.steps
         state[open_] = ended.state
@@ -203,8 +215,10 @@ def outcomes_of(
             closed = attracted(runs, open_[tried], state[open_[tried]], apart[tried], threads)
             found[open_[tried[closed]]] = OSCILLATION
         between[open_] = apart
-        late = (elapsed[open_] >= most[open_]) | (steps[open_] >= MOST_STEPS * runs.effort)
+        late = (elapsed[open_] >= most[open_]) | (steps[open_] >= MOST_STEPS * runs.effort) | (runs.budget.steps <= 0)
         found[open_[late & (found[open_] == OPEN)]] = UNDECIDED
+        if advanced is not None:
+            advanced(int(np.sum(found[open_] != OPEN)))
         open_, first = open_[found[open_] == OPEN], False
         span[open_] = np.minimum(2 * span[open_], np.maximum(most[open_] - elapsed[open_], 0.1 * span[open_]))
     return found

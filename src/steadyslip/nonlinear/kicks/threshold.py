@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +12,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
-from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED, Budget
 from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
 from steadyslip.steady import steady_states
 
@@ -19,6 +20,7 @@ Array = np.ndarray
 COARSE = 240  # sizes of the first scan of a single rig,
 BLOCK = 48  # so many at a time
 FINE = 47  # sizes between the ends of a bracket, at each step of narrowing
+STEPS = 1e9  # of integration, of all motions of one threshold
 BEYOND = 1.01  # edges over this: where it is looked what happens beyond
 
 
@@ -52,6 +54,8 @@ class Threshold:
     decided : bool
         Whether the bracket is as narrow as was asked for. If not, kicks inside it were followed for the longest time
         allowed without coming to an end.
+    interrupted : bool
+        Whether Ctrl-C ended the search; the bracket is what was known by then.
     """
 
     rig: Slider = field(repr=False)
@@ -65,6 +69,7 @@ class Threshold:
     searched: float
     edge: bool = False
     decided: bool = True
+    interrupted: bool = False
 
     def __str__(self) -> str:
         what = f"{self.kick} kick"
@@ -73,10 +78,14 @@ class Threshold:
             return f"{what}: none survived, steady sliding is unstable"
         if np.isinf(self.size):
             return f"{what}: none is large enough, up to {self.searched:.4g} (size without unit)"
+        if self.interrupted and low == 0 and np.isnan(self.size):
+            return f"{what}: stopped before anything was found"
         if np.isnan(self.size):
-            return f"{what}: all that were tried are survived up to size {low:.4g}; undecided beyond"
+            beyond = "stopped there" if self.interrupted else "undecided beyond"
+            return f"{what}: all that were tried are survived up to size {low:.4g}; {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
-        doubt = "" if self.decided else f"; undecided between {low:.6g} and {high:.6g}"
+        why = "stopped when it was" if self.interrupted else "undecided"
+        doubt = "" if self.decided else f"; {why} between {low:.6g} and {high:.6g}"
         return (
             f"{what}: survives up to {shown(self.amount, self.unit, 7, self.rig.area)} (size {self.size:.7g}, bracket "
             f"{low:.9g} to {high:.9g}){edge}{doubt}; beyond: {self.outcome}"
@@ -99,6 +108,7 @@ class Threshold:
             "searched": self.searched,
             "edge": self.edge,
             "decided": self.decided,
+            "interrupted": self.interrupted,
         }
 
 
@@ -111,6 +121,7 @@ def threshold(
     precision: float = 1e-8,
     rtol: float | None = None,
     branch: int = 0,
+    progress: Callable[[int, float, float], None] | None = None,
 ) -> Threshold:
     """The smallest kick of a given kind that does not return to steady sliding.
 
@@ -131,6 +142,9 @@ def threshold(
         Error allowed per step of integration; 1e-10, with mass 1e-8, unless given.
     branch : int, optional
         Which steady sliding, where there are several.
+    progress : callable, optional
+        Called with the number of kicks decided so far and the ends of the bracket reached. Ctrl-C (or
+        KeyboardInterrupt from here) returns what there is.
 
     Returns
     -------
@@ -152,6 +166,8 @@ def threshold(
     sliding that is never left, it has not when it blows up, loses contact or is on a closed orbit that attracts; it may
     also be undecided. Where the steady sliding that a kick leads to is not stable nothing returns, and the search ends
     there. At the edge of stability itself small motions persist; there all that stays bounded counts as returning.
+    All motions together take a billion steps of integration at most, about a minute on two cores; what is open then is
+    undecided.
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
@@ -160,68 +176,97 @@ def threshold(
     if not kicked.stable[0]:
         return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), float(kicked.amount(0.0)[0]), kicked.kick.unit,
                          "unstable", kicked.highest)  # fmt: skip
-    sizes = np.geomspace(kicked.kick.low, kicked.highest, COARSE)
-    edge = float(edges(kicked, np.zeros(1, dtype=int), sizes)[0])
-    bracket = _scanned(kicked, sizes[sizes < edge], edge)
-    while bracket[1] - bracket[0] > precision * bracket[1] and np.isfinite(bracket[1]):
-        low, high, _ = bracket
-        inside = low + (high - low) * np.arange(1, FINE + 1) / (FINE + 1)
-        bracket = _narrowed(kicked, inside, bracket, PATIENCE)
-        if bracket[1] - bracket[0] > 0.5 * (high - low):
-            break
-    return _result(rig, kicked, bracket, edge, precision)
+    search = _Search(kicked, progress)
+    try:
+        search.run(precision)
+    except KeyboardInterrupt:
+        search.interrupted = True
+    return search.result(rig, precision)
 
 
-Bracket = tuple[float, float, int]
-"""Largest size up to which all return, smallest known not to (inf: none), and what comes of that."""
+class _Search:
+    """The bracket of one threshold: a scan of rising sizes, then rounds inside it.
 
+    Attributes
+    ----------
+    low, high : float
+        Largest size up to which all return, smallest known not to (inf: none).
+    outcome : int
+        What comes of the latter; `UNDECIDED` where the first doubt is.
+    """
 
-def _scanned(kicked: Kicked, sizes: Array, edge: float) -> Bracket:
-    """The bracket of the first of rising sizes that fails; a block beyond the first doubt is the last."""
-    bracket: Bracket = (0.0, edge, RETURNS)
-    for start in range(0, len(sizes), BLOCK):
-        block, low = sizes[start : start + BLOCK], bracket[0]
-        doubt = bracket[2] == UNDECIDED
-        bracket = _narrowed(kicked, block[:: 2 if doubt else 1], bracket, 1.0)
-        if doubt:
-            bracket = (low, *bracket[1:])
-        if doubt or bracket[2] in CERTAIN:
-            break
-    return bracket
+    def __init__(self, kicked: Kicked, progress: Callable[[int, float, float], None] | None) -> None:
+        self.kicked, self.progress = kicked, progress
+        kicked.budget = Budget(STEPS)
+        self.low, self.high, self.edge, self.outcome = 0.0, np.inf, np.inf, RETURNS
+        self.tried, self.interrupted = 0, False
 
+    def run(self, precision: float) -> None:
+        """Scan, then narrow to a relative precision."""
+        sizes = np.geomspace(self.kicked.kick.low, self.kicked.highest, COARSE)
+        self.edge = self.high = float(edges(self.kicked, np.zeros(1, dtype=int), sizes)[0])
+        self._scan(sizes[sizes < self.edge])
+        while self.high - self.low > precision * self.high and np.isfinite(self.high):
+            width = self.high - self.low
+            self._narrow(self.low + width * np.arange(1, FINE + 1) / (FINE + 1), PATIENCE)
+            if self.high - self.low > 0.5 * width:
+                break
+        if self.at_edge and self.high * BEYOND <= self.kicked.highest:
+            found = int(self._outcomes(np.array([self.high * BEYOND]), PATIENCE)[0])
+            self.outcome = found if found in CERTAIN else UNDECIDED
 
-def _narrowed(kicked: Kicked, sizes: Array, bracket: Bracket, effort: float) -> Bracket:
-    """A bracket after rising sizes inside it have been tried."""
-    if not len(sizes):
-        return bracket
-    found = kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, effort=effort)
-    if np.any(found == INTERRUPTED):
-        raise KeyboardInterrupt
-    low, high, outcome = bracket
-    others = np.flatnonzero(found != RETURNS)
-    survived = int(others[0]) if len(others) else len(sizes)
-    failed = np.flatnonzero(np.isin(found, CERTAIN))
-    if len(failed):
-        high, outcome = float(sizes[failed[0]]), int(found[failed[0]])
-    elif len(others) and outcome == RETURNS:
-        outcome = UNDECIDED
-    return (float(sizes[survived - 1]) if survived else low), high, outcome
+    @property
+    def at_edge(self) -> bool:
+        """Whether the steady sliding that kicks lead to loses its stability before any other limit."""
+        return bool(np.isfinite(self.high) and self.high == self.edge)
 
+    def _scan(self, sizes: Array) -> None:
+        """Rising sizes up to the first that fails; a block beyond the first doubt is the last."""
+        for start in range(0, len(sizes), BLOCK):
+            block, low = sizes[start : start + BLOCK], self.low
+            doubt = self.outcome == UNDECIDED
+            self._narrow(block[:: 2 if doubt else 1], 1.0)
+            if doubt:
+                self.low = low
+            if doubt or self.outcome in CERTAIN:
+                break
 
-def _result(rig: Slider, kicked: Kicked, bracket: Bracket, edge: float, precision: float) -> Threshold:
-    low, high, outcome = bracket
-    at_edge = bool(np.isfinite(high) and high == edge)
-    if at_edge and high * BEYOND <= kicked.highest:
-        found = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([high * BEYOND]))[0])
-        outcome = found if found in CERTAIN else UNDECIDED
-    decided = bool(high - low <= precision * high) if np.isfinite(high) else outcome == RETURNS
-    size = high if at_edge else 0.5 * (low + high)
-    if np.isinf(high):
-        size = np.inf if outcome == RETURNS else np.nan
-    amount = float(kicked.amount(size)[0]) if np.isfinite(size) else size
-    word = "" if outcome == RETURNS else OUTCOMES[outcome]
-    return Threshold(rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word,
-                     kicked.highest, at_edge, decided)  # fmt: skip
+    def _narrow(self, sizes: Array, effort: float) -> None:
+        """Try rising sizes inside the bracket."""
+        if not len(sizes):
+            return
+        found = self._outcomes(sizes, effort)
+        others = np.flatnonzero(found != RETURNS)
+        survived = int(others[0]) if len(others) else len(sizes)
+        failed = np.flatnonzero(np.isin(found, CERTAIN))
+        if len(failed):
+            self.high, self.outcome = float(sizes[failed[0]]), int(found[failed[0]])
+        elif len(others) and self.outcome == RETURNS:
+            self.outcome = UNDECIDED
+        if survived:
+            self.low = float(sizes[survived - 1])
+        if np.any(found == INTERRUPTED):
+            raise KeyboardInterrupt
+
+    def _outcomes(self, sizes: Array, effort: float) -> Array:
+        def advanced(count: int) -> None:
+            self.tried += count
+            if self.progress is not None:
+                self.progress(self.tried, self.low, self.high)
+
+        return self.kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, None, advanced, effort)
+
+    def result(self, rig: Slider, precision: float) -> Threshold:
+        """What is known."""
+        kicked, low, high = self.kicked, self.low, self.high
+        decided = bool(high - low <= precision * high) if np.isfinite(high) else self.outcome == RETURNS
+        size = high if self.at_edge else 0.5 * (low + high)
+        if np.isinf(high):
+            size = np.inf if self.outcome == RETURNS and not self.interrupted else np.nan
+        amount = float(kicked.amount(size)[0]) if np.isfinite(size) else size
+        word = "" if self.outcome == RETURNS else OUTCOMES[self.outcome]
+        return Threshold(rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word,
+                         kicked.highest, self.at_edge, decided and not self.interrupted, self.interrupted)  # fmt: skip
 
 
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:

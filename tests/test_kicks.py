@@ -84,16 +84,63 @@ def test_there_is_none_where_the_stress_is_gone():
 # -- the neighbourhood
 
 
-@pytest.mark.parametrize(
-    "a_rig",
-    [
-        tilted(0.5, 2.0),
-        rig(friction=STEEP, stiffness=1e11, mass=1e-8 * 0.0145 * SIGMA * D_C / V0**2),
-        unit_rig("aging", 0.5, 0.8, mass=1e-2),
-        unit_rig("prz", 0.5, 2.0, mass=1e-6, damping=1e-3),
-    ],
-    ids=["massless", "mass of 1e-8", "ringing", "prz"],
-)
+TWO_STATES = ss.RateState(a=0.0145, mu_ref=0.7, v_ref=V0, evolution=ss.Slip(),
+                          states=(ss.State(b=0.01, d_c=1e-6), ss.State(b=0.01, d_c=1e-5)))  # fmt: skip
+UNIT_MASS = 0.0145 * SIGMA * D_C / V0**2  # of mass in units of theory 5
+
+
+def bristles(velocity, mass, damping=10.0, stiffness=1e12, contact=None):
+    friction = ss.LuGre(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, bristle_stiffness=1e5,
+                        bristle_damping=damping, viscous=5.0)  # fmt: skip
+    return ss.Slider(friction=friction, contact=contact or ss.Constant(preload=1e6), stiffness=stiffness, mass=mass,
+                     drive=ss.Steady(velocity))  # fmt: skip
+
+
+def of_law(friction, mass=0.0, factor=1.03):
+    """Close to the edge, where balls are small and modes decay at very different rates."""
+    base = rig(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=0.4), mass=mass * UNIT_MASS)
+    return base.with_values({"stiffness": factor * ss.critical_stiffness(base)})
+
+
+STABLE = {
+    "massless": tilted(0.5, 2.0),
+    "mass of 1e-8": rig(friction=STEEP, stiffness=1e11, mass=1e-8 * UNIT_MASS),
+    "ringing": unit_rig("aging", 0.5, 0.8, mass=1e-2),
+    "prz": unit_rig("prz", 0.5, 2.0, mass=1e-6, damping=1e-3),
+    "regularised prz": of_law(ONE_MEMORY[2], 1e-2),
+    "nagata": of_law(ONE_MEMORY[3], 1e-2),
+    "regularised nagata": of_law(ONE_MEMORY[4]),
+    "regularised nagata, mass of 1e-8": of_law(ONE_MEMORY[4], 1e-8, factor=3.0),
+    "two states": of_law(TWO_STATES),
+    "two states, mass": of_law(TWO_STATES, 1e-2),
+    "lugre, massless": bristles(3e-4, 0.0, contact=ss.InclinedSpring(preload=1e6, angle=0.3)),
+    "lugre, light": bristles(3e-3, 1.0, damping=0.0),
+    "lugre, heavy": bristles(3e-3, 3e3),
+    "lugre, damped bristles": bristles(3e-3, 3e3, damping=300.0),
+}
+
+
+@pytest.mark.parametrize("a_rig", STABLE.values(), ids=STABLE)
+def test_distance_falls_everywhere_in_the_neighbourhood(a_rig):
+    """In states that were not among those tested, next to the slow modes above all, where most could be missed."""
+    rest = rest_at(a_rig)
+    near = Neighbourhood(rest)
+    radius = float(near.computed()[0])
+    assert radius > 1e-4
+    random, n = np.random.default_rng(1), rest.state.shape[1]
+    decay = np.sort(-rest.roots[0].real)
+    q = random.normal(size=(8000, n)) * (decay[0] / decay) ** random.uniform(0, 1, size=(8000, 1))
+    q *= radius * random.uniform(0.02, 1, size=(8000, 1)) / np.linalg.norm(q, axis=1)[:, None]
+    matrix, scales = near.inverse[0] @ rest.matrix[0] @ near.basis[0], rest.scales[0]
+    rates = rates_at(rest, (rest.state[0] + scales * (q @ near.basis[0].T))[None])[0] / scales
+    slope, linear = np.sum(q * (rates @ near.inverse[0].T), axis=1), np.sum(q * (q @ matrix.T), axis=1)
+    assert np.min(slope / linear) > 0.35
+
+
+QUICK = ("massless", "mass of 1e-8", "ringing", "prz", "lugre, massless", "lugre, light", "lugre, heavy")
+
+
+@pytest.mark.parametrize("a_rig", [STABLE[name] for name in QUICK], ids=QUICK)
 def test_motion_from_the_edge_of_the_neighbourhood_only_goes_inwards(a_rig):
     """By SciPy on the uncompiled rates, from directions that were not among those tested."""
     rest = rest_at(a_rig)

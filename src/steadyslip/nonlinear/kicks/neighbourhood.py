@@ -4,11 +4,14 @@ With y = y0 + B q, the columns of B the modes of the linearisation, V = |q|² is
 motion. It is one of the motion itself wherever V' < 0, and a ball of V on and in which this holds is never left and
 leads to steady sliding. The largest such ball is looked for: V' is computed from the full rates on
 shells, in many directions, and must everywhere be at least half of what the linearisation gives. The half is the margin
-for what lies between the directions.
+for what lies between the directions. It relies on rates that are smooth, so the ball ends before the block stops: laws
+may have a kink there (the bristles of LuGre).
 
 Modes that decay fast are followed by the slow ones with a lag that grows like the square of the distance; in a plain
 ball this alone would make V' positive at tiny distances (with mass rates differ by ten decades). Modes are therefore
-weighted by the square root of their decay times.
+weighted by the square root of their decay times. For the same reason V' changes from direction to direction most
+steeply next to the slow modes, where little of the fast ones decides its sign; directions are spread there too, as
+evenly as V' sees them.
 """
 
 from __future__ import annotations
@@ -23,8 +26,10 @@ from steadyslip.nonlinear.kicks.rest import Rest, field_of
 Array = np.ndarray
 LARGEST, SMALLEST = 4.0, 1e-9  # radius, in natural sizes of the weakest mode
 SHRINK = 0.6
+SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
 INNER = (0.75, 0.5, 0.25, 0.1)  # shells inside the ball that are looked at too
 MARGIN = 0.5  # share of the linear decay of V that is asked for
+ROUNDING = 1e-14  # of stresses, in the normal stress
 ROUNDS = 12  # of Newton's method for the balance of forces
 
 
@@ -46,12 +51,14 @@ class Neighbourhood:
         count, n = rest.state.shape
         self.basis = np.zeros((count, n, n))
         self.inverse = np.zeros((count, n, n))
+        self.decay = np.ones((count, n))
         self.radius = np.where(rest.stable, np.nan, 0.0)
 
     def part(self, which: Array) -> Neighbourhood:
         """Those of some of the rigs."""
         found = Neighbourhood(self.rest.part(which))
-        found.basis, found.inverse, found.radius = self.basis[which], self.inverse[which], self.radius[which]
+        for name in ("basis", "inverse", "decay", "radius"):
+            setattr(found, name, getattr(self, name)[which])
         return found
 
     def computed(self, which: Array | None = None) -> Array:
@@ -60,7 +67,7 @@ class Neighbourhood:
         asked = np.unique(which[np.isnan(self.radius[which])])
         for start in range(0, len(asked), 512):
             piece = asked[start : start + 512]
-            self.basis[piece], good = modes(self.rest.matrix[piece])
+            self.basis[piece], self.decay[piece], good = modes(self.rest.matrix[piece])
             self.radius[piece[~good]] = 0.0
             piece = piece[good]
             if len(piece):
@@ -74,6 +81,14 @@ class Neighbourhood:
         with np.errstate(all="ignore"):
             away = (states - rest.state[which]) / rest.scales[which]
             return np.asarray(np.einsum("kij,kj->ki", self.inverse[which], away))
+
+    def around(self, which: Array) -> Array:
+        """Directions of q in which rigs `which` (k,) are looked at, (k, d, n), unit vectors."""
+        decay = self.decay[which]
+        lessened = (np.min(decay, axis=1)[:, None] / decay)[:, None, :]
+        even = directions(decay.shape[1])[None]
+        found = np.concatenate([even * lessened**power for power in SPREAD], axis=1)
+        return np.asarray(found / np.linalg.norm(found, axis=2)[:, :, None])
 
     def distance(self, which: Array, states: Array) -> Array:
         """|q| of states (k, n) of rigs `which` (k,); beyond the radius it means nothing."""
@@ -105,19 +120,20 @@ class Neighbourhood:
     def _decays(self, which: Array, radius: Array) -> Array:
         """Whether V falls as fast as asked for, everywhere on a shell."""
         rest = self.rest.part(which)
-        n = rest.state.shape[1]
-        q = directions(n)[None] * radius[:, None, None]
+        q = self.around(which) * radius[:, None, None]
         away = np.einsum("kij,kdj->kdi", self.basis[which], q)
-        rates = rates_at(rest, rest.state[:, None, :] + rest.scales[:, None, :] * away)
-        back = np.einsum("kij,kdj->kdi", self.inverse[which], rates / rest.scales[:, None, :])
+        rates, velocity = motion_at(rest, rest.state[:, None, :] + rest.scales[:, None, :] * away)
+        with np.errstate(all="ignore"):
+            back = np.einsum("kij,kdj->kdi", self.inverse[which], rates / rest.scales[:, None, :])
         linear = np.einsum("kij,kdj->kdi", self.inverse[which] @ rest.matrix @ self.basis[which], q)
-        slope, asked = np.sum(q * back, axis=2), MARGIN * np.sum(q * linear, axis=2)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.all(slope < asked, axis=1))
+        with np.errstate(all="ignore"):
+            slope, asked = np.sum(q * back, axis=2), MARGIN * np.sum(q * linear, axis=2)
+            return np.asarray(np.all((slope < asked) & (velocity > 0), axis=1))
 
 
-def modes(matrix: Array) -> tuple[Array, Array]:
-    """Real weighted modes of stable matrices (m, n, n) as columns, slow ones first, and where they can be used (m,)."""
+def modes(matrix: Array) -> tuple[Array, Array, Array]:
+    """Real weighted modes of stable matrices (m, n, n) as columns, slow ones first; their rates of decay (m, n), 1/s;
+    and where they can be used (m,)."""
     roots, vectors = np.linalg.eig(matrix)
     order = np.lexsort((-roots.imag, -roots.real))  # the slowest first
     roots, vectors = np.take_along_axis(roots, order, axis=1), np.take_along_axis(vectors, order[:, None, :], axis=2)
@@ -131,7 +147,7 @@ def modes(matrix: Array) -> tuple[Array, Array]:
     with np.errstate(all="ignore"):
         columns = columns / weight[:, None, :]
         good = np.all(np.isfinite(columns), axis=(1, 2)) & (np.linalg.cond(columns) < 1e9)
-    return columns, good
+    return columns, decay, good
 
 
 @lru_cache(maxsize=8)
@@ -152,6 +168,11 @@ def directions(n: int) -> Array:
 
 def rates_at(rest: Rest, states: Array) -> Array:
     """Rates (m, d, n) at states (m, d, n), d of them for each rig; NaN where the balance of forces has no solution."""
+    return motion_at(rest, states)[0]
+
+
+def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
+    """Rates (m, d, n) and velocity of the block (m, d) at states (m, d, n); NaN where forces cannot balance."""
     given = (*(rest.column(np.asarray(a)) for a in rest.arguments), rest.sigma[:, None], rest.velocity[:, None])
     given = (*given, rest.pressure[:, None])
     function, split = field_of(rest.reduction), np.moveaxis(states, 2, 0)
@@ -162,12 +183,14 @@ def rates_at(rest: Rest, states: Array) -> Array:
         else:
             unknown = np.broadcast_to(rest.unknown[:, None], shape).copy()
             for _ in range(ROUNDS):
-                found = function(*given, *split, unknown)
-                change = found[-2] / found[-1]
+                *found, residual, slope = function(*given, *split, unknown)
+                change = residual / slope
                 unknown = unknown - change
-            settled = np.abs(change) <= 1e-10 * (1e-30 + np.abs(unknown)) + 1e-10 * _size(rest)[:, None]
-            found = [np.where(settled, rate, np.nan) for rate in found[:-2]]
-    return np.stack([np.broadcast_to(np.asarray(rate, dtype=float), shape) for rate in found], axis=2)
+            rounding = ROUNDING * rest.sigma[:, None] / np.abs(slope)  # much where mass is small
+            settled = np.abs(change) <= 1e-10 * (np.abs(unknown) + _size(rest)[:, None]) + rounding
+            found = [np.where(settled, rate, np.nan) for rate in found]
+    *rates, velocity = (np.broadcast_to(np.asarray(number, dtype=float), shape) for number in found)
+    return np.stack(rates, axis=2), velocity
 
 
 def _size(rest: Rest) -> Array:

@@ -74,12 +74,12 @@ def _balance(reduction: Reduction) -> _Balance:
 
 @lru_cache(maxsize=64)
 def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
-    """Rates, then the residual of the balance and its slope where there is an unknown left.
+    """Rates and the block's velocity, then the residual of the balance and its slope where there is an unknown left.
 
     A function of the parameters, σss, v_lp, p, the state and the unknown if there is one.
     """
     left = [] if reduction.unknown is None else [reduction.residual, sp.diff(reduction.residual, reduction.unknown)]
-    return _at_constant_inputs(reduction, [*reduction.rates, *left])
+    return _at_constant_inputs(reduction, [*reduction.rates, reduction.outputs["v"], *left])
 
 
 @lru_cache(maxsize=64)

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.kernels.program import STATUSES
-from steadyslip.nonlinear.kicks.neighbourhood import LARGEST, directions, rates_at
+from steadyslip.nonlinear.kicks.neighbourhood import LARGEST, rates_at
 from steadyslip.nonlinear.kicks.outcomes import CERTAIN, OPEN, RETURNS, Runs, advanced_runs, outcomes_of
 
 Array = np.ndarray
@@ -108,13 +108,13 @@ class Shells:
         rest, near = self.runs.rest, self.runs.near
         n = rest.state.shape[1]
         flat = self.flat[group[0]]
-        around = np.eye(n)[:1] if flat else directions(n)[::3]
-        q = radii[:, :, None, None] * around
+        around = np.eye(n)[None, :1] if flat else near.around(group)[:, ::3]
+        q = radii[:, :, None, None] * around[:, None]
         away = np.einsum("kij,krdj->krdi", near.basis[group], q)
         states = (rest.state[group][:, None, None] + rest.scales[group][:, None, None] * away).reshape(-1, n)
         turn = 2 * np.pi / np.abs(rest.leading[group].imag)
-        lane = np.repeat(group, radii.shape[1] * len(around))
-        each = np.repeat(turn, radii.shape[1] * len(around))
+        lane = np.repeat(group, radii.shape[1] * around.shape[1])
+        each = np.repeat(turn, radii.shape[1] * around.shape[1])
         begin = np.broadcast_to(radii[:, :, None], q.shape[:3])
         if flat:
             end, states = self._to_ray(lane, states, each)

@@ -133,7 +133,7 @@ def general_route(count: int) -> None:
 
 def general_sets(rig: ss.Slider, vary: dict[str, Any]) -> Any:
     from steadyslip.linear.stiffness import general_set
-    from steadyslip.values import model_values
+    from steadyslip.model.point import model_values
 
     return general_set(model_values(rig, vary)).intervals
 

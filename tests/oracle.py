@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from steadyslip.core.expressions import array_function
-from steadyslip.steady import steady_stress
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import steady_stress
 
 
 class Oracle:

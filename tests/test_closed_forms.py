@@ -9,10 +9,10 @@ import pytest
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, A, B, rate_state, rig
 from steadyslip.linear import cubic
-from steadyslip.linear.linearise import characteristic_coefficients
 from steadyslip.linear.polynomials import is_hurwitz, roots
 from steadyslip.model import build_model
-from steadyslip.values import model_values
+from steadyslip.model.linearisation import characteristic_coefficients
+from steadyslip.model.point import model_values
 
 
 @pytest.mark.parametrize("mass", [0.0, 1e9, 1e12])

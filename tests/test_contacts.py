@@ -11,9 +11,9 @@ import steadyslip as ss
 from steadyslip.core.expressions import array_function
 from steadyslip.linear.response import contact_coefficients
 from steadyslip.linear.state_space import state_matrices
+from steadyslip.model.point import model_values
 from steadyslip.testing import CONTACT_CHECKS, Surroundings
 from steadyslip.units import deg
-from steadyslip.values import model_values
 
 ROCK = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.3))
 V = 1e-6

@@ -10,11 +10,11 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from steadyslip.core.expressions import array_function, asinh_exp, numpy_asinh_exp
-from steadyslip.linear.linearise import characteristic_coefficients
 from steadyslip.linear.response import response
+from steadyslip.model.linearisation import characteristic_coefficients
+from steadyslip.model.point import model_values
 from steadyslip.testing import FRICTION_CHECKS, Conditions
 from steadyslip.testing.statement import statement
-from steadyslip.values import model_values
 
 ROCK = {"a": 0.0145, "mu_ref": 0.7, "v_ref": 1e-6}
 ONE = {"b": 0.016, "d_c": 1e-6}

@@ -9,7 +9,7 @@ import pytest
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, SIGMA, rate_state, rig
 from steadyslip.linear.polynomials import quietly
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
 
 CRANK = {"preload": SIGMA, "crank_angle": math.radians(30), "crank_radius": 0.1, "rod_length": 0.3}
 TWO = (ss.State(b=0.01, d_c=1e-6), ss.State(b=0.008, d_c=2e-5))

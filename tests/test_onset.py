@@ -8,9 +8,9 @@ import steadyslip as ss
 from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, rig
 from steadyslip.linear.boundary import boundary
-from steadyslip.nonlinear.onset.derivatives import taylor
-from steadyslip.steady import steady_stress
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import steady_stress
+from steadyslip.model.taylor import taylor
 from test_motion_oracle import LAWS
 
 LAMBDAS = st.floats(0.05, 3.0)

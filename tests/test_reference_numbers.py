@@ -10,7 +10,7 @@ import steadyslip as ss
 from steadyslip.linear import cubic
 from steadyslip.linear.state_space import jacobian
 from steadyslip.linear.stiffness import general_set
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
 
 FOLDER = Path(__file__).parent / "reference"
 # 12 significant digits, times how much the terms of D cancel

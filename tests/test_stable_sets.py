@@ -15,7 +15,7 @@ from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.state_space import jacobian
 from steadyslip.linear.stiffness import characteristic, closed_form_interval, general_set
 from steadyslip.model import build_model
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
 
 
 @pytest.mark.parametrize("friction", ONE_MEMORY, ids=lambda law: type(getattr(law, "evolution", law)).__name__)

@@ -134,6 +134,11 @@ from .model import (
     Model as Model,
     build_model as build_model,
 )
+from .model.steady import (
+    SteadySliding as SteadySliding,
+    steady_state as steady_state,
+    steady_states as steady_states,
+)
 from .motion import (
     Ensemble as Ensemble,
     Event as Event,
@@ -182,11 +187,6 @@ from .protocol import (
     VelocityHarmonic as VelocityHarmonic,
     VelocityRamp as VelocityRamp,
     VelocityStep as VelocityStep,
-)
-from .steady import (
-    SteadySliding as SteadySliding,
-    steady_state as steady_state,
-    steady_states as steady_states,
 )
 from .verdict import (
     Analysis as Analysis,

@@ -16,8 +16,8 @@ from steadyslip.figures.axis import Axis, axis
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
 from steadyslip.machine.slider import Slider
-from steadyslip.steady import explain_absence
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import explain_absence
 
 _SAMPLES = 12  # points at which the reason for no steady sliding is asked
 

@@ -13,8 +13,8 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures.style import BLACK, VERMILION, axes_or_new, display_unit, labelled
 from steadyslip.linear import critical_stiffness, eigenvalues, stable_stiffness
 from steadyslip.machine.slider import Slider
-from steadyslip.steady import steady_state
-from steadyslip.values import checked_array, model_values
+from steadyslip.model.point import checked_array, model_values
+from steadyslip.model.steady import steady_state
 
 _HALF_SPAN = 1e2  # two decades to each side
 _VIEW = 3.0  # half the width of the view in sizes of the eigenvalues that decide stability

@@ -12,8 +12,8 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.laws.contact import InclinedSpring
 from steadyslip.linear import critical_stiffness
 from steadyslip.machine.slider import Slider
-from steadyslip.steady import steady_stress
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import steady_stress
 
 _LARGEST = 1e6  # m* beyond any rig: a limit above is no limit
 _NEGLIGIBLE = 1e-12  # m* of a quasistatic rig

@@ -24,9 +24,9 @@ from steadyslip.figures.style import (
     labelled,
 )
 from steadyslip.kernels.driver import SLIP_EVENT
+from steadyslip.model.steady import steady_state
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
-from steadyslip.steady import steady_state
 
 if TYPE_CHECKING:
     from steadyslip.motion import History

@@ -14,9 +14,9 @@ from steadyslip.core.expressions import array_function
 from steadyslip.kernels.build import Code, compiled, interpreted
 from steadyslip.kernels.kernel import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
-from steadyslip.kernels.reduction import Reduction, W, reduce_model
-from steadyslip.kernels.variational import with_directions
 from steadyslip.model import Model
+from steadyslip.model.reduction import Reduction, W, reduce_model
+from steadyslip.model.variational import with_directions
 
 LANES = 8  # one vector of doubles: sensitivities fill the registers
 

@@ -16,9 +16,9 @@ import sympy as sp
 from steadyslip.kernels.layout import Layout, Out, Row, make_layout
 from steadyslip.kernels.methods import METHODS, Method
 from steadyslip.kernels.nodes import Loop, Node, Program, Value, exp, larger, log, primitive, select, smaller, weighted
-from steadyslip.kernels.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
 from steadyslip.kernels.rosenbrock import Pattern, factorised, substituted
 from steadyslip.kernels.source import Constants, Formulas
+from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
 
 LEVELS = ("constant", "linear", "harmonic")
 CHANNELS = ("v", "q", "p")

@@ -15,7 +15,7 @@ import sympy as sp
 from steadyslip.kernels.kernel import Choice, Kernel, Record, Step
 from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
-from steadyslip.kernels.reduction import V_LP, P, Q, Reduction
+from steadyslip.model.reduction import V_LP, P, Q, Reduction
 
 
 class LockstepKernel(Kernel):

@@ -12,8 +12,8 @@ import numpy as np
 from steadyslip.kernels.build import Code, compiled, interpreted
 from steadyslip.kernels.kernel import Choice, Kernel
 from steadyslip.kernels.layout import SETTINGS, TALLY, Status
-from steadyslip.kernels.reduction import Reduction, reduce_model
 from steadyslip.model import Model
+from steadyslip.model.reduction import Reduction, reduce_model
 
 STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
 LOG_KINDS = (

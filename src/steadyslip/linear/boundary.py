@@ -12,7 +12,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Parameter
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.slider import Slider
-from steadyslip.values import checked_array, model_values
+from steadyslip.model.point import checked_array, model_values
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import quietly
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.steady import steady_stress
-from steadyslip.values import Values, Vary, model_values
+from steadyslip.model.point import Values, Vary, model_values
+from steadyslip.model.steady import steady_stress
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,14 @@ import numpy as np
 
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.quantities import shown, unit
-from steadyslip.linear.linearise import linearise
 from steadyslip.linear.polynomials import damping_measures, roots
 from steadyslip.linear.response import memory_symbols
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
-from steadyslip.steady import explain_absence, steady_stress
-from steadyslip.values import Values, model_values
+from steadyslip.model.linearisation import linearise
+from steadyslip.model.point import Values, model_values
+from steadyslip.model.steady import explain_absence, steady_stress
 
 _PER_DECADE = 40
 _DECADES = 6

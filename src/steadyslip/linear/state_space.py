@@ -11,11 +11,11 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable, UnknownNameError
 from steadyslip.core.expressions import array_function
-from steadyslip.linear.linearise import linearise
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.steady import explain_absence, steady_stress_roots
-from steadyslip.values import model_values
+from steadyslip.model.linearisation import linearise
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import explain_absence, steady_stress_roots
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace

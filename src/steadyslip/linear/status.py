@@ -9,8 +9,8 @@ import numpy as np
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
 from steadyslip.linear.response import has_closed_form, response_numbers
 from steadyslip.linear.stiffness import characteristic, stiffness_polynomials
-from steadyslip.steady import out_of_range, steady_stress
-from steadyslip.values import Values
+from steadyslip.model.point import Values
+from steadyslip.model.steady import out_of_range, steady_stress
 
 ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms, that rounding alone can make
 ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)

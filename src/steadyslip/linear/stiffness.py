@@ -15,13 +15,13 @@ import sympy as sp
 
 from steadyslip.core.expressions import array_function
 from steadyslip.linear import cubic
-from steadyslip.linear.linearise import characteristic_coefficients, stiffness_split
 from steadyslip.linear.polynomials import StableSet, quietly, roots, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.steady import steady_equation, steady_stress
-from steadyslip.values import Values, Vary, model_values
+from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
+from steadyslip.model.point import Values, Vary, model_values
+from steadyslip.model.steady import steady_equation, steady_stress
 
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
 

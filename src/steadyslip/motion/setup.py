@@ -15,12 +15,12 @@ from steadyslip.core.expressions import array_function
 from steadyslip.core.records import parameters, twin
 from steadyslip.kernels.kernel import Choice
 from steadyslip.kernels.program import Program, program
-from steadyslip.kernels.reduction import TIME, V_LP, P, Q, Reduction, W, reduce_model
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
+from steadyslip.model.point import Values, check_together, model_values
+from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W, reduce_model
+from steadyslip.model.steady import steady_stress
 from steadyslip.protocol import Protocol, Segments, pack
-from steadyslip.steady import steady_stress
-from steadyslip.values import Values, check_together, model_values
 
 METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4", "tsit5": "tsit5", "rodas4": "rodas4",
            "rodas5p": "rodas5p"}  # fmt: skip
@@ -219,7 +219,7 @@ def prepare(
 
 def _protocol_values(plan: Protocol, given: Mapping[str, Any]) -> dict[str, Any]:
     """Checked arrays of the protocol's own parameters, completed by its other numbers."""
-    from steadyslip.values import checked_array
+    from steadyslip.model.point import checked_array
 
     if not given:
         return {}

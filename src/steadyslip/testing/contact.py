@@ -13,7 +13,8 @@ from steadyslip.laws.contact import ContactLaw, Motion
 from steadyslip.laws.friction import FrictionLaw, RateState
 from steadyslip.machine.drive import Steady
 from steadyslip.machine.slider import Slider
-from steadyslip.steady import steady_states
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import steady_states
 from steadyslip.testing.precise import (
     DIGITS,
     TOLERANCE,
@@ -27,7 +28,6 @@ from steadyslip.testing.precise import (
     stated,
 )
 from steadyslip.testing.routes import round_trip
-from steadyslip.values import model_values
 
 
 def _rock() -> FrictionLaw:

@@ -19,10 +19,10 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     """
     from steadyslip.laws.contact import Linear
     from steadyslip.linear import cubic
-    from steadyslip.linear.linearise import characteristic_coefficients
     from steadyslip.linear.response import response
     from steadyslip.machine.drive import Steady
-    from steadyslip.values import model_values
+    from steadyslip.model.linearisation import characteristic_coefficients
+    from steadyslip.model.point import model_values
 
     if len(law.memory()) != 1:
         return

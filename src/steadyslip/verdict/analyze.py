@@ -21,9 +21,9 @@ from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import on_edge
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import Values, axial_projection, model_values
+from steadyslip.model.steady import SteadySliding, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
-from steadyslip.steady import SteadySliding, steady_states
-from steadyslip.values import Values, axial_projection, model_values
 
 if TYPE_CHECKING:
     import sympy as sp

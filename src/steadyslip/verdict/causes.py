@@ -14,7 +14,7 @@ from steadyslip.linear.cubic import coefficients, hopf_line
 from steadyslip.linear.polynomials import quietly
 from steadyslip.linear.response import Response, has_closed_form, response_numbers
 from steadyslip.linear.stiffness import stiffness_polynomials
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
 
 if TYPE_CHECKING:
     from steadyslip.verdict.analyze import Analysis

@@ -11,7 +11,7 @@ from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
 from steadyslip.laws.friction import RateState
 from steadyslip.linear.status import ON_THE_EDGE
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from steadyslip.experiments.fitting.identify import Combination, combinations
 from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.experiments.measured.read import record_from_arrays
 from steadyslip.machine.slider import Slider
+from steadyslip.model.steady import steady_state
 from steadyslip.protocol import (
     NormalStressHarmonic,
     NormalStressPulse,
@@ -24,7 +25,6 @@ from steadyslip.protocol import (
     Protocol,
     VelocityStep,
 )
-from steadyslip.steady import steady_state
 
 Array = np.ndarray
 SAMPLES = 4000

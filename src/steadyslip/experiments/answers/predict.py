@@ -19,8 +19,8 @@ from steadyslip.laws.friction.normal_memory import NoMemory
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import model_values
 from steadyslip.nonlinear.kicks.brackets import threshold_map
-from steadyslip.values import model_values
 
 Array = np.ndarray
 COUNT = 4000

@@ -10,10 +10,10 @@ import numpy as np
 
 from steadyslip.kernels.experiment import LANES, experiment_program
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import Values, model_values
+from steadyslip.model.steady import steady_stress
 from steadyslip.motion.engine import run_many
 from steadyslip.motion.setup import automatic_method, natural_scales
-from steadyslip.steady import steady_stress
-from steadyslip.values import Values, model_values
 
 Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result

@@ -19,7 +19,7 @@ from steadyslip.experiments.fitting.inputs import ProtocolInputs
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import Step
-from steadyslip.steady import steady_state
+from steadyslip.model.steady import steady_state
 
 Array = np.ndarray
 STARTS = 48

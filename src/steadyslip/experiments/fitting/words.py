@@ -9,8 +9,8 @@ import numpy as np
 
 from steadyslip.core.quantities import shown
 from steadyslip.experiments.numerics.splitting import displacement_noise
-from steadyslip.steady import steady_state
-from steadyslip.values import model_values
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import steady_state
 
 if TYPE_CHECKING:
     from steadyslip.experiments.fitting.result import Fit

@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.records import Parameter, checked_number
-from steadyslip.values import checked_array
+from steadyslip.model.point import checked_array
 
 Array = np.ndarray
 SPACINGS = ("linear", "log")

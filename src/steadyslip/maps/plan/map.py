@@ -19,8 +19,8 @@ from steadyslip.files.specifications.layout import find_law
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
 from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
+from steadyslip.model.point import model_values
 from steadyslip.protocol import Protocol
-from steadyslip.values import model_values
 
 SECONDS = 0.5  # that a chunk should take: long beside the cost of handing it out, short enough to lose
 LARGEST_CHUNK = 2**20  # points; bounds the memory of a worker

@@ -24,6 +24,7 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.status import status
 from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import model_values
 from steadyslip.motion import simulate_many
 from steadyslip.motion.many import EVENT_UNITS
 from steadyslip.motion.status import WORDS
@@ -31,7 +32,6 @@ from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.onset.hopf import onset_map
 from steadyslip.protocol import Protocol
-from steadyslip.values import model_values
 
 Vary = Mapping[str, Any]
 SECONDS_A_STEP = 4e-8  # of a lane's step on one core; decides no more than the size of chunks

@@ -13,6 +13,8 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import model_values
+from steadyslip.model.steady import steady_states
 from steadyslip.motion import History, simulate
 from steadyslip.motion.setup import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
@@ -21,8 +23,6 @@ from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED, OUTCOMES, Budget, R
 from steadyslip.nonlinear.kicks.rest import rest_of
 from steadyslip.nonlinear.orbits.branch import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
-from steadyslip.steady import steady_states
-from steadyslip.values import model_values
 
 Array = np.ndarray
 POINTS = 81

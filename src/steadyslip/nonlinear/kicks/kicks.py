@@ -14,11 +14,11 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import model_values
 from steadyslip.motion.setup import Jobs, Options, initial_values, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import Budget, Runs, continuous_at, outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
-from steadyslip.values import model_values
 
 Array = np.ndarray
 PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself

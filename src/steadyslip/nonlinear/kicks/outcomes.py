@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.kernels.program import STATUSES, TALLY, Program
-from steadyslip.kernels.reduction import Reduction
+from steadyslip.model.reduction import Reduction
 from steadyslip.motion.engine import LANES, run_chunk, run_many
 from steadyslip.motion.setup import Jobs
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood

@@ -16,8 +16,8 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.expressions import array_function
-from steadyslip.kernels.reduction import TIME, V_LP, P, Q, Reduction, W
 from steadyslip.model import Model
+from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W
 from steadyslip.motion.setup import Jobs, natural_scales
 
 Array = np.ndarray

@@ -11,10 +11,10 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
+from steadyslip.model.steady import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED, Budget
 from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
-from steadyslip.steady import steady_states
 
 Array = np.ndarray
 COARSE = 240  # sizes of the first scan of a single rig,

@@ -24,9 +24,9 @@ from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, in_chunks, stiffness_polynomials
 from steadyslip.machine.slider import Slider
-from steadyslip.nonlinear.onset.derivatives import Taylor, taylor
-from steadyslip.steady import steady_stress
-from steadyslip.values import Values, model_values
+from steadyslip.model.point import Values, model_values
+from steadyslip.model.steady import steady_stress
+from steadyslip.model.taylor import Taylor, taylor
 
 Array = np.ndarray
 ROUNDING = 1e-9

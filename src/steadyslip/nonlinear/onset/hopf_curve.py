@@ -21,9 +21,9 @@ from steadyslip.linear.polynomials import roots
 from steadyslip.linear.search import Search
 from steadyslip.linear.stiffness import characteristic
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import Values, checked_array, model_values
 from steadyslip.nonlinear.continuation import Curve, Failure, Point, turned_round
 from steadyslip.nonlinear.onset.hopf import coefficients, kinds, parameter_along
-from steadyslip.values import Values, checked_array, model_values
 
 Array = np.ndarray
 DECADES = 6.0

@@ -12,6 +12,7 @@ import numpy as np
 from steadyslip.core.errors import InternalError, ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import checked_array
 from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch
@@ -19,7 +20,6 @@ from steadyslip.nonlinear.orbits.flow import Flow
 from steadyslip.nonlinear.orbits.special import Known
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, LARGEST_STEP, Sheet, Tracer
 from steadyslip.nonlinear.orbits.verify import cycle_near
-from steadyslip.values import checked_array
 
 Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a sheet broke off to the end of the range

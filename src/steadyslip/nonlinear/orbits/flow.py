@@ -18,17 +18,17 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import array_function
 from steadyslip.kernels.kernel import Choice
 from steadyslip.kernels.program import SETTINGS, Program, program
-from steadyslip.kernels.reduction import TIME, V_LP, P, Q, Reduction
-from steadyslip.kernels.variational import with_sensitivities
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import Values, model_values
+from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
+from steadyslip.model.steady import steady_stress
+from steadyslip.model.variational import with_sensitivities
 from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
 from steadyslip.motion.observe import observe
 from steadyslip.motion.setup import Jobs, Options, automatic_method, initial_values, prepare
 from steadyslip.motion.status import WORDS, remedy
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.protocol import Segments
-from steadyslip.steady import steady_stress
-from steadyslip.values import Values, model_values
 
 Array = np.ndarray
 DONE = WORDS.index("done")

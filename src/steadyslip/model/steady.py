@@ -21,7 +21,7 @@ from steadyslip.core.expressions import array_function
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.values import Values, model_values
+from steadyslip.model.point import Values, model_values
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import sympy as sp
 
 from steadyslip.core.expressions import array_function
 from steadyslip.model import Model
-from steadyslip.values import Values
+from steadyslip.model.point import Values
 
 Array = np.ndarray
 Index = tuple[int, ...]

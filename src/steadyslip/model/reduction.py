@@ -62,7 +62,7 @@ class Reduction:
     w_of_v : sympy.Expr
         The velocity variable from v and the memory.
     directions : tuple of tuple of sympy.Symbol
-        State variables (see `steadyslip.kernels.variational`) that answer to changes of the constants, one tuple
+        State variables (see `steadyslip.model.variational`) that answer to changes of the constants, one tuple
         for each independent change; the kernel adds that to their `rates`, in the order of the first variables
         of `state`.
     """

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from steadyslip.kernels.reduction import Reduction
+from steadyslip.model.reduction import Reduction
 
 Column = tuple[sp.Symbol, ...]
 

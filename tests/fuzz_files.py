@@ -30,7 +30,7 @@ import xarray as xr
 import steadyslip as ss
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import make_plan
-from steadyslip.experiments.fitting.result import Fit, Search
+from steadyslip.experiments.fitting.result import Fit, SearchStory
 from steadyslip.experiments.fitting.store import FIT
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.files.sealed import seal, unseal, write_sealed
@@ -70,7 +70,7 @@ def small_fit():
     values = [0.01, 0.02, 1e-5, 0.6, 1e10, 40.0, 0.0]
     coordinates = np.array([float(u.coordinate(v)) for u, v in zip(space.unknowns, values, strict=False)])
     found = Fit(
-        plan, coordinates, 1e-4, Search(8, 3, (1.5,), 12, True), (noise,), np.diag(np.full(len(space), 1e-4)),
+        plan, coordinates, 1e-4, SearchStory(8, 3, (1.5,), 12, True), (noise,), np.diag(np.full(len(space), 1e-4)),
         (Combination({"friction.a": 1.0, "friction.b": -0.5}, float("inf")),),
         (coordinates - 5, coordinates + 5), ss.__version__,
     )  # fmt: skip

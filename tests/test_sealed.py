@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.files.sealed import Kind, read_sealed, seal, unseal, write_sealed
+from steadyslip.files.sealed import FileKind, read_sealed, seal, unseal, write_sealed
 
-RUN = Kind("run", 2, 1000, "simulate again")
+RUN = FileKind("run", 2, 1000, "simulate again")
 
 
 @given(st.binary(max_size=200), st.text())
@@ -40,11 +40,11 @@ def test_every_length_counts():
     ("kind", "of", "message"),
     [
         (
-            Kind("fit", 2, 1000, "fit again"),
+            FileKind("fit", 2, 1000, "fit again"),
             "",
             "it holds a fit and is not a steadyslip run; simulate again",
         ),
-        (Kind("run", 3, 1000, ""), "", "its layout has version 3, and this program reads version 2"),
+        (FileKind("run", 3, 1000, ""), "", "its layout has version 3, and this program reads version 2"),
         (RUN, "that", "cannot read 'x': it is a run of something else; simulate again"),
     ],
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 import steadyslip
 from steadyslip import figures
 from steadyslip.core.quantities import is_per_area, total_unit
-from steadyslip.core.records import Option, Parameter, Part, Record, Samples
+from steadyslip.core.records import FrozenRecord, Option, Parameter, Part, Series
 from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -52,7 +52,7 @@ def default_of(item) -> str:
         return "required"
     if item.default is None or item.default == ():
         return ""
-    if isinstance(item.default, Record):
+    if isinstance(item.default, FrozenRecord):
         return f"`{item.default.name}`"
     if isinstance(item.default, bool):
         return f"`{str(item.default).lower()}`"
@@ -68,7 +68,7 @@ def unit_of(role) -> str:
 def row(item, role) -> str:
     if isinstance(role, Parameter):
         unit, allowed = unit_of(role), role.domain.text
-    elif isinstance(role, Samples):
+    elif isinstance(role, Series):
         unit, allowed = unit_of(role), "list of finite numbers"
     elif isinstance(role, Option):
         unit, allowed = "", ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)

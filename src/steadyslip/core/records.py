@@ -88,7 +88,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Samples:
+class Series:
     """A field that holds a measured column: a tuple of finite numbers in the SI unit."""
 
     unit: str
@@ -99,7 +99,7 @@ class Samples:
 class Part:
     """A field that holds another record; ``inline`` puts its parameters beside the owner's."""
 
-    family: type[Record]
+    family: type[FrozenRecord]
     doc: str
     inline: bool = False
     many: bool = False
@@ -137,9 +137,9 @@ class Condition:
         return Problem(name or self.name, self.message.format(*(repr(float(a[where])) for a in arrays[1:])) + place)
 
 
-Role = Parameter | Option | Part | Samples
+Role = Parameter | Option | Part | Series
 _ROLE = "steadyslip"
-R = TypeVar("R", bound="Record")
+R = TypeVar("R", bound="FrozenRecord")
 
 
 def parameter(
@@ -164,15 +164,15 @@ def option(*choices: Any, doc: str, default: Any) -> Any:
 
 def samples(unit: str, doc: str) -> Any:
     """Declare a measured column: a list or array of numbers, or of texts with units."""
-    return field(metadata={_ROLE: Samples(unit, doc)})
+    return field(metadata={_ROLE: Series(unit, doc)})
 
 
-def part(family: type[Record], doc: str, *, default: Any = MISSING, inline: bool = False) -> Any:
+def part(family: type[FrozenRecord], doc: str, *, default: Any = MISSING, inline: bool = False) -> Any:
     """Declare a field that holds another record of `family`."""
     return field(default=default, metadata={_ROLE: Part(family, doc, inline)})
 
 
-def parts(family: type[Record], doc: str, *, default: tuple[()]) -> Any:
+def parts(family: type[FrozenRecord], doc: str, *, default: tuple[()]) -> Any:
     """Declare a field that holds a tuple of records; the default is the empty one."""
     return field(default=default, metadata={_ROLE: Part(family, doc, many=True)})
 
@@ -180,7 +180,7 @@ def parts(family: type[Record], doc: str, *, default: tuple[()]) -> Any:
 @dataclass_transform(
     kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option, samples, part, parts)
 )
-class Record:
+class FrozenRecord:
     """Frozen, checked when built, addressed by dotted names.
 
     Subclasses become frozen keyword-only dataclasses by themselves. ``name="..."`` registers a law
@@ -192,7 +192,7 @@ class Record:
     name: ClassVar[str] = ""
     family: ClassVar[str] = ""
     section: ClassVar[str] = ""
-    registry: ClassVar[dict[str, type[Record]]] = {}
+    registry: ClassVar[dict[str, type[FrozenRecord]]] = {}
 
     def __init_subclass__(
         cls, *, name: str = "", family: str = "", section: str = "", kw_only: bool = True, **kwargs: Any
@@ -251,7 +251,7 @@ def role_of(item: Field[Any]) -> Role:
     return role
 
 
-def field_name(record: Record | type[Record], item: Field[Any], prefix: str) -> str:
+def field_name(record: FrozenRecord | type[FrozenRecord], item: Field[Any], prefix: str) -> str:
     """Dotted name of a field."""
     return f"{prefix}{record.section if isinstance(role_of(item), Parameter) else ''}{item.name}"
 
@@ -274,7 +274,7 @@ def checked(item: Field[Any], value: Any) -> Any:
                 raise _fault(f"got {came(value)}; allowed: true or false")
             raise _fault(unknown_name("choice", value, [str(c) for c in role.choices]))
         return value
-    if isinstance(role, Samples):
+    if isinstance(role, Series):
         try:
             return numbers(value, role.unit)
         except QuantityError as error:
@@ -286,7 +286,7 @@ def checked(item: Field[Any], value: Any) -> Any:
     return _checked_part(role, value, "")
 
 
-def _checked_part(role: Part, value: Any, index: str) -> Record:
+def _checked_part(role: Part, value: Any, index: str) -> FrozenRecord:
     if isinstance(value, role.family):
         return value
     message = f"got {came(value)}; allowed: a {role.family.__name__}"
@@ -334,7 +334,7 @@ class Address:
     value: float | None
 
 
-def parameters(record: Record, prefix: str = "") -> dict[str, Address]:
+def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
     """All numeric parameters below `record`, by dotted name, in order of declaration."""
     found: dict[str, Address] = {}
     for item in fields(record):  # type: ignore[arg-type]
@@ -350,7 +350,7 @@ def parameters(record: Record, prefix: str = "") -> dict[str, Address]:
     return found
 
 
-def conditions(record: Record, prefix: str = "") -> Iterator[tuple[str, Condition]]:
+def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Condition]]:
     """Every condition below `record`, with the dotted name of the field that it is about."""
     items = {item.name: item for item in fields(record)}  # type: ignore[arg-type]
     for condition in record.conditions():
@@ -421,7 +421,7 @@ def twin(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
     return copy
 
 
-def shape_of(record: Record, prefix: str = "") -> tuple[Any, ...]:
+def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
     """A hashable description of everything but the numbers: types, options, which parameters are given."""
     shape: list[Any] = [type(record)]
     for item in fields(record):  # type: ignore[arg-type]
@@ -430,7 +430,7 @@ def shape_of(record: Record, prefix: str = "") -> tuple[Any, ...]:
             shape.append(value)
         elif isinstance(role, Parameter):
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")
-        elif isinstance(role, Samples):
+        elif isinstance(role, Series):
             shape.append("samples")
         elif role.many:
             shape.append(tuple(shape_of(member) for member in value))

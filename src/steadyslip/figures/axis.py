@@ -22,7 +22,7 @@ _MARGIN = 1 / 18  # of its domain left out at the excluded ends of an angle: 10 
 
 
 @dataclass(frozen=True)
-class Axis:
+class ChartAxis:
     """A parameter's range on a chart; all values SI except what is said to be `shown`.
 
     Attributes
@@ -55,7 +55,7 @@ class Axis:
         return value / self.factor
 
 
-def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> Axis:
+def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> ChartAxis:
     """The axis for a parameter of a rig, over the range given or one that suits the rig.
 
     Raises
@@ -74,7 +74,7 @@ def axis(rig: Slider, name: str, limits: Sequence[Any] | None) -> Axis:
     log = low > 0 and high / low > 100
     typical = value if low <= value <= high and value else math.sqrt(low * high) if log else max(abs(low), abs(high))
     factor, unit_name = display_unit(address.role.unit, typical, rig.area)
-    return Axis(full, low, high, log, factor, labelled(full, unit_name))
+    return ChartAxis(full, low, high, log, factor, labelled(full, unit_name))
 
 
 def _given(name: str, role: Parameter, limits: Sequence[Any]) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from matplotlib.path import Path
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures import regions
-from steadyslip.figures.axis import Axis, axis
+from steadyslip.figures.axis import ChartAxis, axis
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
 from steadyslip.machine.slider import Slider
@@ -90,7 +90,7 @@ def stability_chart(
     return ax
 
 
-def _reasons(rig: Slider, x: Axis, y: Axis, status: Any, points: int) -> str:
+def _reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) -> str:
     """Lock-up, lift-off or both, asked at some of the points without steady sliding."""
     share = np.linspace(0, 1, points)
     b, a = np.nonzero(status(*np.meshgrid(share, share)) == ABSENT)
@@ -106,15 +106,15 @@ def absence_reasons(rig: Slider, points: Sequence[dict[str, float]]) -> str:
     return ", ".join(sorted(set(found)))
 
 
-def _shown(path: Path, x: Axis, y: Axis) -> Path:
+def _shown(path: Path, x: ChartAxis, y: ChartAxis) -> Path:
     return Path(np.column_stack(_line(path.vertices, x, y)), path.codes)
 
 
-def _line(shares: Any, x: Axis, y: Axis) -> tuple[Any, Any]:
+def _line(shares: Any, x: ChartAxis, y: ChartAxis) -> tuple[Any, Any]:
     return x.shown(x.at(shares[:, 0])), y.shown(y.at(shares[:, 1]))
 
 
-def _mark_own(ax: Axes, rig: Slider, x: Axis, y: Axis) -> None:
+def _mark_own(ax: Axes, rig: Slider, x: ChartAxis, y: ChartAxis) -> None:
     own = [rig.value(x.name), rig.value(y.name)]
     if all(v is not None and a.low <= v <= a.high for v, a in zip(own, (x, y), strict=True)):
         at = [x.shown(own[0])], [y.shown(own[1])]
@@ -130,7 +130,7 @@ def _mark_own(ax: Axes, rig: Slider, x: Axis, y: Axis) -> None:
         )
 
 
-def _finish(ax: Axes, x: Axis, y: Axis) -> None:
+def _finish(ax: Axes, x: ChartAxis, y: ChartAxis) -> None:
     ax.set_xscale("log" if x.log else "linear")
     ax.set_yscale("log" if y.log else "linear")
     ax.set_xlim(x.shown(x.low), x.shown(x.high))

@@ -29,7 +29,7 @@ class FormatError(ValueError):
 
 
 @dataclass(frozen=True)
-class Variable:
+class FileVariable:
     """An array in a file.
 
     Attributes
@@ -68,12 +68,12 @@ class File:
     dims : dict of str to int
     attributes : dict
         Text, numbers, or arrays of them.
-    variables : dict of str to Variable
+    variables : dict of str to FileVariable
     """
 
     dims: dict[str, int]
     attributes: dict[str, Any]
-    variables: dict[str, Variable]
+    variables: dict[str, FileVariable]
 
 
 def read(content: bytes | memoryview) -> File:
@@ -156,7 +156,7 @@ class _Reader:
             raise FormatError(f"has numbers of an unknown type, {kind}")
         return _TYPES[kind]
 
-    def variable(self) -> Variable:
+    def variable(self) -> FileVariable:
         rank = self.number()
         if not 0 <= rank <= _DEEPEST:
             raise FormatError(f"has a variable of {rank} dimensions")
@@ -173,7 +173,7 @@ class _Reader:
         self.filled += size
         if begin < 0 or begin + size > len(self.content) or self.filled > len(self.content):
             raise FormatError(f"has too few bytes for a variable of shape {shape}")
-        return Variable(tuple(n for n, _ in own), shape, kind, attributes, self.content[begin : begin + size])
+        return FileVariable(tuple(n for n, _ in own), shape, kind, attributes, self.content[begin : begin + size])
 
 
 def _text(content: memoryview) -> str:

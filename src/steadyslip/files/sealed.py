@@ -28,7 +28,7 @@ _DIGEST = 65  # its last ones
 
 
 @dataclass(frozen=True)
-class Kind:
+class FileKind:
     """One kind of file.
 
     Attributes
@@ -49,7 +49,7 @@ class Kind:
     remedy: str
 
 
-def seal(content: bytes, kind: Kind, of: str = "") -> bytes:
+def seal(content: bytes, kind: FileKind, of: str = "") -> bytes:
     """The content of a sealed file; `of` is what it must be of to be accepted."""
     line = f"\nsteadyslip {kind.name} {kind.version} {_name(of)} ".encode()
     digest = hashlib.sha256(content)
@@ -57,7 +57,7 @@ def seal(content: bytes, kind: Kind, of: str = "") -> bytes:
     return b"".join((content, line, digest.hexdigest().encode(), b"\n"))
 
 
-def unseal(raw: bytes, path: str | PathLike[str], kind: Kind, of: str = "") -> memoryview:
+def unseal(raw: bytes, path: str | PathLike[str], kind: FileKind, of: str = "") -> memoryview:
     """What was sealed.
 
     Raises
@@ -87,7 +87,9 @@ def unseal(raw: bytes, path: str | PathLike[str], kind: Kind, of: str = "") -> m
     return content[: found.start()]
 
 
-def write_sealed(path: str | PathLike[str], content: bytes, kind: Kind, of: str = "", *, private: bool = False) -> None:
+def write_sealed(
+    path: str | PathLike[str], content: bytes, kind: FileKind, of: str = "", *, private: bool = False
+) -> None:
     """Write a sealed file; a file of that name is replaced only once the new one is whole.
 
     Raises
@@ -103,7 +105,7 @@ def write_sealed(path: str | PathLike[str], content: bytes, kind: Kind, of: str 
         file.write(sealed)
 
 
-def read_sealed(path: str | PathLike[str], kind: Kind, of: str = "", *, private: bool = False) -> memoryview:
+def read_sealed(path: str | PathLike[str], kind: FileKind, of: str = "", *, private: bool = False) -> memoryview:
     """What `write_sealed` wrote; `private` refuses a file that anybody else can change.
 
     Raises

@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.files.netcdf import File, FormatError, Variable, read
-from steadyslip.files.sealed import Kind, read_sealed, write_sealed
+from steadyslip.files.netcdf import File, FileVariable, FormatError, read
+from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
 Array = np.ndarray
 _SIZES = "sizes"  # attribute: the format has no empty dimensions, so that variables along them are left out
 
 
 @dataclass(frozen=True)
-class Column:
+class ColumnRule:
     """What a variable must be.
 
     Attributes
@@ -41,7 +41,7 @@ class Column:
     text: bool = False
 
 
-def write_table(path: str | PathLike[str], kind: Kind, dataset: Any) -> None:
+def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any) -> None:
     """Write an xarray.Dataset of floats and words; a file of that name is replaced only once the new one is whole.
 
     Raises
@@ -59,7 +59,7 @@ def write_table(path: str | PathLike[str], kind: Kind, dataset: Any) -> None:
     write_sealed(path, bytes(content), kind)
 
 
-class Table:
+class ExpectedTable:
     """A file that is open: its attributes, and its columns once somebody says which they must be.
 
     Attributes
@@ -67,7 +67,7 @@ class Table:
     attributes : dict
     """
 
-    def __init__(self, path: str | PathLike[str], kind: Kind, attributes: Mapping[str, type]) -> None:
+    def __init__(self, path: str | PathLike[str], kind: FileKind, attributes: Mapping[str, type]) -> None:
         self.path, self.kind = path, kind
         try:
             self._file: File = read(read_sealed(path, kind))
@@ -100,7 +100,7 @@ class Table:
             raise self.fault(f"an attribute holds {found!r:.60}, which has another form")
         return found
 
-    def columns(self, expected: Mapping[str, Column]) -> dict[str, Any]:
+    def columns(self, expected: Mapping[str, ColumnRule]) -> dict[str, Any]:
         """All columns, arrays of float64 or lists of words.
 
         Raises
@@ -122,7 +122,7 @@ class Table:
         if more := [name for name in found if name not in expected]:
             raise self.fault(f"it has unknown {what}, {more[0]!r}")
 
-    def _check(self, name: str, variable: Variable, column: Column) -> None:
+    def _check(self, name: str, variable: FileVariable, column: ColumnRule) -> None:
         rank = len(column.dims)
         shape = tuple(self.sizes[dim] for dim in column.dims)
         texts = variable.dtype == "S1" and len(variable.shape) == rank + 1 == 2
@@ -133,7 +133,7 @@ class Table:
         if variable.attributes.get("units", "") != column.unit:
             raise self.fault(f"{name} is in {variable.attributes.get('units', '')!r:.40}, not in {column.unit!r}")
 
-    def _values(self, name: str, column: Column) -> Any:
+    def _values(self, name: str, column: ColumnRule) -> Any:
         if name not in self._file.variables:
             return [] if column.text else np.empty([self.sizes[dim] for dim in column.dims])
         try:

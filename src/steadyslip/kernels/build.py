@@ -33,7 +33,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.files.inputs import is_private
-from steadyslip.files.sealed import Kind, read_sealed, write_sealed
+from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 from steadyslip.kernels import driver, lockstep_driver
 from steadyslip.kernels.layout import Cursor, Final, Kind as Event, Layout, Out, Routines, Row, Setting, Status
 from steadyslip.kernels.nodes import Program
@@ -62,7 +62,7 @@ OPTIONS = {
     "entry": _FAST | {"nogil": True},
 }
 """How numba compiles drivers."""
-KERNEL = Kind("kernel", 3, 2**26, "it is compiled again")
+KERNEL = FileKind("kernel", 3, 2**26, "it is compiled again")
 _MARK = "THIS"  # stands for the key in the routines' text
 _lock = threading.RLock()
 _drivers: dict[str, Callable[..., Any]] = {}

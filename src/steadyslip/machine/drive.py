@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from steadyslip.core.records import Record, nonnegative, parameter, positive
+from steadyslip.core.records import FrozenRecord, nonnegative, parameter, positive
 
 
-class Drive(Record, family="drive", kw_only=False):
+class Drive(FrozenRecord, family="drive", kw_only=False):
     """Base of drives: steady velocity and the gains of a controller, zero unless a subclass has them."""
 
     velocity: float = parameter("m/s", positive, "velocity of the load point in steady sliding")

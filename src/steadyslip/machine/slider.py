@@ -11,7 +11,7 @@ from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.records import (
     Address,
     Condition,
-    Record,
+    FrozenRecord,
     nonnegative,
     parameter,
     parameters,
@@ -25,7 +25,7 @@ from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
 
 
-class Slider(Record, section="slider"):
+class Slider(FrozenRecord, section="slider"):
     """A block pushed through a spring: m v̇ = T − τ(v, σ, memory) − ηv + q (theory 1).
 
     All stresses, stiffnesses, dampings and the mass are per unit nominal contact area; with area 1 the

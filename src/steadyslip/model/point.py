@@ -13,7 +13,7 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError
 from steadyslip.core.expressions import array_function
 from steadyslip.core.quantities import parse
-from steadyslip.core.records import Parameter, Record, conditions, twin
+from steadyslip.core.records import FrozenRecord, Parameter, conditions, twin
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
 
@@ -101,7 +101,7 @@ def model_values(
     return Values(model, tuple(values[name] for name in model.parameters), shape, wrap, branch, valid)
 
 
-def check_together(record: Record, prefix: str, varied: Mapping[str, Any]) -> None:
+def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:
     """Refuse arrays of a record's numbers that break a condition which they obey together.
 
     Raises
@@ -112,7 +112,7 @@ def check_together(record: Record, prefix: str, varied: Mapping[str, Any]) -> No
     _checked_together(record, varied, prefix, scan=False)
 
 
-def _checked_together(record: Record, varied: Mapping[str, Any], prefix: str, scan: bool) -> Any:
+def _checked_together(record: FrozenRecord, varied: Mapping[str, Any], prefix: str, scan: bool) -> Any:
     """Where all conditions hold."""
     found = list(conditions(twin(record, varied, prefix), prefix))
     problems = [] if scan else [p for name, condition in found if (p := condition.problem(name)) is not None]

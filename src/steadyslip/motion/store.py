@@ -10,8 +10,8 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, SteadyslipError
 from steadyslip.core.quantities import outside
-from steadyslip.files.sealed import Kind
-from steadyslip.files.tables import Column, Table, write_table
+from steadyslip.files.sealed import FileKind
+from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
 from steadyslip.kernels.program import LOG_KINDS
 from steadyslip.motion.events import Event
@@ -21,7 +21,7 @@ from steadyslip.motion.status import WORDS
 if TYPE_CHECKING:
     from steadyslip.motion.result import History
 
-RUN = Kind("run", 2, 2**29, "simulate again and save the run anew")
+RUN = FileKind("run", 2, 2**29, "simulate again and save the run anew")
 MOST_EVENTS = 10**6
 _EVENT_UNITS = {
     "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
@@ -90,7 +90,7 @@ def load_history(path: str | PathLike[str]) -> History:
     from steadyslip.motion.result import History
     from steadyslip.protocol import Protocol
 
-    table = Table(path, RUN, _ATTRIBUTES)
+    table = ExpectedTable(path, RUN, _ATTRIBUTES)
     attributes = table.attributes
     _check_words(table)
     try:
@@ -99,9 +99,9 @@ def load_history(path: str | PathLike[str]) -> History:
         units = {"t": "s"} | observable_units(build_model(rig))
     except SteadyslipError as error:
         raise table.fault(f"its rig is refused: {error}") from error
-    columns = {"time" if name == "t" else name: Column(("time",), unit) for name, unit in units.items()}
-    columns |= {f"event_{name}": Column(("event",), unit) for name, unit in _EVENT_UNITS.items()}
-    found = table.columns(columns | {"event_kind": Column(("event",), text=True)})
+    columns = {"time" if name == "t" else name: ColumnRule(("time",), unit) for name, unit in units.items()}
+    columns |= {f"event_{name}": ColumnRule(("event",), unit) for name, unit in _EVENT_UNITS.items()}
+    found = table.columns(columns | {"event_kind": ColumnRule(("event",), text=True)})
     if table.sizes["event"] > MOST_EVENTS:
         raise table.fault(f"it has {table.sizes['event']} events, allowed are {MOST_EVENTS}")
     kinds = found["event_kind"]
@@ -120,7 +120,7 @@ def load_history(path: str | PathLike[str]) -> History:
     )
 
 
-def _check_words(table: Table) -> None:
+def _check_words(table: ExpectedTable) -> None:
     attributes = table.attributes
     known = {"status": WORDS, "method": tuple(METHODS)}
     for name, words in known.items():
@@ -132,7 +132,7 @@ def _check_words(table: Table) -> None:
         raise table.fault("it has a negative number of steps")
 
 
-def _check_samples(table: Table, data: dict[str, np.ndarray]) -> None:
+def _check_samples(table: ExpectedTable, data: dict[str, np.ndarray]) -> None:
     """Times rise, and a run that is done has a number for everything."""
     if not (np.all(np.isfinite(data["t"])) and np.all(np.diff(data["t"]) >= 0)):
         raise table.fault("its times do not rise")

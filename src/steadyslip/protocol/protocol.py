@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.quantities import shown
-from steadyslip.core.records import Record, parameter, parts, positive
+from steadyslip.core.records import FrozenRecord, parameter, parts, positive
 from steadyslip.protocol.curves import Curve, Jump, Wave
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
@@ -17,7 +17,7 @@ CHANNELS = 3
 ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
 
 
-class Piece(Record, family="protocol piece"):
+class Piece(FrozenRecord, family="protocol piece"):
     """Base of the pieces of a protocol: something that happens to one channel at some time.
 
     A subclass is registered under a name, says which `channel` it acts on (load-point velocity,
@@ -47,7 +47,7 @@ class Piece(Record, family="protocol piece"):
         return _joined(self, other)
 
 
-class Protocol(Record):
+class Protocol(FrozenRecord):
     """What is done to a rig in an experiment: its pieces, and when it ends.
 
     Pieces that set the load-point velocity (steps, ramps, holds, a measured table) are given in the order of

@@ -11,11 +11,21 @@ from pathlib import Path
 from steadyslip.core.errors import SteadyslipError
 from steadyslip.figures import style
 from steadyslip.reproduce.drawings import FIGURES, PaperFigure
-from steadyslip.reproduce.numbers import PaperTable, Row, paper_table
+from steadyslip.reproduce.numbers import PaperNumber, PaperTable, paper_table
 from steadyslip.reproduce.rig import D_C, V0, paper_rig
 
-__all__ = ["D_C", "FIGURES", "V0", "OutputError", "PaperFigure", "PaperTable", "Row", "paper_rig", "paper_table",
-           "reproduce"]  # fmt: skip
+__all__ = [
+    "D_C",
+    "FIGURES",
+    "V0",
+    "OutputError",
+    "PaperFigure",
+    "PaperNumber",
+    "PaperTable",
+    "paper_rig",
+    "paper_table",
+    "reproduce",
+]  # fmt: skip
 
 
 class OutputError(SteadyslipError, OSError):

@@ -24,7 +24,7 @@ from steadyslip.units import deg
 
 
 @dataclass(frozen=True)
-class Row:
+class PaperNumber:
     """One number of the paper beside ours.
 
     Attributes
@@ -63,10 +63,10 @@ class Row:
 class PaperTable:
     """Rows of `paper_table`; prints itself, and as Markdown or CSV."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[PaperNumber, ...]
     header = ("source", "quantity", "unit", "paper", "steadyslip", "relative difference")
 
-    def __iter__(self) -> Iterator[Row]:
+    def __iter__(self) -> Iterator[PaperNumber]:
         return iter(self.rows)
 
     def __len__(self) -> int:
@@ -113,23 +113,27 @@ _M_STAR = 0.01
 
 def paper_table() -> PaperTable:
     """The paper's numbers beside ours, with the relative difference of each."""
-    rows = [Row("eq. 25", _at("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg))))]
-    rows += [Row("eq. 28", _at("κ_cr", angle), "1", value, _kappa(angle)) for angle, value in _KAPPA.items()]
+    rows = [
+        PaperNumber("eq. 25", _at("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg))))
+    ]
+    rows += [PaperNumber("eq. 28", _at("κ_cr", angle), "1", value, _kappa(angle)) for angle, value in _KAPPA.items()]
     rows += [
-        Row("eq. 28", _at("κ_cr", angle, _M_STAR), "1", value, _kappa(angle, _M_STAR))
+        PaperNumber("eq. 28", _at("κ_cr", angle, _M_STAR), "1", value, _kappa(angle, _M_STAR))
         for angle, value in _KAPPA_WITH_MASS.items()
     ]
-    rows += [Row("eq. 26", _at("β d_c/v0", angle), "1", value, _frequency(angle)) for angle, value in _BETA.items()]
     rows += [
-        Row("eq. 26 with mass", _at("β d_c/v0", angle, _M_STAR), "1", value, _frequency(angle, _M_STAR))
+        PaperNumber("eq. 26", _at("β d_c/v0", angle), "1", value, _frequency(angle)) for angle, value in _BETA.items()
+    ]
+    rows += [
+        PaperNumber("eq. 26 with mass", _at("β d_c/v0", angle, _M_STAR), "1", value, _frequency(angle, _M_STAR))
         for angle, value in _BETA_WITH_MASS.items()
     ]
     lock_up = next(edge.value for edge in boundary(paper_rig(), "contact.angle") if edge.kind == "lock-up")
-    rows.append(Row("eq. 27", "lock-up angle", "deg", _LOCK_UP, lock_up / deg))
+    rows.append(PaperNumber("eq. 27", "lock-up angle", "deg", _LOCK_UP, lock_up / deg))
     crossing = mass.mass_of_equal_stiffness(paper_rig(), figures.ANGLES)
-    rows.append(Row("eq. 30", "m*_cr1", "1", _MASS_1, crossing))
+    rows.append(PaperNumber("eq. 30", "m*_cr1", "1", _MASS_1, crossing))
     rows += [
-        Row("eq. 31", _at("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg))
+        PaperNumber("eq. 31", _at("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg))
         for angle, value in _MASS_2.items()
     ]
     return PaperTable((*rows, *_from_motion()))
@@ -152,7 +156,7 @@ def _frequency(angle: float, m_star: float = 0.0) -> float:
     return float(np.nanmax(found.imag)) * D_C / V0
 
 
-def _from_motion() -> tuple[Row, ...]:
+def _from_motion() -> tuple[PaperNumber, ...]:
     """What Figs 1, 2 and 5 show, read from simulated motion: good to the finite time of a step or size of a kick."""
     rise, settled = _parts(VelocityStep(at=STEP, to=float(np.e) * V0))
     share = 0.01
@@ -160,11 +164,11 @@ def _from_motion() -> tuple[Row, ...]:
     at_once = (1 + share) * (0.7 - 0.56 * np.log1p(share)) - 0.7  # eq. 1; (μss − α) Δσ/σ to first order
     edge = float(critical_stiffness(paper_rig()))
     return (
-        Row("Fig. 1", "A", "1", 0.0145, rise),
-        Row("Fig. 1", "B", "1", 0.0160, rise - settled),
-        Row("Fig. 2", "jump of τ/σ for Δσ/σ = 1 %", "1", float(at_once), jump),
-        Row("Fig. 2", "final change of τ/σ for Δσ/σ = 1 %", "1", 0.7 * share, final),
-        Row("Fig. 5", "β d_c/v0 of a small orbit at k_cr, ψ = −45°", "1", _BETA[-45], _orbit_frequency(edge)),
+        PaperNumber("Fig. 1", "A", "1", 0.0145, rise),
+        PaperNumber("Fig. 1", "B", "1", 0.0160, rise - settled),
+        PaperNumber("Fig. 2", "jump of τ/σ for Δσ/σ = 1 %", "1", float(at_once), jump),
+        PaperNumber("Fig. 2", "final change of τ/σ for Δσ/σ = 1 %", "1", 0.7 * share, final),
+        PaperNumber("Fig. 5", "β d_c/v0 of a small orbit at k_cr, ψ = −45°", "1", _BETA[-45], _orbit_frequency(edge)),
     )
 
 

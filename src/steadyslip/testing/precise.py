@@ -13,7 +13,7 @@ import mpmath
 import sympy as sp
 
 from steadyslip.core.errors import SteadyslipError
-from steadyslip.core.records import Record, parameters, twin
+from steadyslip.core.records import FrozenRecord, parameters, twin
 
 DIGITS = 50
 #: Allowed error relative to the terms that cancel: far above rounding at fifty digits and above constants
@@ -25,13 +25,13 @@ class ContractViolation(SteadyslipError, AssertionError):
     """A law breaks its contract; the message says which part, with numbers, and what to do."""
 
 
-def require(condition: Any, law: Record, message: str) -> None:
+def require(condition: Any, law: FrozenRecord, message: str) -> None:
     """Raise `ContractViolation` about `law` unless the condition holds (NaN does not)."""
     if not bool(condition):
         raise ContractViolation(f"{law!r}: {message}")
 
 
-def in_symbols(law: Record) -> tuple[Any, dict[sp.Symbol, float]]:
+def in_symbols(law: FrozenRecord) -> tuple[Any, dict[sp.Symbol, float]]:
     """A twin of the law that holds symbols, and the number of each symbol; structural zeros stay zero."""
     values: dict[str, Any] = {}
     numbers: dict[sp.Symbol, float] = {}
@@ -48,7 +48,7 @@ def in_symbols(law: Record) -> tuple[Any, dict[sp.Symbol, float]]:
     return twin(law, values), numbers
 
 
-def stated(law: Record, what: str, method: Callable[..., Any], *arguments: Any) -> Any:
+def stated(law: FrozenRecord, what: str, method: Callable[..., Any], *arguments: Any) -> Any:
     """Call a law's method with symbols and turn what comes back into SymPy, or say why that fails."""
     try:
         result = method(*arguments)
@@ -62,7 +62,7 @@ def stated(law: Record, what: str, method: Callable[..., Any], *arguments: Any) 
     return sp.sympify(result)
 
 
-def require_known_symbols(law: Record, what: str, expression: sp.Expr, allowed: Sequence[sp.Symbol]) -> None:
+def require_known_symbols(law: FrozenRecord, what: str, expression: sp.Expr, allowed: Sequence[sp.Symbol]) -> None:
     """Expressions may depend on what the method was given and on nothing else, rates of change included."""
     foreign = sorted(str(s) for s in expression.free_symbols - set(allowed))
     foreign += sorted(str(d) for d in expression.atoms(sp.Derivative, sp.core.function.AppliedUndef))
@@ -76,7 +76,7 @@ def require_known_symbols(law: Record, what: str, expression: sp.Expr, allowed: 
 
 
 def precise_function(
-    law: Record, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]
+    law: FrozenRecord, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]
 ) -> Callable[..., list[mpmath.mpf]]:
     """A function of numbers that returns the expressions' values to fifty digits, NaN where they are not real."""
     names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(arguments)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mpmath
 
-from steadyslip.core.records import Record
+from steadyslip.core.records import FrozenRecord
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.slider import Slider
 from steadyslip.testing.precise import DIGITS, TOLERANCE, precise_function, require, shown
@@ -69,7 +69,7 @@ def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE)
     round_trip(law, Slider(friction=law, contact=press, stiffness=1e9, drive=Steady(conditions.velocity)))
 
 
-def round_trip(law: Record, rig: Slider) -> None:
+def round_trip(law: FrozenRecord, rig: Slider) -> None:
     """Write `rig` as text, read it back, and compare."""
     from steadyslip.core.errors import SteadyslipError
     from steadyslip.files.specifications import rig_from_text, rig_to_text

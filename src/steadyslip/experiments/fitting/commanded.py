@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from steadyslip.experiments.fitting.forward import Table
+from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 
 Array = np.ndarray
@@ -70,17 +70,17 @@ class CommandedInputs:
             found += [(i, "duration")] if change.stretches else []
         return found
 
-    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """The table for free times (jobs, free), s; see `MeasuredInputs.table`."""
         if not self.free:
             return self._once
         return self._table(times, first, directions)
 
     @cached_property
-    def _once(self) -> Table:
+    def _once(self) -> InputTable:
         return self._table(np.empty((1, 0)), 0, 0)
 
-    def _table(self, times: Array, first: int, directions: int) -> Table:
+    def _table(self, times: Array, first: int, directions: int) -> InputTable:
         jobs = len(times)
         begins = np.array([[change.time for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
         lengths = np.array([[change.duration for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
@@ -99,7 +99,7 @@ class CommandedInputs:
         rows = np.zeros((jobs, nodes.shape[1] - 1, 9))
         rows[:, :, 0], rows[:, :, 1] = nodes[:, :-1] - low, nodes[:, 1:] - low
         self._fill(rows, nodes, begins, lengths)
-        table = Table(rows, np.ascontiguousarray(samples), len(self.time))
+        table = InputTable(rows, np.ascontiguousarray(samples), len(self.time))
         if not directions or not self.free:
             return table
         moves = np.zeros((jobs, directions, count))
@@ -114,7 +114,7 @@ class CommandedInputs:
         job, row = np.nonzero(event < count)
         rates[job, :, row] = moves[job, :, event[job, row]]
         changing = self._input_rates(nodes, begins, lengths, first, directions)
-        return Table(rows, table.samples, table.count, rates, changing)
+        return InputTable(rows, table.samples, table.count, rates, changing)
 
     def _fill(self, rows: Array, nodes: Array, begins: Array, lengths: Array) -> None:
         """Values and slopes of the inputs on every row."""

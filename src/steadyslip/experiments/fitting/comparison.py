@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.experiments.fitting.commanded import CommandedInputs
-from steadyslip.experiments.fitting.forward import Forward, Table
+from steadyslip.experiments.fitting.forward import Forward, InputTable
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.loading.loading import Loading
@@ -22,7 +22,7 @@ LOSSES = ("linear", "soft-l1", "huber", "cauchy")
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RecordPart:
     """One record and what it is compared with.
 
     Attributes
@@ -53,7 +53,7 @@ class Part:
     trend_places: tuple[int, ...]
     trend: Array
 
-    def table(self, values: Array, sensitive: bool = True) -> Table:
+    def table(self, values: Array, sensitive: bool = True) -> InputTable:
         first = len(self.rig_places)
         directions = first + len(self.time_places) if sensitive else 0
         return self.inputs.table(values[:, list(self.time_places)], first, directions)
@@ -70,7 +70,7 @@ class Comparison:
 
     Parameters
     ----------
-    parts : sequence of Part
+    parts : sequence of RecordPart
     space : Space
     loss : str
         ``linear`` (least squares) or a loss that outliers weigh less in.
@@ -78,7 +78,7 @@ class Comparison:
         Residual at which that begins.
     """
 
-    def __init__(self, parts: tuple[Part, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
+    def __init__(self, parts: tuple[RecordPart, ...], space: Space, loss: str = "linear", width: float = 1.0) -> None:
         self.parts, self.space, self.loss, self.width = parts, space, loss, width
         ends = np.cumsum([0, *(len(part.data) for part in parts)])
         self.slices = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))

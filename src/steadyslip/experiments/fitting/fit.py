@@ -12,7 +12,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan, with_loading
-from steadyslip.experiments.fitting.result import Fit, Search
+from steadyslip.experiments.fitting.result import Fit, SearchStory
 from steadyslip.experiments.fitting.starts import STARTS, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.loading.loading import shifted
@@ -124,7 +124,7 @@ def fit(
     return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
 
 
-def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Search, tuple[Array, Array]]:
+def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
     """The best minimum: from several starts on few samples, the best of those on all.
 
     A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
@@ -157,7 +157,7 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     worse = np.concatenate([found.ssq / found.ssq[0], rough.ssq[rough.converged] / np.min(rough.ssq)])
     others = sorted({float(f"{x:.3g}") for x in worse if np.isfinite(x) and x > 1 + SAME})
-    search = Search(len(rough.ssq), arrived, tuple(others), int(found.iterations[0]), bool(found.converged[0]))
+    search = SearchStory(len(rough.ssq), arrived, tuple(others), int(found.iterations[0]), bool(found.converged[0]))
     found.coordinates = _ordered(found.coordinates, space)
     return found, search, (low, high)
 
@@ -270,7 +270,7 @@ def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> A
 
 
 def finished(
-    plan: Plan, comparison: Comparison, z: Array, search: Search, errors: str, bounds: tuple[Array, Array]
+    plan: Plan, comparison: Comparison, z: Array, search: SearchStory, errors: str, bounds: tuple[Array, Array]
 ) -> Fit:
     """Errors and everything else that belongs to a minimum."""
     from steadyslip import __version__

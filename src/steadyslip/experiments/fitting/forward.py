@@ -23,7 +23,7 @@ _STEP = 1e-6  # of the central difference through an axis at an angle, where k f
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class InputTable:
     """Inputs of an experiment, as the kernels take them.
 
     Attributes
@@ -47,20 +47,22 @@ class Table:
     node_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     input_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0, 3)))
 
-    def part(self, rows: Array | slice) -> Table:
+    def part(self, rows: Array | slice) -> InputTable:
         """That of some jobs."""
 
         def own(array: Array) -> Array:
             return array if len(array) == 1 else np.ascontiguousarray(array[rows])
 
-        return Table(own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates))
+        return InputTable(
+            own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates)
+        )
 
-    def along(self, part: slice, size: int) -> Table:
+    def along(self, part: slice, size: int) -> InputTable:
         """That of some directions, filled up to as many as a kernel has."""
         rates = [
             _padded(array[:, part], size) if array.shape[1] else array for array in (self.node_rates, self.input_rates)
         ]
-        return Table(self.segments, self.samples, self.count, *rates)
+        return InputTable(self.segments, self.samples, self.count, *rates)
 
 
 def _padded(array: Array, size: int) -> Array:
@@ -134,12 +136,12 @@ class Forward:
         slope: Array = (ends[0] - ends[1]) / (2 * step)
         return slope
 
-    def run(self, table: Table, parameters: Array, units: Array) -> Array:
+    def run(self, table: InputTable, parameters: Array, units: Array) -> Array:
         """The friction coefficient that would be observed.
 
         Parameters
         ----------
-        table : Table
+        table : InputTable
             Its shifts as many as given to the constructor.
         parameters : ndarray (jobs, names)
         units : ndarray (jobs, names)
@@ -163,7 +165,7 @@ class Forward:
         ]
         return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
 
-    def _run(self, table: Table, values: Values, sigma: Array, chain: Array) -> Array:
+    def _run(self, table: InputTable, values: Values, sigma: Array, chain: Array) -> Array:
         """One pass, with as many directions as the kernel has."""
         jobs = len(sigma)
         constants, start = self.program.arrays(values.arguments, sigma, chain)
@@ -191,7 +193,7 @@ class Forward:
             seen[good] = found
         return seen
 
-    def _settings(self, table: Table, values: Values, sigma: Array, jobs: int) -> Array:
+    def _settings(self, table: InputTable, values: Values, sigma: Array, jobs: int) -> Array:
         """rtol, guess of the unknown and its scale, limit of steps, absolute tolerances."""
         reduction = self.program.reduction
         scales, unknown = natural_scales(reduction, values.arguments, sigma)

@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.records import parameters, twin
-from steadyslip.experiments.fitting.forward import Table
+from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
 from steadyslip.experiments.measured.record import Record
 from steadyslip.protocol import Protocol, Segments, pack
@@ -201,7 +201,7 @@ class MeasuredInputs:
             rows[row - 1, 3], rows[row, 3] = record.velocity[i], record.velocity[i + 1]
             rows[row - 1 : row + 1, 6] = 0.0
 
-    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """The table for the times of the jumps.
 
         Parameters
@@ -214,15 +214,15 @@ class MeasuredInputs:
             How many directions there are; none are wanted if zero.
         """
         if not len(self.moving):
-            return Table(self.rows, self.samples, self.count)
+            return InputTable(self.rows, self.samples, self.count)
         rows = np.repeat(self.rows, len(times), axis=0)
         rows[:, self.moving, 0] = rows[:, self.moving - 1, 1] = times - self.origin
         if not directions:
-            return Table(rows, self.samples, self.count)
+            return InputTable(rows, self.samples, self.count)
         rates = np.zeros((1, directions, rows.shape[1]))
         for k, row in enumerate(self.moving):
             rates[0, first + k, row] = 1.0
-        return Table(rows, self.samples, self.count, rates)
+        return InputTable(rows, self.samples, self.count, rates)
 
 
 class ProtocolInputs:
@@ -249,7 +249,7 @@ class ProtocolInputs:
         self.free = tuple(free)
         self._plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
 
-    def table(self, times: Array, first: int = 0, directions: int = 0) -> Table:
+    def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """Tables for the free times (jobs, free); see `MeasuredInputs.table`."""
         if not self.free:
             return self._once
@@ -261,7 +261,7 @@ class ProtocolInputs:
         return self._table(segments, moved, directions, len(times))
 
     @cached_property
-    def _once(self) -> Table:
+    def _once(self) -> InputTable:
         return self._table(pack(self.protocol, self.velocity, float(self.time[-1])), [], 0, 1)
 
     def _packed(self, times: Array) -> Segments:
@@ -270,7 +270,7 @@ class ProtocolInputs:
 
     def _table(
         self, segments: Segments, moved: Sequence[tuple[int, Segments, Segments]], directions: int, jobs: int
-    ) -> Table:
+    ) -> InputTable:
         first, last = float(self.time[0]), float(self.time[-1])
         starts = np.broadcast_to(segments.start, (jobs, segments.start.shape[1]))
         extra = _wave_nodes(segments, first, last)
@@ -293,7 +293,7 @@ class ProtocolInputs:
         spacing = (rows[:, :, 1] - rows[:, :, 0])[:, :, None]
         rows[:, :, 3:6] = before
         rows[:, :, 6:9] = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
-        table = Table(rows, np.ascontiguousarray(samples), len(self.time))
+        table = InputTable(rows, np.ascontiguousarray(samples), len(self.time))
         if not moved:
             return table
         node_rates = np.zeros((jobs, directions, rows.shape[1]))
@@ -304,7 +304,7 @@ class ProtocolInputs:
             node_rates[:, direction] = np.where(inside[:, :-1], _of(shift, own, jobs), 0.0)
             change = _at(plus, own, middle, jobs) - _at(minus, own, middle, jobs)
             input_rates[:, direction] = change / (2 * _SHIFT)
-        return Table(rows, table.samples, table.count, node_rates, input_rates)
+        return InputTable(rows, table.samples, table.count, node_rates, input_rates)
 
 
 def _of(array: Array, own: Array, jobs: int) -> Array:

@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.comparison import (
     LOSSES,
     Comparison,
-    Part,
+    RecordPart,
     jump_unknowns,
     step_unknowns,
     trend_rows,
@@ -131,7 +131,7 @@ class Plan:
         parts = tuple(self._part(i, record, space, threads) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
 
-    def _part(self, i: int, record: Record, space: Space, threads: int | None) -> Part:
+    def _part(self, i: int, record: Record, space: Space, threads: int | None) -> RecordPart:
         rig, pressed = self.driven(record, i)
         places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
         for place, one in enumerate(space.unknowns):
@@ -155,7 +155,7 @@ class Plan:
                 self.protocol, rig.drive.velocity, record.time, times, None if own_stress else pressed
             )
         weights = np.ones(len(record)) if self.weights is None else self.weights[i]
-        return Part(
+        return RecordPart(
             record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
             tuple(places["trend"]), trend_rows(record, self.trend, self.offset, self.trend_axis, moved),
         )  # fmt: skip

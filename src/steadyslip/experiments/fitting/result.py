@@ -69,7 +69,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Search:
+class SearchStory:
     """How the minimum was found.
 
     Attributes
@@ -105,7 +105,7 @@ class Fit(ReadOnly):
         Where the sum of squares is least, in the coordinates of ``plan.space()``.
     ssq : float
         Sum of squared residuals (weighted, or as the loss has them).
-    search : Search
+    search : SearchStory
     noise : tuple of Noise
         Of the residuals of every record.
     covariance : ndarray (p, p)
@@ -120,7 +120,7 @@ class Fit(ReadOnly):
     plan: Plan
     coordinates: Array = field(repr=False)
     ssq: float
-    search: Search
+    search: SearchStory
     noise: tuple[Noise, ...] = field(repr=False)
     covariance: Array = field(repr=False)
     unidentified: tuple[Combination, ...]

@@ -14,11 +14,11 @@ import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.experiments.fitting.commanded import CommandedInputs, windows
-from steadyslip.experiments.fitting.comparison import Part
+from steadyslip.experiments.fitting.comparison import RecordPart
 from steadyslip.experiments.fitting.inputs import ProtocolInputs
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.measured.record import Record
-from steadyslip.experiments.measured.steps import Step
+from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.model.steady import steady_state
 
 Array = np.ndarray
@@ -89,7 +89,7 @@ def _moved(record: Record, rate: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * (along[1:] + along[:-1]) * np.diff(time))])
 
 
-def _response(record: Record, moved: Array, step: Step) -> tuple[float, float]:
+def _response(record: Record, moved: Array, step: LoadStep) -> tuple[float, float]:
     """Peak and steady change of friction per e-fold, without the trend before the step."""
     time, mu = record.time, record.friction
     fold = float(np.log(step.after / step.before))
@@ -114,7 +114,7 @@ def _smoothed(values: Array, width: int = 3) -> Array:
     return np.convolve(values, np.ones(width) / width, mode="valid")
 
 
-def _steepest(record: Record, moved: Array, step: Step) -> float:
+def _steepest(record: Record, moved: Array, step: LoadStep) -> float:
     """Rise of friction with displacement right after a step; without the jump of friction at one of normal stress."""
     begin = max(int(np.searchsorted(record.time, step.time)) - 1, 0)
     if step.unit == "Pa":
@@ -139,7 +139,7 @@ def _steepest_anywhere(moved: Array, mu: Array) -> float:
     return max(best, float(np.ptp(mu)) / max(float(np.ptp(moved)), 1e-12))
 
 
-def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, already: int = 0) -> Array:
+def starting_points(parts: Sequence[RecordPart], space: Space, count: int = STARTS, already: int = 0) -> Array:
     """Coordinates to start from, (count, p): a design over what the records leave open, continued after `already`."""
     from scipy.stats import qmc
 
@@ -168,7 +168,7 @@ def starting_points(parts: Sequence[Part], space: Space, count: int = STARTS, al
     return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
 
 
-def search_bounds(parts: Sequence[Part], space: Space) -> tuple[Array, Array]:
+def search_bounds(parts: Sequence[RecordPart], space: Space) -> tuple[Array, Array]:
     """Bounds of the coordinates: of the parameters themselves, and of what records can show.
 
     A slip distance far below what passes between samples, or far above the whole record, changes nothing any more.
@@ -192,7 +192,7 @@ def search_bounds(parts: Sequence[Part], space: Space) -> tuple[Array, Array]:
     return low, high
 
 
-def _start(unknown: Unknown, part: Part, own: Features, design: tuple[Array, ...]) -> Array:
+def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Array, ...]) -> Array:
     """Starting values of one parameter."""
     name = unknown.parameter
     d_c, a, b, steepness, alpha, spare = design
@@ -227,7 +227,7 @@ def _start(unknown: Unknown, part: Part, own: Features, design: tuple[Array, ...
     return present * 10.0 ** (2 * spare - 1) if present else 0.02 * (spare - 0.5)
 
 
-def _near(unknown: Unknown, part: Part, spare: Array) -> Array:
+def _near(unknown: Unknown, part: RecordPart, spare: Array) -> Array:
     """Starting values of a time that the record leaves open: as it has it, or anywhere between two samples."""
     if not isinstance(part.inputs, CommandedInputs):
         raise InternalError("times of changes are free in commanded loading only")
@@ -235,12 +235,12 @@ def _near(unknown: Unknown, part: Part, spare: Array) -> Array:
     return np.asarray(begin + NEARBY * (spare - 0.5) * (unknown.high - unknown.low))
 
 
-def _stress(part: Part) -> float:
+def _stress(part: RecordPart) -> float:
     """Normal stress to begin with, Pa."""
     return float(part.record.normal[0]) if part.record.normal is not None else steady_state(part.rig).normal_stress
 
 
-def _time_of(name: str, part: Part) -> float:
+def _time_of(name: str, part: RecordPart) -> float:
     """A free time of the protocol: as the protocol has it."""
     if not isinstance(part.inputs, ProtocolInputs):
         raise InternalError("isinstance(part.inputs, ProtocolInputs)")

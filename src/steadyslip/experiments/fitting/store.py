@@ -12,14 +12,14 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import DRIVES, Plan, make_plan
-from steadyslip.experiments.fitting.result import Fit, Search
+from steadyslip.experiments.fitting.result import Fit, SearchStory
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
 from steadyslip.experiments.numerics.noise import Noise
-from steadyslip.files.sealed import Kind
-from steadyslip.files.tables import Column, Table, write_table
+from steadyslip.files.sealed import FileKind
+from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = Kind("fit", 2, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 2, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 _ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
     "steadyslip": str,
@@ -100,7 +100,7 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
     """
-    table = Table(path, FIT, _ATTRIBUTES)
+    table = ExpectedTable(path, FIT, _ATTRIBUTES)
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
     described, noises = stored["records"], stored["noise"]
     weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")
@@ -120,7 +120,7 @@ def load_fit(path: str | PathLike[str]) -> Fit:
         plan=plan,
         coordinates=found["coordinates"],
         ssq=table.attributes["ssq"],
-        search=Search(**search | {"others": tuple(search["others"])}),
+        search=SearchStory(**search | {"others": tuple(search["others"])}),
         noise=tuple(
             Noise(lag1, correlated, found[f"noise_coefficients_{i}"], innovation, found[f"noise_covariance_{i}"])
             for i, (lag1, correlated, innovation) in enumerate(noises, start=1)
@@ -134,25 +134,27 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     return fit
 
 
-def _columns(present: list[list[str]], weighted: bool) -> dict[str, Column]:
+def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
     """What a fit to records with these columns must hold."""
     along = ("parameter",)
-    found = {name: Column(along) for name in ("coordinates", "value", "error")}
-    found |= {"parameter": Column(along, text=True), "other": Column(("other",), text=True)}
-    found |= {"unit": Column(along, text=True), "covariance": Column(("parameter", "other"))}
-    found["bound"] = Column(("parameter", "side"))
+    found = {name: ColumnRule(along) for name in ("coordinates", "value", "error")}
+    found |= {"parameter": ColumnRule(along, text=True), "other": ColumnRule(("other",), text=True)}
+    found |= {"unit": ColumnRule(along, text=True), "covariance": ColumnRule(("parameter", "other"))}
+    found["bound"] = ColumnRule(("parameter", "side"))
     for i, names in enumerate(present, start=1):
         samples = (f"sample_{i}",)
-        found |= {f"{name}_{i}": Column(samples, ROLES.get(name, "")) for name in names}
-        found[f"model_{i}"] = Column(samples, "1")
+        found |= {f"{name}_{i}": ColumnRule(samples, ROLES.get(name, "")) for name in names}
+        found[f"model_{i}"] = ColumnRule(samples, "1")
         if weighted:
-            found[f"weight_{i}"] = Column(samples)
-        found[f"noise_coefficients_{i}"] = Column((f"order_{i}",))
-        found[f"noise_covariance_{i}"] = Column((f"lag_{i}",))
+            found[f"weight_{i}"] = ColumnRule(samples)
+        found[f"noise_coefficients_{i}"] = ColumnRule((f"order_{i}",))
+        found[f"noise_covariance_{i}"] = ColumnRule((f"lag_{i}",))
     return found
 
 
-def _record(table: Table, found: dict[str, Any], i: int, source: str, notes: list[str], integrated: bool) -> Record:
+def _record(
+    table: ExpectedTable, found: dict[str, Any], i: int, source: str, notes: list[str], integrated: bool
+) -> Record:
     columns = {name: found.get(f"{name}_{i}") for name in ROLES}
     if columns["time"] is None or columns["friction"] is None:
         raise table.fault(f"record {i} has no time or no friction")
@@ -162,7 +164,7 @@ def _record(table: Table, found: dict[str, Any], i: int, source: str, notes: lis
         raise table.fault(str(error)) from error
 
 
-def _plan(table: Table, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
+def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
     """The plan, checked as if a user gave it."""
     from steadyslip.files.specifications import protocol_from_text, rig_from_text
 
@@ -183,7 +185,7 @@ def _plan(table: Table, records: tuple[Record, ...], options: dict[str, Any], we
     return replace(plan, rtol=rtol)
 
 
-def _check(table: Table, fit: Fit) -> None:
+def _check(table: ExpectedTable, fit: Fit) -> None:
     """Numbers that no fit has."""
     bad = {
         "coordinates": not np.all(np.isfinite(fit.coordinates)),

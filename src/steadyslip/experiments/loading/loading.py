@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 Array = np.ndarray
-Curve = Callable[[Array], Array]
+LoadCurve = Callable[[Array], Array]
 FELT = 1e-6  # of the highest level: uncertainty that could matter
 
 
@@ -81,7 +81,7 @@ class Course:
     first: float
     changes: tuple[Change, ...] = ()
     errors: Array = field(default_factory=lambda: np.zeros(1), repr=False)
-    curve: Curve | None = field(default=None, repr=False)
+    curve: LoadCurve | None = field(default=None, repr=False)
     strays: float = 0.0
     slips: int = 0
     glitches: int = 0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.experiments.loading.loading import Change, Course, Curve
+from steadyslip.experiments.loading.loading import Change, Course, LoadCurve
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
@@ -21,7 +21,7 @@ OSCILLATION = 8  # alternating changes that are one oscillation
 
 
 @dataclass(frozen=True)
-class Wave:
+class StressWave:
     """An oscillation: when it begins, s, its period, s, mean and amplitude, Pa."""
 
     time: float
@@ -157,7 +157,7 @@ def _uneven(values: Array, noise: float) -> bool:
     return bool(np.var(means) > UNEVEN * noise**2 / size)
 
 
-def _span(time: Array, normal: Array, level: float, noise: float) -> tuple[float, float, Curve]:
+def _span(time: Array, normal: Array, level: float, noise: float) -> tuple[float, float, LoadCurve]:
     curve = smoothing_curve(time, normal - level, noise)
     return float(time[0]), float(time[-1]), curve
 
@@ -165,7 +165,7 @@ def _span(time: Array, normal: Array, level: float, noise: float) -> tuple[float
 class _Spans:
     """Curves, each on a span of its own; what lies between joins their ends, what lies outside is level."""
 
-    def __init__(self, spans: list[tuple[float, float, Curve]]) -> None:
+    def __init__(self, spans: list[tuple[float, float, LoadCurve]]) -> None:
         self.spans = spans
 
     def __call__(self, time: Array) -> Array:
@@ -178,7 +178,7 @@ class _Spans:
         return found
 
 
-def oscillation(time: Array, normal: Array) -> Wave | None:
+def oscillation(time: Array, normal: Array) -> StressWave | None:
     """A normal stress that keeps crossing its mean at regular intervals."""
     mean, noise = float(np.mean(normal)), level_noise(normal)
     if len(normal) < 2 * FEWEST or float(np.std(normal)) < LEAST_STRESS / 4 * abs(mean):
@@ -197,4 +197,4 @@ def oscillation(time: Array, normal: Array) -> Wave | None:
         return None
     first = max(int(np.flatnonzero(np.abs(normal - mean) > band)[0]) - 1, 0)
     inside = normal[turns[0] : turns[-1]]
-    return Wave(float(time[first]), 2 * float(np.mean(gaps[like])), mean, float(np.sqrt(2) * np.std(inside)))
+    return StressWave(float(time[first]), 2 * float(np.mean(gaps[like])), mean, float(np.sqrt(2) * np.std(inside)))

@@ -17,7 +17,7 @@ from steadyslip.core.records import Parameter, checked_number, real
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
-from steadyslip.experiments.measured.steps import Step, steps_of
+from steadyslip.experiments.measured.steps import LoadStep, steps_of
 
 Array = np.ndarray
 FEWEST_ROWS = 20
@@ -60,7 +60,7 @@ class Record:
         return len(self.time)
 
     @cached_property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> tuple[LoadStep, ...]:
         """What was done to the sample, in the order of time."""
         return steps_of(self.loading, None if self.normal is None else oscillation(self.time, self.normal))
 

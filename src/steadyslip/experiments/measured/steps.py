@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from steadyslip.core.quantities import shown
 from steadyslip.experiments.loading.loading import Change, Loading
-from steadyslip.experiments.loading.pressing import Wave
+from steadyslip.experiments.loading.pressing import StressWave
 
 
 @dataclass(frozen=True)
-class Step:
+class LoadStep:
     """One change of what drives an experiment.
 
     Attributes
@@ -46,17 +46,17 @@ class Step:
         return f"{self.kind} at {self.time:.6g} s: {values}{lasting}"
 
 
-def steps_of(loading: Loading, wave: Wave | None) -> tuple[Step, ...]:
+def steps_of(loading: Loading, wave: StressWave | None) -> tuple[LoadStep, ...]:
     """The changes of a loading, in the order of time."""
     found = [_step(channel, change) for channel, _, change in loading.changes]
     if wave is not None:
-        found.append(Step("normal-stress oscillation", wave.time, wave.period, wave.mean, wave.amplitude))
+        found.append(LoadStep("normal-stress oscillation", wave.time, wave.period, wave.mean, wave.amplitude))
     return tuple(sorted(found, key=lambda step: step.time))
 
 
-def _step(channel: str, change: Change) -> Step:
+def _step(channel: str, change: Change) -> LoadStep:
     if channel == "stress":
         kind = "normal-stress step"
     else:
         kind = "hold" if change.after == 0.0 else "reslide" if change.before == 0.0 else "velocity step"
-    return Step(kind, change.time, change.duration, change.before, change.after)
+    return LoadStep(kind, change.time, change.duration, change.before, change.after)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
-from steadyslip.core.records import Part, Record, resolve
+from steadyslip.core.records import FrozenRecord, Part, resolve
 from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.files.specifications.toml import NotToml, Table, tables_of
 from steadyslip.machine.slider import Slider
@@ -80,7 +80,7 @@ def _known_names(tables: Table) -> list[str]:
     return names
 
 
-def _names_chosen(family: type[Record], table: Table, prefix: str) -> list[str]:
+def _names_chosen(family: type[FrozenRecord], table: Table, prefix: str) -> list[str]:
     """The names below a table that says which law it is."""
     key, default = selector(family)
     chosen = table.get(key, default)
@@ -88,7 +88,7 @@ def _names_chosen(family: type[Record], table: Table, prefix: str) -> list[str]:
     return _names_of(law, table, prefix) if law else []
 
 
-def _names_of(law: type[Record], table: Table, prefix: str) -> list[str]:
+def _names_of(law: type[FrozenRecord], table: Table, prefix: str) -> list[str]:
     names: list[str] = []
     for item, role in own_fields(law):
         inner = table.get(item.name)

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
-from steadyslip.core.records import Part, Record, Role, role_of
+from steadyslip.core.records import FrozenRecord, Part, Role, role_of
 from steadyslip.machine.drive import Drive
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Piece, Protocol
@@ -21,7 +21,7 @@ class Section:
     """A table of the file: its name and the family of records that fills it (None: the slider itself)."""
 
     name: str
-    family: type[Record] | None
+    family: type[FrozenRecord] | None
 
 
 PROTOCOL = Section("protocol", Protocol)
@@ -38,19 +38,19 @@ def sections() -> tuple[Section, ...]:
     return tuple(found)
 
 
-def selector(family: type[Record]) -> tuple[str, str | None]:
+def selector(family: type[FrozenRecord]) -> tuple[str, str | None]:
     """The key that names the law of a table, and the law meant when it is absent."""
     if family is Piece:
         return "kind", None
     return ("control", "steady") if family is Drive else ("law", None)
 
 
-def has_choice(family: type[Record]) -> bool:
+def has_choice(family: type[FrozenRecord]) -> bool:
     """Whether a table of this family names one of several laws, rather than being the one record itself."""
     return bool(family.registry) and not family.name
 
 
-def find_law(family: type[Record], name: object) -> type[Record]:
+def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
     """The law of a family with a registered name, or one that an installed package offers under it.
 
     Raises
@@ -72,7 +72,7 @@ def find_law(family: type[Record], name: object) -> type[Record]:
     raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])
 
 
-def own_fields(law: type[Record]) -> Iterator[tuple[Field[Any], Role]]:
+def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Role]]:
     """The fields of a record that are keys of its own table."""
     for item in fields(law):  # type: ignore[arg-type]
         role = role_of(item)

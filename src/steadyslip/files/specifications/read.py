@@ -19,11 +19,11 @@ from steadyslip.core.errors import (
 )
 from steadyslip.core.quantities import is_per_area, numbers, parse, total_unit
 from steadyslip.core.records import (
+    FrozenRecord,
     Parameter,
     Part,
-    Record,
     Role,
-    Samples,
+    Series,
     allowed,
     checked,
     checked_number,
@@ -184,7 +184,7 @@ class Reader:
             except ParameterError:
                 self.area = None  # reported when the slider's own keys are read
 
-    def _section(self, section: Section) -> Record | None:
+    def _section(self, section: Section) -> FrozenRecord | None:
         if section.family is None:
             raise InternalError("section.family is not None")
         key, default = selector(section.family)
@@ -194,7 +194,7 @@ class Reader:
             return None
         return self.record(section.family, self._table(section.name), f"{section.name}.")
 
-    def record(self, family: type[Record], table: Table, prefix: str) -> Record | None:
+    def record(self, family: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
         """The record that a table describes, or None after noting its problems."""
         if not has_choice(family):
             law, rest = family, table
@@ -209,7 +209,7 @@ class Reader:
             law, rest = chosen, {name: value for name, value in table.items() if name != key}
         return self._complete(law, rest, prefix)
 
-    def _complete(self, law: type[Record], table: Table, prefix: str) -> Record | None:
+    def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
         """Build a record; with bad values, still find what the others contradict."""
         before = len(self.problems)
         arguments = self._arguments(law, table, prefix)
@@ -218,21 +218,21 @@ class Reader:
         self.problems += [p.under(prefix.rstrip(".")) for p in _contradictions(law, arguments, set(table))]
         return None
 
-    def _law(self, family: type[Record], name: object, where: str) -> type[Record] | None:
+    def _law(self, family: type[FrozenRecord], name: object, where: str) -> type[FrozenRecord] | None:
         try:
             return find_law(family, name)
         except ParameterError as error:
             self.problem(where, error.problems[0].message)
             return None
 
-    def _built(self, law: type[Record], arguments: Table, prefix: str) -> Record | None:
+    def _built(self, law: type[FrozenRecord], arguments: Table, prefix: str) -> FrozenRecord | None:
         try:
             return law(**arguments)
         except ParameterError as error:
             self.problems += [p.under(prefix.rstrip(".")) for p in error.problems]
             return None
 
-    def _arguments(self, law: type[Record], table: Table, prefix: str) -> Table:
+    def _arguments(self, law: type[FrozenRecord], table: Table, prefix: str) -> Table:
         """Constructor arguments from a table; unknown, missing and bad keys are noted."""
         rest = dict(table)
         arguments: Table = {}
@@ -253,9 +253,9 @@ class Reader:
             self.problem(prefix + name, unknown_name("key", name, keys))
         return arguments
 
-    def _inline(self, item: Field[Any], role: Part, rest: Table, prefix: str, keys: list[str]) -> Record | None:
+    def _inline(self, item: Field[Any], role: Part, rest: Table, prefix: str, keys: list[str]) -> FrozenRecord | None:
         """A part named by a word whose own parameters stand beside it (evolution, c_nagata)."""
-        raw = rest.pop(item.name, item.default.name if isinstance(item.default, Record) else None)
+        raw = rest.pop(item.name, item.default.name if isinstance(item.default, FrozenRecord) else None)
         law = self._law(role.family, raw, prefix + item.name)
         if law is None:
             return None
@@ -269,7 +269,7 @@ class Reader:
         if isinstance(role, Part):
             return self._part(role, raw, name)
         try:
-            if isinstance(role, (Parameter, Samples)) and self.area is not None and is_per_area(role.unit):
+            if isinstance(role, (Parameter, Series)) and self.area is not None and is_per_area(role.unit):
                 return (
                     number(role, raw, self.area) if isinstance(role, Parameter) else self._totals(role, raw, self.area)
                 )
@@ -293,7 +293,7 @@ class Reader:
             return None
         return self.record(role.family, dict(table), f"{name}.")
 
-    def _totals(self, role: Samples, raw: Any, area: float) -> tuple[float, ...]:
+    def _totals(self, role: Series, raw: Any, area: float) -> tuple[float, ...]:
         """A column for the whole area as one per unit area; its texts may give either."""
 
         def read(text: str, total: str) -> float:
@@ -340,12 +340,12 @@ def number(role: Parameter, raw: Any, area: float | None) -> float:
 def _missing(role: Role) -> str:
     if isinstance(role, Parameter):
         return f"missing ({role.doc}); allowed: {allowed(role)}"
-    if isinstance(role, Samples):
+    if isinstance(role, Series):
         return f"missing ({role.doc}); allowed: a list of numbers in {role.unit}, or of texts with units"
     return f"missing ({role.doc})"
 
 
-def _contradictions(law: type[Record], valid: Mapping[str, Any], given: set[str]) -> list[Problem]:
+def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], given: set[str]) -> list[Problem]:
     """Problems between the fields of a record that cannot be built, because other fields are bad.
 
     Numbers that were given but are bad, or missing, stand as NaN, which contradicts nothing.

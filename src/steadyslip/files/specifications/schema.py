@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from steadyslip.core.quantities import example
-from steadyslip.core.records import Option, Parameter, Part, Record, Role, Samples, is_required
+from steadyslip.core.records import FrozenRecord, Option, Parameter, Part, Role, Series, is_required
 from steadyslip.files.specifications.layout import MAP, PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -69,7 +69,7 @@ def _map() -> Schema:
     }
 
 
-def _family(family: type[Record]) -> Schema:
+def _family(family: type[FrozenRecord]) -> Schema:
     """One alternative for each registered law."""
     key, default = selector(family)
     alternatives = []
@@ -81,7 +81,7 @@ def _family(family: type[Record]) -> Schema:
     return {"description": family.family, "oneOf": alternatives}
 
 
-def _table(law: type[Record], properties: Schema, description: str) -> Schema:
+def _table(law: type[FrozenRecord], properties: Schema, description: str) -> Schema:
     properties = dict(properties)
     required: list[str] = []
     schema: Schema = {"type": "object", "description": description, "properties": properties}
@@ -109,7 +109,7 @@ def _value(role: Role) -> Schema:
             member = _family(role.family) if has_choice(role.family) else _table(role.family, {}, _summary(role.family))
             return {"type": "array", "items": member, "description": role.doc}
         return {"description": role.doc, "anyOf": [{"enum": list(role.family.registry)}, _family(role.family)]}
-    if isinstance(role, Samples):
+    if isinstance(role, Series):
         member = {"anyOf": [{"type": "number"}, _text(role.unit)]}
         return {"type": "array", "items": member, "description": f"{role.doc}, {role.unit}"}
     return _number(role)
@@ -130,5 +130,5 @@ def _text(unit: str) -> Schema:
     return {"type": "string", "description": f"text such as {example(unit)}"}
 
 
-def _summary(law: type[Record]) -> str:
+def _summary(law: type[FrozenRecord]) -> str:
     return (law.__doc__ or law.__name__).strip().splitlines()[0]

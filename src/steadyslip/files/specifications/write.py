@@ -9,7 +9,7 @@ from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.quantities import outside
-from steadyslip.core.records import Option, Parameter, Part, Record, Samples
+from steadyslip.core.records import FrozenRecord, Option, Parameter, Part, Series
 from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -50,21 +50,21 @@ def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
     return "\n".join(blocks)
 
 
-def _law_name(record: Record, where: str) -> str:
+def _law_name(record: FrozenRecord, where: str) -> str:
     if not record.name:
         kind = type(record).__name__
         raise ParameterError([Problem(where, f'{kind} has no name; declare it as class {kind}(..., name="...")')])
     return record.name
 
 
-def _table(header: str, record: Record, first: list[str], path: str, area: float | None) -> str:
+def _table(header: str, record: FrozenRecord, first: list[str], path: str, area: float | None) -> str:
     lines = [header, *first]
     below: list[str] = []
     for item, role in own_fields(type(record)):
         value = getattr(record, item.name)
         if value is None or value == item.default:
             continue
-        if isinstance(role, Samples):
+        if isinstance(role, Series):
             lines.append(f"{item.name} = {_column(role, value, area)}")
         elif not isinstance(role, Part):
             lines.append(f"{item.name} = {_scalar(role, value, area)}")
@@ -79,7 +79,7 @@ def _table(header: str, record: Record, first: list[str], path: str, area: float
     return "\n".join(["\n".join(lines) + "\n", *below])
 
 
-def _member(family: type[Record], member: Record, name: str, path: str, area: float | None) -> str:
+def _member(family: type[FrozenRecord], member: FrozenRecord, name: str, path: str, area: float | None) -> str:
     """One table of a list."""
     first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
     return _table(f"[[{name}]]", member, first, path, area)
@@ -96,7 +96,7 @@ def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
     return repr(float(value) * factor) + (f"  # {unit}" if unit != "1" else "")
 
 
-def _column(role: Samples, values: tuple[float, ...], area: float | None) -> str:
+def _column(role: Series, values: tuple[float, ...], area: float | None) -> str:
     """A list of numbers, on as many lines as it needs."""
     factor, unit = outside(role.unit, area)
     each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {role.unit}"' for v in values]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, Problem
-from steadyslip.core.records import Record, parameter, positive
+from steadyslip.core.records import FrozenRecord, parameter, positive
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
 
@@ -55,7 +55,7 @@ class Motion:
         )
 
 
-class ContactLaw(Record, family="contact law"):
+class ContactLaw(FrozenRecord, family="contact law"):
     """Base of contact laws: normal stress σ (Pa, compression positive) from the motion.
 
     σ = `load` + `coupling`(motion): a part that does not depend on the motion, and one that does. Where

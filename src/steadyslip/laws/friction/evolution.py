@@ -10,11 +10,11 @@ from typing import ClassVar
 
 import sympy as sp
 
-from steadyslip.core.records import Record, nonnegative, parameter
+from steadyslip.core.records import FrozenRecord, nonnegative, parameter
 from steadyslip.laws.friction.law import Expression
 
 
-class Evolution(Record, family="evolution law"):
+class Evolution(FrozenRecord, family="evolution law"):
     """Base of evolution laws: dΘ/dt at constant normal stress."""
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:

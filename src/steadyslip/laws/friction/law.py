@@ -6,12 +6,12 @@ from typing import Any
 
 import sympy as sp
 
-from steadyslip.core.records import Record
+from steadyslip.core.records import FrozenRecord
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
 
 
-class FrictionLaw(Record, family="friction law"):
+class FrictionLaw(FrozenRecord, family="friction law"):
     """Base of friction laws: τ(v, σ, memory) and the evolution of the memory.
 
     A law works in *memory variables*: combinations of its states that stay continuous when velocity

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from steadyslip.core.records import Record, nonnegative, parameter, positive, share
+from steadyslip.core.records import FrozenRecord, nonnegative, parameter, positive, share
 
 
-class NormalMemory(Record, family="memory of normal stress"):
+class NormalMemory(FrozenRecord, family="memory of normal stress"):
     """Base of the laws for the memory of normal stress; `RateState` reads their parameters."""
 
 

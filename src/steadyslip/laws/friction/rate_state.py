@@ -8,13 +8,13 @@ import sympy as sp
 
 from steadyslip.core.errors import Problem
 from steadyslip.core.expressions import asinh_exp
-from steadyslip.core.records import Condition, Record, nonnegative, option, parameter, part, parts, positive, real
+from steadyslip.core.records import Condition, FrozenRecord, nonnegative, option, parameter, part, parts, positive, real
 from steadyslip.laws.friction.evolution import Evolution, Nagata, Slip
 from steadyslip.laws.friction.law import Expression, FrictionLaw
 from steadyslip.laws.friction.normal_memory import LinkerDieterich, NoMemory, NormalMemory, PrakashClifton
 
 
-class State(Record):
+class State(FrozenRecord):
     """One of several states of a rate-and-state law."""
 
     b: float = parameter("1", real, "evolution effect of this state")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
-from steadyslip.core.records import Address, Parameter, Record, parameters, resolve
+from steadyslip.core.records import Address, FrozenRecord, Parameter, parameters, resolve
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.machine.slider import Slider
@@ -353,12 +353,12 @@ def rig_definition(rig: Slider, protocol: Protocol) -> dict[str, Any]:
     return tables | ({"laws": foreign} if foreign else {})
 
 
-def _records(record: Record) -> Iterator[Record]:
+def _records(record: FrozenRecord) -> Iterator[FrozenRecord]:
     yield record
     for item in fields(record):  # type: ignore[arg-type]
         value = getattr(record, item.name)
         for inner in value if isinstance(value, tuple) else (value,):
-            if isinstance(inner, Record):
+            if isinstance(inner, FrozenRecord):
                 yield from _records(inner)
 
 

@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
-from steadyslip.core.records import Domain, Record, option, parameter, positive
+from steadyslip.core.records import Domain, FrozenRecord, option, parameter, positive
 from steadyslip.linear import critical_stiffness, growth_rate, safety_factor, stable_stiffness
 from steadyslip.linear.polynomials import most_intervals
 from steadyslip.linear.response import has_closed_form
@@ -70,7 +70,7 @@ class Output:
         return NOT_DONE if self.flags else np.nan
 
 
-class Measure(Record, family="measure"):
+class Measure(FrozenRecord, family="measure"):
     """Base of what a map can show.
 
     A subclass is registered under a name, lists its `outputs` and computes them in `arrays`. Results must depend
@@ -130,7 +130,7 @@ class SafetyFactor(Measure, name="safety_factor"):
         return {"safety_factor": safety_factor(rig, vary)}
 
 
-class Margin(Measure, name="margin"):
+class LogMargin(Measure, name="margin"):
     """Logarithm of the safety factor, ln(k/k_cr): zero at the edge, as far below it as above by the same factor."""
 
     def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
@@ -164,7 +164,7 @@ class GrowthRate(Measure, name="growth_rate"):
         return {"growth_rate": growth_rate(rig, vary)}
 
 
-class Status(Measure, name="status"):
+class StabilityStatus(Measure, name="status"):
     """Stable, unstable (ill-posed included), or no steady sliding."""
 
     def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:

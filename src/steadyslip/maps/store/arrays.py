@@ -39,7 +39,7 @@ class Store:
     Attributes
     ----------
     path : Path
-    layout : Layout
+    layout : MapLayout
         What its metadata say.
     """
 

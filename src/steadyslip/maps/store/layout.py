@@ -41,7 +41,7 @@ class LayoutError(ValueError):
 
 
 @dataclass(frozen=True)
-class Array:
+class StoredArray:
     """What the metadata say of one array."""
 
     dtype: str
@@ -57,7 +57,7 @@ class Array:
 
 
 @dataclass(frozen=True)
-class Layout:
+class MapLayout:
     """What the metadata of a map say.
 
     Attributes
@@ -82,13 +82,13 @@ class Layout:
     shape: tuple[int, ...]
     chunks: tuple[int, ...]
     grid: tuple[int, ...]
-    arrays: dict[str, Array]
+    arrays: dict[str, StoredArray]
 
 
 # -- reading
 
 
-def read_layout(path: Path) -> Layout:
+def read_layout(path: Path) -> MapLayout:
     """The layout of the map in a folder.
 
     Raises
@@ -106,7 +106,7 @@ def read_layout(path: Path) -> Layout:
         ) from error
 
 
-def _layout(document: Any) -> Layout:
+def _layout(document: Any) -> MapLayout:
     _demand(fits_form(document, {"attributes": dict, "zarr_format": int, "consolidated_metadata": dict,
                                  "node_type": str}), "it is no Zarr group of format 3")  # fmt: skip
     _demand((document["zarr_format"], document["node_type"]) == (3, "group"), "it is no Zarr group of format 3")
@@ -133,7 +133,7 @@ def _layout(document: Any) -> Layout:
     _demand(len(set(names)) == len(names) and set(stored) == set(names), "its arrays are not those of its definition")
     arrays = {name: _array(name, stored[name], _PLAIN if name == COMPLETE else _PACKED) for name in names}
     grid, chunks = arrays[COMPLETE].shape, arrays[results[0]].chunks[: len(dims)] if results else ()
-    found = Layout(
+    found = MapLayout(
         definition, _json(attributes, "versions", {str: str}), attributes["steadyslip"], attributes["title"],
         attributes["rig"], dims, results, sampled, sampled if "method" in samples else (), tuple(sizes), chunks, grid,
         arrays,
@@ -153,7 +153,7 @@ def _json(attributes: dict[str, Any], name: str, form: Any) -> Any:
     return found
 
 
-def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> Array:
+def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> StoredArray:
     def demand(condition: object, what: str) -> None:
         _demand(condition, f"{name!r:.60}: {what}")
 
@@ -181,14 +181,14 @@ def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> Array:
     demand(isinstance(attributes.get("long_name"), str), "has no long_name")
     words = attributes.get("flag_meanings")
     demand((dtype == "int8") == isinstance(words, str), "words for its numbers")
-    return Array(dtype, tuple(dims), tuple(shape), tuple(chunks), attributes)
+    return StoredArray(dtype, tuple(dims), tuple(shape), tuple(chunks), attributes)
 
 
 def _listed(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-def _check_arrays(layout: Layout) -> None:
+def _check_arrays(layout: MapLayout) -> None:
     """Shapes follow from the definition, and none is larger than a map can be."""
     rank = len(layout.dims)
     _demand(layout.results, "it has no results")

@@ -11,8 +11,21 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+
+
+class _Commands(TyperGroup):
+    """Commands, of which Ctrl-C leaves what they say in parting: Typer would end without a word."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as stopped:
+            raise typer.Exit(_failed(str(stopped) or "before there was an answer", 130, "stopped")) from None
+
 
 app = typer.Typer(
+    cls=_Commands,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -106,9 +119,11 @@ def _formula(result: Any) -> dict[str, str | None]:
 
 def _echo_formula(result: Any) -> None:
     from steadyslip.core.errors import NotAvailable
+    from steadyslip.core.progress import progress_text
 
     try:
-        equation = result.formula()
+        with progress_text("simplifying the formula"):
+            equation = result.formula()
         say(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
     except NotAvailable as reason:
         say(f"\nNo formula: {reason}")
@@ -144,6 +159,8 @@ def _predicted(
         say(f"{found}\n\nWith the best values\n{best}")
         if formula:
             _echo_formula(best)
+    if found.left_out:
+        raise typer.Exit(130)
     if require_stable and not found.probability_stable >= 0.95:
         raise typer.Exit(1)
 
@@ -187,11 +204,13 @@ def fit(
         if comparison is not None:
             say(f"{comparison}\n")
         say(str(found))
-    draws, interrupted = None, False
-    try:
-        draws = resample(found, bootstrap) if bootstrap else None
-    except KeyboardInterrupt:
-        interrupted = True
+    draws, stopped = None, comparison is not None and comparison.interrupted
+    if bootstrap and not stopped:
+        try:
+            draws = resample(found, bootstrap)
+            stopped = draws.interrupted
+        except KeyboardInterrupt:
+            stopped = True
     if as_json:
         import json
 
@@ -203,7 +222,7 @@ def fit(
         say(f"\n{draws}")
     for path in () if as_json else output or ():
         say(f"wrote {path}")
-    if interrupted:
+    if stopped:
         raise typer.Exit(130)
 
 
@@ -436,7 +455,7 @@ def _status(command: Callable[[], object]) -> int:
         command()
     except SystemExit as left:
         status = left.code if isinstance(left.code, int) else 0 if left.code is None else 2
-    except KeyboardInterrupt:
+    except KeyboardInterrupt:  # before there was a command
         status = 130
     except OutputClosed:
         status = 141
@@ -471,9 +490,9 @@ def _system_fault(error: OSError) -> str:
     return f"{where}{error.strerror or error}"
 
 
-def _failed(message: str, status: int) -> int:
+def _failed(message: str, status: int, kind: str = "error") -> int:
     with suppress(OSError):
-        typer.secho(f"error: {message}", err=True, fg=typer.colors.RED if sys.stderr and sys.stderr.isatty() else None)
+        typer.secho(f"{kind}: {message}", err=True, fg=typer.colors.RED if sys.stderr and sys.stderr.isatty() else None)
     return status
 
 

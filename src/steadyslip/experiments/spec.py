@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -17,6 +18,7 @@ from steadyslip.core.errors import (
     UnknownNameError,
     unknown_name,
 )
+from steadyslip.core.progress import progress_text
 from steadyslip.core.records import Parameter, checked_number, positive, resolve
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
@@ -380,7 +382,7 @@ def fit_files(
     paths: Sequence[str | PathLike[str]], spec: str | PathLike[str] | None = None, changes: Iterable[str] = (),
     *, skip_bad_lines: bool = False,
 ) -> tuple[Fit, LawComparison | None]:  # fmt: skip
-    """Read records and fit them, as the command line does.
+    """Read records and fit them, as the command line does; shows progress on a terminal.
 
     Parameters
     ----------
@@ -415,7 +417,13 @@ def fit_files(
         raise faults[0]
     if faults:
         raise NotAvailable("\n".join(map(str, faults)))
-    if plan.laws:
-        found = plan.compare(records)
-        return found.fits[found.best], found
-    return plan.fit(records), None
+    with progress_text("searching") as said:
+
+        def told(what: str, starts: int, rms: float) -> None:
+            reached = f", residuals {rms:.3g} of friction" if math.isfinite(rms) else ""
+            said(f"{what}: {starts} starts tried{reached}; Ctrl-C ends it")
+
+        if plan.laws:
+            found = plan.compare(records, progress=told)
+            return found.fits[found.best], found
+        return plan.fit(records, progress=told), None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import NotAvailable, UnknownNameError
+from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, UnknownNameError
 from steadyslip.core.expressions import array_function
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -42,7 +42,8 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, 
     UnknownNameError
         If an output is unknown.
     NotAvailable
-        If the problem is ill-posed: the balance cannot be solved for its unknown.
+        If the problem is ill-posed: the balance cannot be solved for its unknown; or if numbers leave the range of
+        floating point.
     """
     values = model_values(rig)
     model = values.model
@@ -53,14 +54,23 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, 
     if not stresses:
         raise explain_absence(rig, values)
     names = tuple(outputs)
-    blocks = _matrix_function(model, names)(*values.arguments, stresses[0])
-    n, inputs, p = len(model.variables), len(INPUTS), len(names)
-    width = n + inputs + 1
+    with np.errstate(all="ignore"):
+        found = _solved(
+            _matrix_function(model, names)(*values.arguments, stresses[0]), len(model.variables), len(names)
+        )
+    if not all(np.all(np.isfinite(block)) for block in found):
+        raise NotAvailable(OUT_OF_RANGE)
+    return found
+
+
+def _solved(blocks: Any, n: int, p: int) -> tuple[Any, Any, Any, Any]:
+    """The matrices, with the unknown in terms of variables and inputs."""
+    width = n + len(INPUTS) + 1
     table = np.array([float(b) for b in blocks]).reshape(n + p + 1, width)
     balance = table[-1]
     if balance[-1] == 0:
         raise NotAvailable("ill-posed: the friction law does not determine the motion (its direct effect is zero)")
-    solved = -balance[:-1] / balance[-1]  # the unknown in terms of variables and inputs
+    solved = -balance[:-1] / balance[-1]
     full = table[:-1, :-1] + table[:-1, -1:] * solved
     return full[:n, :n], full[:n, n:], full[n:, :n], full[n:, n:]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pictures import draw
+from steadyslip.core.progress import interrupts_held, progress_bar
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Samples
@@ -18,6 +19,7 @@ from steadyslip.maps.plan.map import Map, evaluate
 Array = np.ndarray
 POINTS = 4096
 RESAMPLES = 200
+BLOCK = 32  # sets of points at a time, between which Ctrl-C takes effect
 LEAST, MOST = 64, 2**20
 WIDE = 0.2  # width of an interval from which on an index says little
 LEVEL = 0.95
@@ -42,6 +44,8 @@ class Sensitivity(ReadOnly):
         the rest.
     points : dict of str to int
         Sets of points used, each of d + 2 evaluations.
+    interrupted : bool
+        Whether Ctrl-C came before all sets were done.
     """
 
     rig: Slider = field(repr=False)
@@ -53,6 +57,7 @@ class Sensitivity(ReadOnly):
     total_interval: dict[str, Array] = field(repr=False)
     missing: dict[str, float]
     points: dict[str, int]
+    interrupted: bool = False
 
     def ranked(self, result: str) -> list[str]:
         """Parameters by falling total share."""
@@ -75,6 +80,8 @@ class Sensitivity(ReadOnly):
                 lines.append(
                     f"  does not exist at {100 * self.missing[result]:.3g} % of the points, which are left out"
                 )
+        if self.interrupted:
+            lines.append(f"  stopped: these are the shares by {max(self.points.values())} sets of points")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -108,6 +115,7 @@ def sensitivity(
     points: int = POINTS,
     seed: int = 0,
     protocol: Any = None,
+    progress: bool | None = None,
 ) -> Sensitivity:
     """Sobol indices of results over ranges of parameters.
 
@@ -124,6 +132,9 @@ def sensitivity(
     seed : int
     protocol : Protocol or piece, optional
         For measures that simulate.
+    progress : bool, optional
+        Whether to show a progress bar; on a terminal unless given. After Ctrl-C, indices are those of the sets that
+        are done, where these are enough (`Sensitivity.interrupted`).
 
     Returns
     -------
@@ -153,8 +164,10 @@ def sensitivity(
     if several:
         raise ParameterError([Problem("of", f"{name!r} is not one number a point") for name in several])
     sets = _sets(plan, points, seed)
-    with np.errstate(all="ignore"):
-        values = evaluate(plan.rig, plan.protocol, plan.compute, sets)  # (d + 2, points) each
+    values = _evaluated(plan, sets, progress)  # (d + 2, points) each
+    asked, points = points, next(iter(values.values())).shape[1]
+    if points < LEAST:
+        raise KeyboardInterrupt(f"after {points} of {asked} sets of points; {LEAST} would have been enough")
     generator = np.random.default_rng(seed)
     found: dict[str, dict[str, Any]] = {n: {} for n in ("first", "total", "low", "high", "missing", "points")}
     for output in outputs:
@@ -177,8 +190,27 @@ def sensitivity(
     ranges = {name: (low, high, spacing) for name, low, high, spacing in plan.sampling.ranges}  # type: ignore[union-attr]
     return Sensitivity(
         plan.rig, plan.varied, ranges, found["first"], found["total"], found["low"], found["high"], found["missing"],
-        found["points"],
+        found["points"], points < asked,
     )  # fmt: skip
+
+
+def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict[str, Array]:
+    """All results at all sets (d + 2, points), or at those that were done when Ctrl-C came."""
+    count = next(iter(sets.values())).shape[1]
+    parts: list[dict[str, Array]] = []
+    with (
+        progress_bar(count, progress, "sets of points") as advanced,
+        interrupts_held() as interrupted,
+        np.errstate(all="ignore"),
+    ):
+        for start in range(0, count, BLOCK):
+            part = {name: values[:, start : start + BLOCK] for name, values in sets.items()}
+            parts.append(evaluate(plan.rig, plan.protocol, plan.compute, part))
+            if advanced is not None:
+                advanced(min(BLOCK, count - start))
+            if interrupted:
+                break
+    return {name: np.concatenate([part[name] for part in parts], axis=1) for name in parts[0]}
 
 
 def _sets(plan: Map, points: int, seed: int) -> dict[str, Array]:

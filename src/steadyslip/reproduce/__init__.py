@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from steadyslip.core.errors import SteadyslipError
+from steadyslip.core.progress import progress_bar
 from steadyslip.figures import style
 from steadyslip.reproduce.drawings import FIGURES, PaperFigure
 from steadyslip.reproduce.numbers import PaperNumber, PaperTable, paper_table
@@ -32,13 +33,15 @@ class OutputError(SteadyslipError, OSError):
     """Results cannot be written where they were asked for."""
 
 
-def reproduce(folder: str | PathLike[str]) -> list[Path]:
+def reproduce(folder: str | PathLike[str], *, progress: bool | None = None) -> list[Path]:
     """Write the paper's figures and the table of its numbers.
 
     Parameters
     ----------
     folder : path
         Where to write; created if missing. Files of the same names are replaced.
+    progress : bool, optional
+        Whether to show a progress bar; on a terminal unless given. Ctrl-C leaves the files that are written.
 
     Returns
     -------
@@ -51,18 +54,24 @@ def reproduce(folder: str | PathLike[str]) -> list[Path]:
         If the folder cannot be created or written to.
     """
     folder = Path(folder)
-    table = paper_table()
+    written: list[Path] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        written = []
-        for figure in FIGURES:
-            written += style.write(figure.draw(style.unmanaged_axes()), folder / figure.name)
+        with progress_bar(len(FIGURES) + 1, progress, "figures and table") as advanced:
+            for figure in FIGURES:
+                written += style.write(figure.draw(style.unmanaged_axes()), folder / figure.name)
+                if advanced is not None:
+                    advanced(1)
+            table = paper_table()
         for path, text in (
             (folder / "paper-numbers.md", table.markdown()),
             (folder / "paper-numbers.csv", table.csv()),
         ):
             path.write_text(text, encoding="utf-8", newline="\n")
             written.append(path)
+    except KeyboardInterrupt:
+        names = ", ".join(path.name for path in written) or "none"
+        raise KeyboardInterrupt(f"these files are written: {names}") from None
     except OSError as error:
         raise OutputError(
             f"folder: got {str(folder)!r}, which cannot be written ({error.strerror or error}); "

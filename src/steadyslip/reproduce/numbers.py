@@ -11,6 +11,7 @@ import csv
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -111,6 +112,7 @@ _STIFFNESS = 29069767441.8604651  # Pa/m at −45 degrees
 _M_STAR = 0.01
 
 
+@lru_cache(maxsize=1)
 def paper_table() -> PaperTable:
     """The paper's numbers beside ours, with the relative difference of each."""
     rows = [

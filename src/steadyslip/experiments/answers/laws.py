@@ -27,10 +27,18 @@ class LawComparison:
         By label.
     criteria : dict of str to (float, float)
         AIC and BIC, with the same number of independent samples for all.
+    left_out : tuple of str
+        Models that were not fitted before Ctrl-C.
     """
 
     fits: dict[str, Fit]
     criteria: dict[str, tuple[float, float]]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C came before all were fitted."""
+        return bool(self.left_out)
 
     @property
     def best(self) -> str:
@@ -54,6 +62,8 @@ class LawComparison:
                 f"{label:<{wide}}  {len(one.space):>10}  {one.ssq:>14.6g}  {mine[0] - aic:>4.1f}  "
                 f"{mine[1] - bic:>5.1f}  {self.weights[label]:>6.3f}"
             )
+        if self.left_out:
+            lines.append(f"stopped before these were fitted: {'; '.join(self.left_out)}")
         return "\n".join(lines)
 
 
@@ -100,15 +110,22 @@ def compare_laws(
     laws : sequence of str
         ``slip``, ``aging`` or ``prz``, each also with ``, two states``.
     **options
-        As for `fit`.
+        As for `fit`. Ctrl-C compares the laws that have been fitted, where there are two or more.
 
     Raises
     ------
     ParameterError
         If a law is unknown or the rig has another kind of friction.
     """
-    fits = {label: fit(with_law(rig, label), records, **options) for label in laws}
-    return compare(fits)
+    fits: dict[str, Fit] = {}
+    rigs = {label: with_law(rig, label) for label in laws}
+    try:
+        for label, one in rigs.items():
+            fits[label] = fit(one, records, **options)
+    except KeyboardInterrupt:
+        if len(fits) < 2:
+            raise
+    return replace(compare(fits), left_out=tuple(label for label in rigs if label not in fits))
 
 
 def with_law(rig: Slider, label: str) -> Slider:

@@ -20,7 +20,8 @@ from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import model_values
-from steadyslip.nonlinear.kicks.brackets import threshold_map
+from steadyslip.nonlinear.kicks.brackets import threshold_brackets
+from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED
 
 Array = np.ndarray
 COUNT = 4000
@@ -53,6 +54,8 @@ class Prediction(ReadOnly):
     shares : dict of str to float
         Share of the spread of the critical stiffness (of the growth rate, where there is none) that goes away once a
         parameter, or b − a, is known exactly.
+    left_out : tuple of str
+        Kinds of kick that were not done when Ctrl-C came.
     """
 
     rig: Slider
@@ -64,6 +67,7 @@ class Prediction(ReadOnly):
     growth_rate: Array = field(repr=False)
     thresholds: dict[str, Array] = field(repr=False)
     shares: dict[str, float]
+    left_out: tuple[str, ...] = ()
 
     @property
     def probability_stable(self) -> float:
@@ -97,6 +101,8 @@ class Prediction(ReadOnly):
             lines.append(f"{kick + ' kick':<24}" + _kick_range(sizes))
             if doubt := self.undecided[kick]:
                 lines.append(f"{'':<24}undecided in {percent(doubt)} of the draws")
+        if self.left_out:
+            lines.append(f"stopped                 before the kicks were done: {', '.join(self.left_out)}")
         if self.shares:
             found = ", ".join(f"{name} {share:.0%}" for name, share in self.shares.items() if share >= 0.005)
             lines.append(f"spread comes from       {found}")
@@ -215,10 +221,16 @@ def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tupl
             for number in (critical_stiffness, safety_factor, growth_rate)
         )
     few = {name: values[:KICKED] for name, values in vary.items()}
-    thresholds = {kick: np.asarray(threshold_map(target, few, kick, precision=1e-3, progress=False)) for kick in kicks}
+    thresholds: dict[str, Array] = {}
+    for kick in kicks:
+        found, _, _ = threshold_brackets(target, few, kick, precision=1e-3)
+        if np.any(found.beyond == INTERRUPTED):
+            break
+        thresholds[kick] = found.size
+    left_out = tuple(kick for kick in kicks if kick not in thresholds)
     exists = (states != ABSENT) & (states != UNKNOWN)
     shares = _shares(vary | _difference(target, vary), critical, growth)
-    return Prediction(target, draws, states == STABLE, exists, critical, safety, growth, thresholds, shares)
+    return Prediction(target, draws, states == STABLE, exists, critical, safety, growth, thresholds, shares, left_out)
 
 
 def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:

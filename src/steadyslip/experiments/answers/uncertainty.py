@@ -9,10 +9,11 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.pictures import draw
+from steadyslip.core.progress import progress_bar
 from steadyslip.core.quantities import shown, shown_error, shown_range
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
 Array = np.ndarray
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
@@ -34,12 +35,15 @@ class Draws(ReadOnly):
         SI units, by name.
     details : dict of str to float
         How they came about: block length and share of refits that converged, or acceptance and autocorrelation time.
+    interrupted : bool
+        Whether Ctrl-C came before all that were asked for.
     """
 
     fit: Fit
     kind: str
     values: dict[str, Array] = field(repr=False)
     details: dict[str, float]
+    interrupted: bool = False
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -58,7 +62,8 @@ class Draws(ReadOnly):
 
     def __str__(self) -> str:
         details = ", ".join(f"{name} {value:.4g}" for name, value in self.details.items())
-        lines = [f"{len(self)} draws, {self.kind} ({details})"]
+        stopped = ", stopped before all were done" if self.interrupted else ""
+        lines = [f"{len(self)} draws, {self.kind} ({details}){stopped}"]
         for one in self.fit.estimates:
             low, high = self.interval(one.name)
             middle = shown_error(float(np.mean(self[one.name])), self.error(one.name), one.unit)
@@ -86,14 +91,14 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     return _draws(fit, "normal", np.clip(z, fit.space.low, fit.space.high), {"seed": float(seed)})
 
 
-def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float]) -> Draws:
+def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float], interrupted: bool = False) -> Draws:
     values = fit.space.values(z)
-    return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details)
+    return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details, interrupted)
 
 
 def bootstrap(
     fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
-    threads: int | None = None,
+    threads: int | None = None, progress: bool | None = None,
 ) -> Draws:  # fmt: skip
     """Refit the model plus resampled residuals, many times, each from the fit's own minimum.
 
@@ -109,6 +114,9 @@ def bootstrap(
         Samples in a block; three times as many as are worth one independent sample unless given.
     seed : int
     threads : int, optional
+    progress : bool, optional
+        Whether to show a progress bar; on a terminal unless given. Ctrl-C returns the refits that are done
+        (`Draws.interrupted`), where there are any.
 
     Returns
     -------
@@ -121,22 +129,32 @@ def bootstrap(
     generator = np.random.default_rng(seed)
     comparison = fit.plan.comparison(threads)
     lengths = [_block(fit, i, kind, block) for i in range(len(comparison.parts))]
-    ends, converged = [], []
-    for start in range(0, count, TOGETHER):
-        many = min(TOGETHER, count - start)
+    ends, converged, done = [], [], 0
+
+    def refitted(many: int) -> Minima:
         data = np.empty((many, comparison.size))
         for i, where in enumerate(comparison.slices):
             r = fit.residuals[where]
             centred = (r - r.mean()) * np.sqrt(fit.samples / max(fit.degrees, 1))
             data[:, where] = fit.model[where] + _resampled(centred, lengths[i], many, generator)
-        found = minimise(
-            lambda z, lanes, d=data: comparison.residuals(z, d[lanes]),  # type: ignore[misc]
-            np.tile(fit.coordinates, (many, 1)), fit.bounds[0], fit.bounds[1], most=30, tolerance=WARM,
-        )  # fmt: skip
-        ends.append(found.coordinates[np.isfinite(found.ssq)])
-        converged.append(found.converged)
-    share = float(np.mean(np.concatenate(converged)))
-    return _draws(fit, "bootstrap", np.concatenate(ends), {"block": float(max(lengths)), "converged": share})
+        start = np.tile(fit.coordinates, (many, 1))
+        return minimise(lambda z, lanes: comparison.residuals(z, data[lanes]), start, *fit.bounds, most=30,
+                        tolerance=WARM)  # fmt: skip
+
+    with progress_bar(count, progress, "refits") as advanced:
+        try:
+            while done < count:
+                found = refitted(min(TOGETHER, count - done))
+                ends.append(found.coordinates[np.isfinite(found.ssq)])
+                converged.append(found.converged)
+                done += len(found.ssq)
+                if advanced is not None:
+                    advanced(len(found.ssq))
+        except KeyboardInterrupt:
+            if sum(map(len, ends)) < 2:
+                raise KeyboardInterrupt("before the first refits were done") from None
+    details = {"block": float(max(lengths)), "converged": float(np.mean(np.concatenate(converged)))}
+    return _draws(fit, "bootstrap", np.concatenate(ends), details, done < count)
 
 
 def _block(fit: Fit, record: int, kind: str, block: int | None) -> int:

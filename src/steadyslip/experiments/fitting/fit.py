@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,6 +28,9 @@ ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
 
+Told = Callable[[str, int, float], None]
+"""What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
+
 ERRORS = ("auto", "correlated", "independent")
 
 
@@ -49,6 +52,7 @@ def fit(
     errors: str = "auto",
     starts: int = STARTS,
     threads: int | None = None,
+    progress: Told | None = None,
 ) -> Fit:
     """Fit a rig to one or several records of experiments.
 
@@ -96,6 +100,9 @@ def fit(
         Points to start from.
     threads : int, optional
         All cores unless given.
+    progress : callable, optional
+        Called with what is being done, the number of starts tried and the root mean square of the residuals reached.
+        There is no fit before the search has ended: Ctrl-C (or KeyboardInterrupt from here) ends without one.
 
     Returns
     -------
@@ -117,14 +124,16 @@ def fit(
     if not (isinstance(starts, int) and starts >= 1):
         raise ParameterError([Problem("starts", f"got {starts!r}; allowed: a whole number >= 1")])
     if plan.loss != "linear" and plan.width is None:
-        first, _, _ = _searched(replace(plan, loss="linear"), starts, threads)
+        first, _, _ = _searched(replace(plan, loss="linear"), starts, threads, progress)
         comparison = replace(plan, loss="linear").comparison(threads)
         plan = check_width(plan, comparison.residuals(first.coordinates[:1])[0][0])
-    found, search, bounds = _searched(plan, starts, threads)
+    found, search, bounds = _searched(plan, starts, threads, progress)
     return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
 
 
-def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
+def _searched(
+    plan: Plan, starts: int, threads: int | None, progress: Told | None
+) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
     """The best minimum: from several starts on few samples, the best of those on all.
 
     A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
@@ -134,17 +143,27 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
     quick = replace(_thinned(plan), rtol=1e-5).comparison(threads)
     low, high = search_bounds(whole.parts, space)
     rough = Minima(np.empty((0, len(space))), np.empty(0), np.empty(0, dtype=bool), np.empty(0, dtype=int))
+
+    def told(what: str, among: Comparison) -> Callable[[Minima], None]:
+        def tell(ends: Minima) -> None:
+            if progress is not None:
+                tried, least = len(rough.ssq), float(np.min(ends.ssq, initial=np.inf))
+                progress(what, tried, float(np.sqrt(least / among.size)))
+
+        return tell
+
     for upto in (-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts):
         begin = starting_points(whole.parts, space, upto - len(rough.ssq), len(rough.ssq))
         rough = rough + minimise(
-            lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH
-        )
+            lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH,
+            told=told("searching", quick),
+        )  # fmt: skip
         if not np.any(np.isfinite(rough.ssq)):
             continue
         arrived = int(np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)))
         if arrived < ENOUGH or (upto < starts and arrived < upto / 3):
             continue
-        found = _polished(whole, rough, low, high)
+        found = _polished(whole, rough, low, high, told("refining", whole))
         if upto >= starts or not _leaves_structure(whole, found.coordinates[0]):
             break
     else:
@@ -152,7 +171,7 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
             raise NotAvailable(
                 "the model cannot follow these records from any start; are law and drive those of the experiment?"
             )
-        found = _polished(whole, rough, low, high)
+        found = _polished(whole, rough, low, high, told("refining", whole))
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     worse = np.concatenate([found.ssq / found.ssq[0], rough.ssq[rough.converged] / np.min(rough.ssq)])
@@ -162,13 +181,13 @@ def _searched(plan: Plan, starts: int, threads: int | None) -> tuple[Minima, Sea
     return found, search, (low, high)
 
 
-def _polished(whole: Comparison, rough: Minima, low: Array, high: Array) -> Minima:
+def _polished(whole: Comparison, rough: Minima, low: Array, high: Array, told: Callable[[Minima], None]) -> Minima:
     """The best of rough minima brought to their end, the best first."""
     chosen = _distinct(rough, FINALISTS)
-    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1)
+    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1, told=told)
     begin = _released(whole.space, found.coordinates[int(np.argmin(found.ssq))], low, high)
     if len(begin):
-        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=300)
+        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=300, told=told)
     order = np.argsort(found.ssq, kind="stable")
     return Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
 

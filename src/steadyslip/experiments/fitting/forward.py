@@ -187,8 +187,8 @@ class Forward:
 
         if len(found) <= LANES:
             work(0, len(found), threading.Event())
-        else:
-            run_many(work, len(found), self.threads, LANES, lanes=LANES)
+        elif not run_many(work, len(found), self.threads, LANES, lanes=LANES):
+            raise KeyboardInterrupt  # half of the runs would pass for runs that failed
         if found is not seen:
             seen[good] = found
         return seen

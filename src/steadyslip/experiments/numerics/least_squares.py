@@ -51,7 +51,7 @@ class Minima:
 
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
-    tolerance: float = CONVERGED, race: int = 0,
+    tolerance: float = CONVERGED, race: int = 0, told: Callable[[Minima], None] | None = None,
 ) -> Minima:  # fmt: skip
     """Minimise the sum of squares of every problem.
 
@@ -70,6 +70,8 @@ def minimise(
     race : int
         All problems are one, from several starts: once so many are done at the best place, those that promise no
         better stop too. Zero: they are not.
+    told : callable, optional
+        Called after every iteration with what is known by then.
     """
     count, size = start.shape
     z = np.clip(start, low, high)
@@ -121,6 +123,8 @@ def minimise(
         found.coordinates[better], found.ssq[better] = trial[good], after[good]
         found.iterations[active] = iteration
         normal[good], gradient[good] = new_normal[good], new_gradient[good]
+        if told is not None:
+            told(found)
     return found
 
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.progress import interrupts_held
 from steadyslip.maps.work.chunk import Done, Job, do_chunk, keep_memory
 
 PATIENCE = 8  # times that workers may die without a single chunk being finished in between
@@ -21,26 +22,12 @@ WATCH = 0.5  # seconds between a worker's looks at whether its driver lives
 
 def run_here(job: Job, chunks: Sequence[int], report: Callable[[Done], None]) -> None:
     """All chunks, one after the other, in this process; Ctrl-C takes effect between them."""
-    with _interrupts_held() as interrupted:
+    with interrupts_held() as interrupted:
         for number in chunks:
             done = do_chunk(job, number)
             report(done)
             if interrupted:
                 raise KeyboardInterrupt
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[list[int]]:
-    """Collect Ctrl-C instead of raising: a simulation that sees it would hand back half its runs."""
-    received: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield received
-        return
-    before = signal.signal(signal.SIGINT, lambda number, _: received.append(number))
-    try:
-        yield received
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def run_local(job: Job, chunks: Sequence[int], report: Callable[[Done], None], workers: int) -> None:

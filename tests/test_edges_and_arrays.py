@@ -136,3 +136,10 @@ def test_bad_arrays_are_all_reported():
         ss.critical_stiffness(rig(), {"axial_stiffness": [1e9]})
     with pytest.raises(ss.ParameterError, match="do not broadcast"):
         ss.critical_stiffness(rig(), {"a": [0.01, 0.02], "b": [1, 2, 3]})
+
+
+def test_matrices_that_overflow_are_not_available():
+    """Not infinities, and no warning of NumPy's."""
+    small = rig(friction=rate_state(a=1e-300), mass=0.0, radiation_damping=0.0, damping=0.0)
+    with pytest.raises(ss.NotAvailable, match="floating point"):
+        ss.state_space(small.with_values({"contact.preload": 1e-10, "stiffness": 1e300}))

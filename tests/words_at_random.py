@@ -88,8 +88,8 @@ def fate(rig):
         if np.isinf(ss.growth_rate(rig)):
             return "ill-posed"
         found = eigenvalues_of(rig)
-    except NotAvailable:
-        return "ill-posed"
+    except NotAvailable as error:
+        return "undecided" if "floating point" in str(error) else "ill-posed"
     if found is None or np.all(np.isnan(rates)):
         return "absent"
     if abs(found.real.max()) < 1e-11 * np.abs(found).max():  # less than this route can tell beside fast eigenvalues
@@ -254,6 +254,8 @@ def scan(count, seed=0):
         except NotAvailable as error:
             print(i, "not available:", error)
             continue
+        except Exception as error:  # a traceback is a finding like any other, and the scan goes on
+            found = [f"{type(error).__name__}: {error}"]
         if found:
             bad += 1
             print(i, found, flush=True)

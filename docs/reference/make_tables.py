@@ -149,12 +149,12 @@ GROUPS = {
     "protocol": "Protocols of experiments",
     "core.records": "To declare a law of your own",
     "machine.slider": "The rig",
-    "steady": "Steady sliding",
+    "model.steady": "Steady sliding",
     "maps": "Maps",
 }
 ORDER = (
     *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
-    *("verdict", "steady", "linear", "model", "core.records"),
+    *("verdict", "model.steady", "linear", "model", "core.records"),
     *("core.errors", "experiments", "motion", "nonlinear", "maps"),
 )
 MODULES = {

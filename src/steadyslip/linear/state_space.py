@@ -55,9 +55,8 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, 
         raise explain_absence(rig, values)
     names = tuple(outputs)
     with np.errstate(all="ignore"):
-        found = _solved(
-            _matrix_function(model, names)(*values.arguments, stresses[0]), len(model.variables), len(names)
-        )
+        blocks = _matrix_function(model, names)(*values.arguments, stresses[0])
+        found = _solved(blocks, len(model.variables), len(names))
     if not all(np.all(np.isfinite(block)) for block in found):
         raise NotAvailable(OUT_OF_RANGE)
     return found

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -27,22 +28,44 @@ LAWS = ("aging", "slip", "prz", "nagata", "two states", "lugre")
 
 
 def random_rig(index: int, seed: int) -> tuple[str, ss.Slider]:
-    """A rig and what it is."""
+    """A rig with an oscillatory edge along the stiffness, and what it is."""
     rng = np.random.default_rng([seed, index])
     kinds = [(law, m, c) for law in LAWS for m in ("damping", "mass") for c in ("constant", "inclined")]
-    kinds = [kind for kind in kinds if kind[0] != "lugre" or kind[1:] == ("mass", "constant")]
     law, inertia, contact = kinds[index % len(kinds)]
+    while True:
+        rig = (lugre if law == "lugre" else rate_state)(rng, law, inertia, contact)
+        with suppress(ss.NotAvailable):
+            ss.hopf(rig)
+            return f"{law}, {inertia}, {contact}", rig
+
+
+def lugre(rng: np.random.Generator, law: str, inertia: str, contact: str) -> ss.Slider:
+    """Bristles of every damping, at speeds around that of Stribeck."""
+    sigma, static, v_stribeck = 10 ** rng.uniform(6, 7.5), rng.uniform(0.15, 0.5), 10 ** rng.uniform(-3.5, -2.5)
+    friction = ss.LuGre(
+        mu_coulomb=static * rng.uniform(0.5, 0.9), mu_static=static, v_stribeck=v_stribeck,
+        bristle_stiffness=10 ** rng.uniform(4, 5.5), bristle_damping=10 ** rng.uniform(0.5, 2),
+        viscous=10 ** rng.uniform(-1, 1),
+    )  # fmt: skip
+    v0 = v_stribeck * 10 ** rng.uniform(-0.5, 0.3)
+    still = {"mass": 10 ** rng.uniform(2.5, 4)}
+    if inertia == "damping":
+        still = {"radiation_damping": 10 ** rng.uniform(-6, -3) * sigma / v0}
+    return ss.Slider(
+        friction=friction, contact=pressed(rng, sigma, contact), stiffness=1e10, drive=ss.Steady(v0), **still
+    )
+
+
+def pressed(rng: np.random.Generator, sigma: float, contact: str) -> object:
+    """A contact of either kind."""
+    if contact == "inclined":
+        return ss.InclinedSpring(preload=sigma, angle=rng.uniform(-0.6, 0.6))
+    return ss.Constant(preload=sigma)
+
+
+def rate_state(rng: np.random.Generator, law: str, inertia: str, contact: str) -> ss.Slider:
+    """Rate-and-state friction."""
     sigma, v0 = 10 ** rng.uniform(6, 7.5), 10 ** rng.uniform(-7, -5)
-    if law == "lugre":
-        static = rng.uniform(0.15, 0.5)
-        friction = ss.LuGre(
-            mu_coulomb=static * rng.uniform(0.5, 0.9), mu_static=static, v_stribeck=1e-3,
-            bristle_stiffness=10 ** rng.uniform(4.5, 5.5), bristle_damping=10 ** rng.uniform(1, 2), viscous=5.0,
-        )  # fmt: skip
-        drive = 10 ** rng.uniform(-3.5, -2.9)
-        rig = ss.Slider(friction=friction, contact=ss.Constant(preload=sigma), stiffness=1e10, mass=3e3,
-                        drive=ss.Steady(drive))  # fmt: skip
-        return law, rig
     a, lam, d_c = rng.uniform(0.005, 0.02), rng.uniform(0.1, 2.0), 10 ** rng.uniform(-6, -4.5)
     b = a * (1 + lam)
     more: dict[str, object] = {"b": b, "d_c": d_c}
@@ -54,9 +77,7 @@ def random_rig(index: int, seed: int) -> tuple[str, ss.Slider]:
                  "nagata": ss.Nagata(c_nagata=rng.uniform(0.1, 1.0))}[law]  # fmt: skip
     memory = ss.LinkerDieterich(alpha=rng.uniform(0.1, 0.5)) if contact == "inclined" else ss.NoMemory()
     friction = ss.RateState(a=a, mu_ref=0.6, v_ref=v0, evolution=evolution, normal_memory=memory, **more)
-    press = ss.Constant(preload=sigma)
-    if contact == "inclined":
-        press = ss.InclinedSpring(preload=sigma, angle=rng.uniform(-0.6, 0.6))
+    press = pressed(rng, sigma, contact)
     size = 10 ** rng.uniform(-6, -1)
     still = (
         {"radiation_damping": size * a * sigma / v0}
@@ -64,9 +85,7 @@ def random_rig(index: int, seed: int) -> tuple[str, ss.Slider]:
         else {"mass": size * a * sigma * d_c / v0**2}
     )
     stiffness = 0.8 * b * lam / (1 + lam) * sigma / d_c
-    return f"{law}, {inertia}, {contact}", ss.Slider(
-        friction=friction, contact=press, stiffness=stiffness, drive=ss.Steady(v0), **still
-    )
+    return ss.Slider(friction=friction, contact=press, stiffness=stiffness, drive=ss.Steady(v0), **still)
 
 
 def aging_rig(index: int) -> tuple[str, ss.Slider]:

@@ -194,6 +194,20 @@ def test_ringing_while_the_block_sticks_is_no_cycle():
     assert outcomes(a_rig, "displacement", [5.0, 20.0, 39.1, 60.0, 150.0]) == ["returns"] * 5
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_block_may_be_stopped_beyond_floating_point(direction):
+    """Friction follows ln v to -65 000 e-folds while the spring is taken up again: no kick is too large to be told."""
+    a_rig = heavy(ss.Slip(), 1.3, 1e10)
+    found = ss.threshold(a_rig, "displacement", direction=direction)
+    assert (found.size, found.searched, found.decided) == (np.inf, 1e5, True)
+    lengths = 2000.0
+    step = ss.DisplacementStep(at=0.0, by=direction * lengths * 1e-6)
+    run = ss.simulate(a_rig, step, until=2 * lengths, times=[30.0, 0.9 * lengths, 2 * lengths], rtol=1e-8)
+    assert run["v"][:2] == pytest.approx(0.0, abs=1e-30)
+    assert np.diff(run["x"][:2]) == pytest.approx(1e-6 * (30.0 - 0.9 * lengths))  # the load point alone moves
+    assert run["v"][2] == pytest.approx(1e-6, rel=1e-6)
+
+
 def test_peaks_that_shrink_towards_a_cycle_are_no_return():
     a_rig = heavy(ss.Aging(), 0.5, 2.5e9)
     assert outcomes(a_rig, "displacement", [1.0, 50.0, 90.8, 120.0]) == ["oscillation"] * 4

@@ -48,6 +48,13 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]  # SymPy's printers are unty
     def _print_asinh_exp(self, expr: sp.Expr) -> str:
         return f"asinh_exp({', '.join(self._print(a) for a in expr.args)})"
 
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:  # noqa: N802
+        """`numpy.where` takes numbers and arrays alike; `numpy.select`, which SymPy writes, arrays only."""
+        where, text = self._module_format("numpy.where"), str(self._module_format("numpy.nan"))
+        for branch, condition in reversed(expr.args):
+            text = f"{where}({self._print(condition)}, {self._print(branch)}, {text})"
+        return text
+
 
 def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Callable[..., list[Any]]:
     """A function of the arguments' values that returns the values of all expressions.

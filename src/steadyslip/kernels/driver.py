@@ -17,6 +17,7 @@ import numpy as np
 
 from steadyslip.kernels.layout import (
     INPUTS,
+    MOST_FAILURES,
     Array,
     Cursor,
     Final,
@@ -168,8 +169,6 @@ def start_job(
     R[Row.RECORD] = own[Setting.RECORD]
     R[Row.Z] = own[Setting.GUESS]
     R[Row.Z_SCALE] = own[Setting.Z_SCALE]
-    R[Row.SETTLED] = own[Setting.SETTLED]
-    R[Row.SAME] = own[Setting.SAME]
     R[Row.V_DRIVE] = own[Setting.V_DRIVE]
     R[Row.H] = own[Setting.FIRST_STEP]
     for i in range(layout.size):
@@ -382,7 +381,7 @@ def note(R: Array, layout: Layout, kind: int, tau: float, y: Array, log: Array, 
         size = math.log(abs(v / y[n + Out.V_LP])) if y[n + Out.V_LP] != 0.0 else math.inf
         if R[Row.VELOCITY_PEAKS] > 0.0:
             R[Row.PEAK_PERIOD] = time - R[Row.LAST_PEAK_TIME]
-            decide(R, size)
+            R[Row.PEAK_GROWTH] = abs(size) - abs(R[Row.PEAK_SIZE])
         R[Row.PEAK_SIZE] = size
         R[Row.VELOCITY_PEAKS] += 1.0
         R[Row.LAST_PEAK_TIME] = time
@@ -393,16 +392,6 @@ def note(R: Array, layout: Layout, kind: int, tau: float, y: Array, log: Array, 
         R[Row.LOWEST_VELOCITY] = min(R[Row.LOWEST_VELOCITY], v)
         if not is_event and v < R[Row.NOW_FROM] < math.inf:  # what came before was no event
             outrun(R, layout, v, tau, y)
-
-
-def decide(R: Array, now: float) -> None:
-    """Compare a peak with the last one; where asked for, end a run if both are small, or the same."""
-    before = R[Row.PEAK_SIZE]
-    R[Row.PEAK_GROWTH] = abs(now) - abs(before)
-    if abs(before) < R[Row.SETTLED] and abs(now) < R[Row.SETTLED]:
-        R[Row.DECIDED] = Status.SETTLED
-    elif abs(now - before) < R[Row.SAME] * (1e-3 + abs(now)):
-        R[Row.DECIDED] = Status.PERIODIC
 
 
 def await_sample(R: Array, times: Array) -> None:
@@ -482,13 +471,11 @@ def go_on(
             record(R, layout, cursor, recorded)
         if lost:
             return Status.CONTACT_LOST
-        if R[Row.DECIDED] > 0.0:
-            return int(R[Row.DECIDED])
     if abs(R[Row.V]) >= R[Row.V_HIGH]:
         return Status.BLOW_UP
     if R[Row.SIGMA] <= R[Row.SIGMA_LOW]:
         return Status.CONTACT_LOST
-    if R[Row.FAILURES] >= 40.0:
+    if R[Row.FAILURES] >= MOST_FAILURES:
         return Status.STUCK
     if R[Row.ACCEPTED] + R[Row.REJECTED] >= R[Row.MOST]:
         return Status.TOO_MANY_STEPS

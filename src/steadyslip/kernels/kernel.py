@@ -13,7 +13,7 @@ from functools import cached_property
 
 import sympy as sp
 
-from steadyslip.kernels.layout import Layout, Out, Row, make_layout
+from steadyslip.kernels.layout import MOST_FAILURES, Layout, Out, Row, make_layout
 from steadyslip.kernels.methods import METHODS, Method
 from steadyslip.kernels.nodes import Loop, Node, Program, Value, exp, larger, log, primitive, select, smaller, weighted
 from steadyslip.kernels.rosenbrock import Pattern, factorised, substituted
@@ -478,7 +478,7 @@ class Step(Record):
         reasons = [
             moved >= self.end,
             accepted + rejected >= load(Row.MOST),
-            failures >= 40.0,
+            failures >= MOST_FAILURES,
             abs(v) >= load(Row.V_HIGH),
             sigma <= load(Row.SIGMA_LOW),
             moved > load(Row.NEXT),

@@ -36,27 +36,27 @@ class Row(IntEnum):
     MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 25, 26, 27, 28, 29, 30
     NEXT = 31
     """How far into the segment the next sample is."""
-    SETTLED, SAME = 32, 33
-    SLIPPING, RESTING = 34, 35
-    DONE, TAU_OLD = 36, 37
+    SLIPPING, RESTING = 32, 33
+    DONE, TAU_OLD = 34, 35
     """Length of the last step and where it began."""
-    V_OLD, ACCELERATION_OLD, SIGMA_OLD = 38, 39, 40
+    V_OLD, ACCELERATION_OLD, SIGMA_OLD = 36, 37, 38
     # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
-    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 41, 42, 43
-    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 44, 45, 46, 47, 48, 49
-    ARRESTS, VELOCITY_PEAKS, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 50, 51, 52, 53, 54
-    NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, DECIDED, ANY_BEGIN = (
-        55, 56, 57, 58, 59, 60, 61, 62, 63,
-    )  # fmt: skip
-    STOP = 64
+    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 39, 40, 41
+    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 42, 43, 44, 45, 46, 47
+    ARRESTS, VELOCITY_PEAKS, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 48, 49, 50, 51, 52
+    NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, ANY_BEGIN = 53, 54, 55, 56, 57, 58, 59, 60
+    STOP = 61
     """End of the segment since the start of the run."""
-    NOW_FROM, NOW_EVENT, NOW_V, NOW_SIGMA, NOW_TAU, NOW_SEGMENT = 65, 66, 67, 68, 69, 70
-    V_DRIVE = 71
+    NOW_FROM, NOW_EVENT, NOW_V, NOW_SIGMA, NOW_TAU, NOW_SEGMENT = 62, 63, 64, 65, 66, 67
+    V_DRIVE = 68
 
 
 TALLY = tuple(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH)
 """Columns of the tally of events, a result."""
 INPUTS = 3
+MOST_FAILURES = 400.0
+"""Steps in a row that may be refused. A block with mass that is stopped falls by hundreds of decades in a moment: so
+much shorter may the step have to be than the one before."""
 
 
 class Out(IntEnum):
@@ -69,7 +69,7 @@ class Setting(IntEnum):
     """Columns of the settings of a trajectory; absolute tolerances of the state follow."""
 
     RTOL, MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 0, 1, 2, 3, 4, 5, 6
-    GUESS, Z_SCALE, FIRST_STEP, SETTLED, SAME, V_DRIVE, ATOL = 7, 8, 9, 10, 11, 12, 13
+    GUESS, Z_SCALE, FIRST_STEP, V_DRIVE, ATOL = 7, 8, 9, 10, 11
 
 
 SETTINGS = tuple(setting.name.lower() for setting in Setting if setting < Setting.ATOL)
@@ -85,7 +85,6 @@ class Status(IntEnum):
     """How a trajectory ended."""
 
     RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
-    SETTLED, PERIODIC = 7, 8
 
 
 class Kind(IntEnum):

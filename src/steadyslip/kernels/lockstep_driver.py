@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, call
+from steadyslip.kernels.layout import INPUTS, MOST_FAILURES, Array, Layout, Routines, Row, call
 
 RTOL, GUESS, SCALE, MOST, ATOL = 0, 1, 2, 3, 4
 """Columns of the settings: error per step, guess of the unknown and its scale, limit of steps, absolute tolerances."""
@@ -83,7 +83,7 @@ def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
         for lane in range(W):
             if S[Row.TAU * W + lane] < S[Row.END * W + lane]:
                 steps = S[Row.ACCEPTED * W + lane] + S[Row.REJECTED * W + lane]
-                dead = S[Row.ACTIVE * W + lane] == 0.0 or S[Row.FAILURES * W + lane] >= 40.0
+                dead = S[Row.ACTIVE * W + lane] == 0.0 or S[Row.FAILURES * W + lane] >= MOST_FAILURES
                 if dead or steps >= S[Row.MOST * W + lane]:
                     S[Row.ACTIVE * W + lane] = 0.0
                     S[Row.TAU * W + lane] = S[Row.END * W + lane]

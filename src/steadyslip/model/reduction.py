@@ -26,6 +26,8 @@ from steadyslip.model import Model
 Row = dict[sp.Symbol, sp.Expr]
 CREEP_SHARE = 1e-6
 """Coulomb friction is a step at rest; the kernels creep below this share of the drive velocity instead."""
+STANDSTILL = -500
+"""Of ln(v/v0): a block with mass slower than this keeps still to every purpose, and 1/v stays a number there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,12 +281,23 @@ def _inertial(model: Model, eq: _Equations) -> Reduction:
     rates = {eq.x: written(eq.rates[eq.x]), W: push / sp.diff(eq.of_w, W), **memory_rates}
     if eq.integral is not None:
         rates[eq.integral] = eq.rates[eq.integral]
+    if eq.velocity == "logarithm":
+        rates = {symbol: _kept_moving(rate) for symbol, rate in rates.items()}
     outputs = _outputs(eq, written, written(eq.acceleration))
     return Reduction(
         model, "explicit" if unknown is None else "implicit", eq.velocity, state, _names(eq, state),
         state, tuple(rates[s] for s in state), unknown, None if unknown is None else residual, None,
         state, outputs, eq.w_of_v,
     )  # fmt: skip
+
+
+def _kept_moving(rate: sp.Expr) -> sp.Expr:
+    """A rate in which the velocity falls no further than to `STANDSTILL`, while friction goes on with ln v.
+
+    Whoever pulls the block back far below its strength would else divide by a velocity beneath floating point.
+    """
+    least = sp.Piecewise((W, W > STANDSTILL), (sp.Integer(STANDSTILL), True))
+    return rate.replace(lambda e: isinstance(e, sp.exp) and e.has(W), lambda e: e.xreplace({W: least}))
 
 
 def _outputs(eq: _Equations, written: object, acceleration: sp.Expr) -> dict[str, sp.Expr]:

@@ -31,7 +31,7 @@ from steadyslip.motion.single import checked_times
 from steadyslip.motion.status import WORDS
 from steadyslip.protocol import Protocol
 
-REACHED_END = tuple(STATUSES.index(word) for word in ("done", "settled", "periodic"))
+DONE = STATUSES.index("done")
 EVENT_UNITS = dict(
     zip(TALLY, ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "1", "s", "s", "1"), strict=True)
 )
@@ -312,7 +312,7 @@ class _Store:
 
     def _leaves_range(self, rows: np.ndarray, time: np.ndarray, bad: np.ndarray) -> None:
         """Runs that reached their end, but with numbers that are none at some time."""
-        bad &= np.isin(self.code[rows], (*REACHED_END, OUT_OF_RANGE))
+        bad &= np.isin(self.code[rows], (DONE, OUT_OF_RANGE))
         self.code[rows[bad]] = OUT_OF_RANGE
         np.minimum.at(self.end, rows[bad], time[bad])
 

@@ -43,17 +43,12 @@ class Options:
         Limit of steps.
     arrest : float
         Share of the drive velocity below which the block counts as arrested.
-    settled, same : float
-        Where events are watched: end a run when ln(peak velocity/drive) of two peaks is below `settled`, or when it
-        changes by less than a share `same` from one peak to the next. Zero: never.
     """
 
     method: str = "auto"
     rtol: float = 1e-7
     most_steps: int = 10_000_000
     arrest: float = 1e-3
-    settled: float = 0.0
-    same: float = 0.0
 
     def __post_init__(self) -> None:
         problems = []
@@ -135,8 +130,6 @@ class Jobs:
                 "guess": _guess(self.reduction, arguments, sigma, initial, velocity),
                 "z_scale": unknown,
                 "first_step": scales["x"] / drive,
-                "settled": self.options.settled,
-                "same": self.options.same,
                 "v_drive": drive,
             },
             rtol * np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[n]) for n in self.reduction.names))),

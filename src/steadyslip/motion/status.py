@@ -17,8 +17,6 @@ REMEDIES = {
     "give the slider mass or damping, or check the contact law",
     "no velocity": "no velocity balances the forces after a jump of the inputs (or at the start); make the jump "
     "smaller, or give the slider a mass",
-    "settled": "",
-    "periodic": "",
     "interrupted": "stopped by the user; run it again for the rest",
     "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off); see steadyslip.steady_state",
     "ill-posed": "without mass, friction falls at once when the block speeds up (or the normal stress answers too "

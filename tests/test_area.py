@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
+import lab_records as lab
 import steadyslip as ss
 from steadyslip.core.quantities import outside, shown, shown_range
 from steadyslip.maps import Map, run_map
@@ -96,6 +97,64 @@ def test_a_run(rig, tmp_path):
 def test_thresholds(rig):
     kick = Threshold(rig, "normal-stress", 1, 0.5, (0.4, 0.6), 2e6, "Pa", "oscillation", 1.0)
     assert "20 kN" in str(kick)
+    assert (kick.to_dict()["total"], kick.to_dict()["total_unit"]) == (2e4, "N")
+    assert "total" not in Threshold(rig, "velocity", 1, 0.5, (0.4, 0.6), 2e-6, "m/s", "blow-up", 1.0).to_dict()
+
+
+def test_edges_and_onsets(rig):
+    for name in ("slider.stiffness", "contact.preload"):
+        edges = ss.boundary(rig, name)
+        assert edges
+        for edge in edges:
+            assert not PER_AREA.search(str(edge))
+            assert PER_AREA.search(str(replace(edge, area=None)))
+    data = ss.analyze(rig).to_dict()["onset"]
+    assert data["total"] == pytest.approx(data["value"] * AREA)
+    assert data["total_unit"] == "N/m"
+
+
+def test_cycles(rig):
+    stick_slip = replace(ss.read_rig(EXAMPLE.parent / "stick-slip.toml"), area=AREA)
+    branch = ss.cycles(stick_slip, doublings=0, most_points=12)
+    assert not PER_AREA.search(str(branch))
+    data = branch.to_dict()
+    for row in (*data["cycles"], *data["special"]):
+        assert row["forces"]["area"] == AREA
+        for name, value in row["forces"]["values"].items():
+            assert value == pytest.approx(row[name] * AREA)
+        assert row["forces"]["units"]["stress_drop"] == "N"
+        assert row["forces"]["units"]["value"] == "N/m"
+    assert data["onset"]["total_unit"] == "N/m"
+    assert not PER_AREA.search(words_of(branch.plot()))
+
+
+def test_fits_and_predictions(rig):
+    """Estimates, draws, profiles and predictions of a rig with an area, in words, JSON and figures."""
+    found = ss.fit(replace(ss.lab_rig(), area=AREA), lab.record(lab.rig(), lab.STEP, 0))
+    plain = replace(found, plan=replace(found.plan, rig=replace(found.plan.rig, area=None)))
+    stiff = found.to_dict()["parameters"]["slider.stiffness"]
+    assert stiff["total"] == pytest.approx(stiff["value"] * AREA)
+    assert stiff["total_unit"] == "N/m"
+    assert "total" not in plain.to_dict()["parameters"]["slider.stiffness"]
+    draws = ss.bootstrap(found, 32)
+    prediction = ss.predict(rig, found)
+    asked = prediction.to_dict()
+    assert asked["forces"]["critical_stiffness"] == pytest.approx([AREA * x for x in asked["critical_stiffness"]])
+    precise = ss.precision(replace(lab.rig(), area=AREA), lab.STEP, until=150.0)
+    for result in (
+        found["slider.stiffness"],
+        draws,
+        ss.profile(found, "slider.stiffness", count=9),
+        prediction,
+        precise,
+    ):
+        assert "N/m" in str(result)
+        assert not PER_AREA.search(str(result))
+    assert PER_AREA.search(str(plain["slider.stiffness"]))
+    for axes in (found.plot("corner"), draws.plot(), prediction.plot()):
+        words = words_of(axes)
+        assert "N/m" in words
+        assert not PER_AREA.search(words)
 
 
 def test_maps(rig, tmp_path):
@@ -104,6 +163,10 @@ def test_maps(rig, tmp_path):
     found = run_map(plan, tmp_path / "map.zarr", progress=False)
     assert found.area == AREA
     assert not PER_AREA.search(str(found).split("\n", 2)[2])
+    data, plain = found.to_dict(), found.statistics()["critical_stiffness"]
+    assert data["forces"]["statistics"]["critical_stiffness"] == pytest.approx(
+        {"low": plain["low"] * AREA, "high": plain["high"] * AREA, "unit": "N/m"}
+    )
     words = words_of(found.plot())
     assert "N/m" in words
     assert not PER_AREA.search(words)
@@ -115,5 +178,5 @@ def test_a_file_without_a_map_is_told_so(rig, tmp_path):
     path = tmp_path / "rig.toml"
     ss.write_rig(rig, path)
     for ask in (lambda: map_file(path, [tmp_path / "map.zarr"]), lambda: sensitivity_file(path)):
-        with pytest.raises(ss.errors.ParameterError, match=r"missing table; write \[map\]"):
+        with pytest.raises(ss.ParameterError, match=r"missing table; write \[map\]"):
             ask()

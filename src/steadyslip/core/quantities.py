@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -324,6 +324,30 @@ def outside(unit_name: str, area: float | None) -> tuple[float, str]:
     return (area, total_unit(unit_name)) if area is not None and is_per_area(unit_name) else (1.0, unit_name)
 
 
+def totals(values: Mapping[str, float | None], units: Mapping[str, str], area: float | None) -> dict[str, Any]:
+    """What JSON has beside values per unit area: those of the whole contact, with their units; nothing without area.
+
+    >>> totals({"k": 9e9, "v": 1e-6}, {"k": "Pa/m", "v": "m/s"}, 0.01)
+    {'area': 0.01, 'values': {'k': 90000000.0}, 'units': {'k': 'N/m'}}
+    """
+    found = {name: outside(units[name], area) for name in values if outside(units[name], area)[1] != units[name]}
+    if not found:
+        return {}
+    scaled = {name: _times(values[name], factor) for name, (factor, _) in found.items()}
+    return {"area": area, "values": scaled, "units": {name: unit_name for name, (_, unit_name) in found.items()}}
+
+
+def total(value: float | None, unit_name: str, area: float | None) -> dict[str, Any]:
+    """The same beside a single value: ``total`` and ``total_unit``; nothing where it is not per unit area."""
+    factor, name = outside(unit_name, area)
+    return {} if name == unit_name else {"total": _times(value, factor), "total_unit": name}
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    """A number for JSON; what does not exist and infinity are None."""
+    return value * factor if value is not None and math.isfinite(value * factor) else None
+
+
 _SHOWN_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
 
@@ -362,12 +386,14 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
     return f"{value / factor:.{digits}g} {prefix}{si_unit}"
 
 
-def shown_error(value: float, error: float, si_unit: str) -> str:
+def shown_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
     """A value and its error for people, both in the unit in which the value reads best.
 
     >>> shown_error(1.009e-5, 8.7e-7, "m"), shown_error(0.00696, 0.00043, "1")
     ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
     """
+    scale, si_unit = outside(si_unit, area)
+    value, error = value * scale, error * scale
     number, _, name = shown(value, si_unit).partition(" ")
     factor = value / float(number) if float(number) else 1.0
     return f"{number} ± {error / factor:.2g} {name}".rstrip()

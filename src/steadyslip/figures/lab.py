@@ -145,7 +145,8 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
     if draws is None and len(names) == len(source.names):
         draws = normal_draws(source, 4000)
     grid = _grid(ax, len(names))
-    units = [display_unit(source[n].unit, abs(source[n].value) or source[n].error) for n in names]
+    estimates = [source[n] for n in names]
+    units = [display_unit(e.unit, abs(e.value) or e.error, e.area) for e in estimates]
     for i, row in enumerate(names):
         for k, column in enumerate(names):
             panel = grid[i, k]
@@ -194,7 +195,7 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     own = float(np.nanmedian(result.safety * result.critical_stiffness)) if len(critical) else float("nan")
     if not len(critical):
         raise NotAvailable("no draw has a critical stiffness; the verdict does not depend on the stiffness")
-    factor, unit = display_unit("Pa/m", max(float(np.median(critical)), own))
+    factor, unit = display_unit("Pa/m", max(float(np.median(critical)), own), result.rig.area)
     ax.hist(critical / factor, bins=60, color=SKY, label="critical stiffness")
     ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
     middle = result.quantiles(result.critical_stiffness)[2]

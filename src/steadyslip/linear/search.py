@@ -54,6 +54,8 @@ class Boundary:
     stable : str
         On which side steady sliding is stable: ``above``, ``below`` or ``neither``.
     unit : str
+    area : float or None
+        Of the rig, m²: people are told totals then.
     """
 
     parameter: str
@@ -63,9 +65,10 @@ class Boundary:
     angular_frequency: float
     stable: str
     unit: str
+    area: float | None = None
 
     def __str__(self) -> str:
-        text = f"{self.parameter} = {shown(self.value, self.unit, 6)}: {self.kind}"
+        text = f"{self.parameter} = {shown(self.value, self.unit, 6, self.area)}: {self.kind}"
         if self.kind == "oscillatory":
             text += f", period {shown(2 * np.pi / self.angular_frequency, 's')}"
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
@@ -197,7 +200,8 @@ class Search:
         kind, frequency = self._kind(low, high, below, above)
         stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
-        return Boundary(self.name, float(middle), (float(low), float(high)), kind, frequency, stable, self.role.unit)
+        bracket = float(low), float(high)
+        return Boundary(self.name, float(middle), bracket, kind, frequency, stable, self.role.unit, self.rig.area)
 
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
         """A wider bracket where steady sliding ends within rounding of the edge.
@@ -242,7 +246,7 @@ class Search:
         stable = "above" if np.any(intervals[:, 0] == k) else "below"
         bracket = (float(np.nextafter(k, 0)), float(np.nextafter(k, np.inf)))
         beta = frequency if kind == "oscillatory" else 0.0
-        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit)
+        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area)
 
 
 def _decay_rate(values: Values, sigma: float) -> float:

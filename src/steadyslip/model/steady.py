@@ -55,7 +55,7 @@ class SteadySliding:
             f"{shown(self.normal_stress, 'Pa', area=self.area)}, {stress_name('shear stress', self.area)} "
             f"{shown(self.shear_stress, 'Pa', area=self.area)}, friction {self.friction:.4g}"
         ]
-        rows += [f"  {name} = {shown(value, self.units[name])}" for name, value in self.states.items()]
+        rows += [f"  {name} = {shown(value, self.units[name], area=self.area)}" for name, value in self.states.items()]
         return "\n".join(rows)
 
 

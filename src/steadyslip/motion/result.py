@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import unknown_name
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import outside, shown, stress_name
+from steadyslip.core.quantities import shown, stress_name, totals
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.events import Event, SlipEvent, slip_events
@@ -138,12 +138,8 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
 
     def _forces(self, last: dict[str, float]) -> dict[str, Any]:
         """With an area, the last values of the whole contact."""
-        totals = {name: outside(self.units[name], self.rig.area) for name in last}
-        found = {name: (last[name] * f, u) for name, (f, u) in totals.items() if u != self.units[name]}
-        if not found:
-            return {}
-        final = {name: value if np.isfinite(value) else None for name, (value, _) in found.items()}
-        return {"forces": {"area": self.rig.area, "final": final, "units": {n: u for n, (_, u) in found.items()}}}
+        found = totals(last, self.units, self.rig.area)
+        return {"forces": {"area": found["area"], "final": found["values"], "units": found["units"]}} if found else {}
 
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions in its attributes."""

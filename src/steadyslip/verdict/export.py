@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from steadyslip.core.quantities import outside
+from steadyslip.core.quantities import total
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -44,7 +44,7 @@ def as_dict(analysis: Analysis) -> dict[str, Any]:
         "damping_ratio": analysis.damping_ratio,
         "time_to_halve": analysis.time_to_halve,
         "time_to_double": analysis.time_to_double,
-        "onset": None if analysis.onset is None else _onset(analysis.onset),
+        "onset": None if analysis.onset is None else _onset(analysis.onset, analysis.rig.area),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
         "boundaries": [row for margin in analysis.margins for row in _edges(margin, analysis.rig.area)],
         "warnings": list(analysis.warnings),
@@ -54,7 +54,7 @@ def as_dict(analysis: Analysis) -> dict[str, Any]:
     return data
 
 
-def _onset(onset: Onset) -> dict[str, Any]:
+def _onset(onset: Onset, area: float | None) -> dict[str, Any]:
     return {
         "kind": onset.kind,
         "parameter": onset.along,
@@ -64,12 +64,11 @@ def _onset(onset: Onset) -> dict[str, Any]:
         "growth_slope": onset.growth_slope,
         "angular_frequency": onset.angular_frequency,
         "meaning": onset.meaning,
-    }
+    } | total(onset.value, onset.unit, area)
 
 
 def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
     """One row an edge; distances are from the rig's own value; with an area, totals stand beside."""
-    factor, unit = outside(margin.unit, area)
     return [
         {
             "parameter": edge.parameter,
@@ -84,7 +83,7 @@ def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
             "relative_distance": (edge.value - margin.value) / abs(margin.value) if margin.value else None,
             "nearest": edge is margin.edge,
         }
-        | ({} if unit == edge.unit else {"total": edge.value * factor, "total_unit": unit})
+        | total(edge.value, edge.unit, area)
         for edge in margin.edges
     ]
 

@@ -45,6 +45,8 @@ class Precision(ReadOnly):
     unidentified : tuple of Combination
     noise : float
     samples : int
+    area : float or None
+        Of the rig, m²: people are told totals then.
     """
 
     protocol: Protocol
@@ -55,15 +57,15 @@ class Precision(ReadOnly):
     noise: float
     samples: int
     units: dict[str, str] = field(repr=False)
+    area: float | None = None
 
     def __str__(self) -> str:
         lines = [f"{self.samples} samples with noise {self.noise:g} in friction would give"]
         wide = max(map(len, self.errors))
         for name, error in self.errors.items():
             if np.isfinite(error):
-                lines.append(
-                    f"  {name:<{wide}}  ± {shown(error, self.units[name], 2)} ({100 * self.relative[name]:.2g} %)"
-                )
+                size = shown(error, self.units[name], 2, self.area)
+                lines.append(f"  {name:<{wide}}  ± {size} ({100 * self.relative[name]:.2g} %)")
             else:
                 lines.append(f"  {name:<{wide}}  not determined")
         lines += [f"! {one}" for one in self.unidentified]
@@ -136,6 +138,7 @@ def precision(
     return Precision(
         plan, dict(zip(names, map(float, errors), strict=True)), dict(zip(names, map(float, relative), strict=True)),
         correlation, lost, float(noise), samples, {u.name: u.unit for u in space.unknowns},
+        rig.area,
     )  # fmt: skip
 
 
@@ -162,7 +165,8 @@ class Ranking:
         lines = [f"{self.parameter}, the best experiment first"]
         for label, one in self.found.items():
             error = one.errors[self.parameter]
-            text = f"± {shown(error, one.units[self.parameter], 2)}" if np.isfinite(error) else "not determined"
+            size = shown(error, one.units[self.parameter], 2, one.area)
+            text = f"± {size}" if np.isfinite(error) else "not determined"
             lines.append(f"  {label:<{wide}}  {text}")
         return "\n".join(lines)
 

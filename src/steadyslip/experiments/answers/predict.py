@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import percent, shown
+from steadyslip.core.quantities import outside, percent, shown
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
 from steadyslip.experiments.fitting.result import Fit
@@ -92,8 +92,10 @@ class Prediction(ReadOnly):
         if absent:
             lines.append(f"no steady sliding       in {probability_text(absent, len(self.stable))} of the draws")
         if np.any(np.isfinite(self.critical_stiffness)):
-            lines.append("critical stiffness      " + _range(self.quantiles(self.critical_stiffness), "Pa/m"))
-            lines.append("stiffness over critical " + _range(self.quantiles(self.safety), "1"))
+            lines.append(
+                "critical stiffness      " + _range(self.quantiles(self.critical_stiffness), "Pa/m", self.rig.area)
+            )
+            lines.append("stiffness over critical " + _range(self.quantiles(self.safety), "1", None))
             without = float(np.mean(~np.isfinite(self.critical_stiffness)))
             if without:
                 lines.append(f"no critical stiffness   in {probability_text(without, len(self.stable))} of the draws")
@@ -127,6 +129,7 @@ class Prediction(ReadOnly):
             "probability_steady": float(np.mean(self.exists)),
             "levels": list(LEVELS),
             "critical_stiffness": plain(self.critical_stiffness),
+            **self._forces(plain(self.critical_stiffness)),
             "safety": plain(self.safety),
             "growth_rate": plain(self.growth_rate),
             "thresholds": {
@@ -139,6 +142,14 @@ class Prediction(ReadOnly):
             "draws": len(self.stable),
             "kind": self.draws.kind,
         }
+
+    def _forces(self, critical: list[float | None]) -> dict[str, Any]:
+        """With an area, the critical stiffness of the whole contact."""
+        factor, unit = outside("Pa/m", self.rig.area)
+        if self.rig.area is None:
+            return {}
+        values = [None if x is None else x * factor for x in critical]
+        return {"forces": {"area": self.rig.area, "critical_stiffness": values, "unit": unit}}
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the distribution of the critical stiffness, and the rig's own.
@@ -280,8 +291,8 @@ def probability_text(share: float, count: int) -> str:
     return percent(share)
 
 
-def _range(quantiles: tuple[float, ...], unit: str) -> str:
-    low, _, middle, _, high = (shown(q, unit) for q in quantiles)
+def _range(quantiles: tuple[float, ...], unit: str, area: float | None) -> str:
+    low, _, middle, _, high = (shown(q, unit, area=area) for q in quantiles)
     return f"{middle}   95 %: {low} to {high}"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
-from steadyslip.core.quantities import shown, shown_error, shown_range
+from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
@@ -66,8 +66,8 @@ class Draws(ReadOnly):
         lines = [f"{len(self)} draws, {self.kind} ({details}){stopped}"]
         for one in self.fit.estimates:
             low, high = self.interval(one.name)
-            middle = shown_error(float(np.mean(self[one.name])), self.error(one.name), one.unit)
-            lines.append(f"  {one.name}  {middle}   95 %: {shown_range(low, high, one.unit)}")
+            drawn = replace(one, value=float(np.mean(self[one.name])), error=self.error(one.name), low=low, high=high)
+            lines.append(f"  {one.name}  {drawn.shown()}   95 %: {drawn.range()}")
         return "\n".join(lines)
 
     def plot(self, ax: Any = None) -> Any:
@@ -186,6 +186,8 @@ class Profile(ReadOnly):
     ssq : ndarray (m,)
     rise : ndarray (m,)
         Rise above the minimum in units in which 1 is one standard deviation squared.
+    area : float or None
+        Of the rig, m²: people are told totals then.
     """
 
     name: str
@@ -193,6 +195,7 @@ class Profile(ReadOnly):
     values: Array
     ssq: Array = field(repr=False)
     rise: Array
+    area: float | None = None
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Where the rise is below that of a probability; infinite where the profile does not rise so far."""
@@ -214,7 +217,9 @@ class Profile(ReadOnly):
 
     def __str__(self) -> str:
         low, high = self.interval()
-        ends = " to ".join("beyond the profile" if not np.isfinite(x) else shown(x, self.unit) for x in (low, high))
+        ends = " to ".join(
+            "beyond the profile" if not np.isfinite(x) else shown(x, self.unit, area=self.area) for x in (low, high)
+        )
         return f"{self.name}, 95 % by its profile: {ends}"
 
 
@@ -250,7 +255,8 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     keep = np.isfinite(found.ssq)
     order = np.argsort(z[keep, i])
     one = fit.space.unknowns[i]
-    return Profile(one.name, one.unit, one.value(z[keep, i][order]), found.ssq[keep][order], rise[keep][order])
+    values = one.value(z[keep, i][order])
+    return Profile(one.name, one.unit, values, found.ssq[keep][order], rise[keep][order], fit.plan.rig.area)
 
 
 def _unit_of_rise(fit: Fit, i: int) -> float:

@@ -38,6 +38,8 @@ class Estimate:
     unit : str
     low, high : float
         Ends of the 95 % interval.
+    area : float or None
+        Of the rig, m²: people are told totals then.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Estimate:
     unit: str
     low: float
     high: float
+    area: float | None = None
 
     @property
     def determined(self) -> bool:
@@ -56,16 +59,19 @@ class Estimate:
 
     def shown(self) -> str:
         """Value and error for people."""
-        clock = self.unit == "s"  # times are those of the record's clock
+        if self.unit == "s":  # times are those of the record's clock
+            return (
+                f"{self.value:.7g} ± {self.error:.2g} s" if self.determined else f"{self.value:.7g} s (not determined)"
+            )
         if not self.determined:
-            return f"{f'{self.value:.7g} s' if clock else shown(self.value, self.unit)} (not determined)"
-        return f"{self.value:.7g} ± {self.error:.2g} s" if clock else shown_error(self.value, self.error, self.unit)
+            return f"{shown(self.value, self.unit, area=self.area)} (not determined)"
+        return shown_error(self.value, self.error, self.unit, self.area)
 
     def range(self) -> str:
         """The 95 % interval for people."""
-        return (
-            f"{self.low:.7g} to {self.high:.7g} s" if self.unit == "s" else shown_range(self.low, self.high, self.unit)
-        )
+        if self.unit == "s":
+            return f"{self.low:.7g} to {self.high:.7g} s"
+        return shown_range(self.low, self.high, self.unit, self.area)
 
 
 @dataclass(frozen=True)
@@ -187,7 +193,8 @@ class Fit(ReadOnly):
         i = self.index(name)
         full = self.names[i]
         low, high = self.interval(full)
-        return Estimate(full, self.values[full], self.errors[full], self.space.unknowns[i].unit, low, high)
+        unit, area = self.space.unknowns[i].unit, self.plan.rig.area
+        return Estimate(full, self.values[full], self.errors[full], unit, low, high, area)
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -214,7 +221,7 @@ class Fit(ReadOnly):
                 continue
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
-                    end = shown(float(one.value(bound)), one.unit)
+                    end = shown(float(one.value(bound)), one.unit, area=self.plan.rig.area)
                     found.append(f"{one.name} ended at the {word} value that was searched, {end}")
         return tuple(found)
 

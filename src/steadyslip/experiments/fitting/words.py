@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.quantities import shown
+from steadyslip.core.quantities import shown, total
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.model.point import model_values
 from steadyslip.model.steady import steady_state
@@ -195,6 +195,7 @@ def as_dict(fit: Fit) -> dict[str, Any]:
                 "unit": e.unit,
                 "determined": e.determined,
             }
+            | total(e.value, e.unit, e.area)
             for e in fit.estimates
         },
         "correlation": [[float(x) if np.isfinite(x) else None for x in row] for row in fit.correlation],

@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, shown_range
+from steadyslip.core.quantities import outside, shown, shown_range
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.store.arrays import Store
 from steadyslip.maps.view import export
@@ -194,15 +194,22 @@ class MapResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units: what is computed, how far, and its statistics."""
-        done, count = self.finished
+        (done, count), statistics = self.finished, self.statistics()
+        ends = {name: {k: v for k, v in one.items() if k in ("low", "high")} for name, one in statistics.items()}
+        scaled = {name: outside(self.unit(name), self.area) for name, one in ends.items() if one}
+        forces = {
+            name: {end: value * factor for end, value in ends[name].items()} | {"unit": unit}
+            for name, (factor, unit) in scaled.items()
+            if unit != self.unit(name)
+        }
         return {
             "path": str(self.path),
             "dims": dict(zip(self.dims, self.shape, strict=True)),
             "parameters": {name: self.unit(name) for name in self.parameters},
             "results": {name: self.unit(name) for name in self.results},
             "chunks": {"finished": done, "all": count},
-            "statistics": self.statistics(),
-        }
+            "statistics": statistics,
+        } | ({"forces": {"area": self.area, "statistics": forces}} if forces else {})
 
     def to_netcdf(self, path: str | PathLike[str]) -> None:
         """Write one netCDF file; what is not computed yet is missing there.

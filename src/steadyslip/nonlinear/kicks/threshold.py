@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.quantities import shown
+from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.steady import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
@@ -109,7 +109,7 @@ class Threshold:
             "edge": self.edge,
             "decided": self.decided,
             "interrupted": self.interrupted,
-        }
+        } | total(plain(self.amount), self.unit, self.rig.area)
 
 
 def threshold(

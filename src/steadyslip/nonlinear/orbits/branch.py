@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import outside, shown, stress_name
+from steadyslip.core.quantities import outside, shown, stress_name, total, totals
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.shooting import Orbit
@@ -189,8 +189,12 @@ class CycleBranch:
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``steadyslip cycles --json`` prints it."""
 
+        area, units = self.rig.area, {"value": self.unit} | UNITS
+
         def plain(cycle: Cycle) -> dict[str, Any]:
-            found = {name: getattr(cycle, name) for name in ("value", *UNITS)}
+            found = {name: getattr(cycle, name) for name in units}
+            if forces := totals(found, units, area):
+                found["forces"] = forces
             found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
             found |= {"stable": cycle.stable, "start": cycle.start}
             return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
@@ -198,7 +202,7 @@ class CycleBranch:
         return {
             "parameter": self.along,
             "unit": self.unit,
-            "onset": {"kind": self.onset.kind, "value": self.onset.value},
+            "onset": {"kind": self.onset.kind, "value": self.onset.value} | total(self.onset.value, self.unit, area),
             "end": self.end,
             "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
             "cycles": [plain(cycle) for cycle in self.cycles],
@@ -237,8 +241,8 @@ class CycleBranch:
                 f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
             )
         for i, why in zip(self.gaps, self.broken, strict=True):
-            before = shown(self.cycles[i - 1].value, self.unit)
-            after = shown(self.cycles[i].value, self.unit)
+            before = shown(self.cycles[i - 1].value, self.unit, area=area)
+            after = shown(self.cycles[i].value, self.unit, area=area)
             lines += [f"  gap: at {before} {why};", f"    another sheet, found by simulation, from {after} on"]
         lines.append(f"  ends: {self.end}")
         if self.doubled is not None:

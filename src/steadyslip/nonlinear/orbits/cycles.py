@@ -308,6 +308,6 @@ def _limits(rig: Slider, onset: Onset, between: Sequence[Any] | None) -> tuple[f
     if not low < high:
         raise ParameterError([Problem("between", f"got {between!r}; allowed: low < high")])
     if not low <= onset.value <= high:
-        edge = shown(onset.value, onset.unit, 6)
+        edge = shown(onset.value, onset.unit, 6, rig.area)
         raise ParameterError([Problem("between", f"got {between!r}; it must contain the edge, {edge}")])
     return low, high

@@ -297,7 +297,8 @@ class Tracer:
         low, high = self.limits
         cycle = now.cycle
         if not low < cycle.value < high:
-            return f"end of the range, {shown(low if cycle.value <= low else high, self.onset.unit)}", True
+            end = shown(low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area)
+            return f"end of the range, {end}", True
         if self._slows(now):
             return ENDS["steady"], False
         if twice and before.half @ now.half < -0.5 * np.linalg.norm(before.half) * np.linalg.norm(now.half):

@@ -36,6 +36,8 @@ from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
 Array = np.ndarray
 AXES = ("displacement", "time")
 DRIVES = ("commanded", "smoothed", "measured", "protocol")
+MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
+"""Samples of a record beyond which a fit works with means of them, and how many."""
 NEVER_FREE = ("drive.velocity", "slider.area", "friction.v_ref")
 
 
@@ -219,6 +221,8 @@ def make_plan(
         options["weights"] = _checked_weights(weights, many, problems)
     if problems:
         raise ParameterError(problems)
+    if weights is None:
+        many, options["weights"] = _weighed(many)
     if plan_protocol is not None:
         options["drive"] = "protocol"
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
@@ -286,6 +290,15 @@ def _bad_options(options: dict[str, Any]) -> list[Problem]:
     if width is not None and not (isinstance(width, (int, float)) and width > 0):
         problems.append(Problem("width", f"got {width!r}; allowed: a number > 0, in units of what is fitted"))
     return problems
+
+
+def _weighed(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
+    """Long records as means that a fit can work with, and the weights of means; None where all was measured."""
+    handy = tuple(r if len(r) <= MOST_SAMPLES else r.decimated(HANDY_SAMPLES) for r in records)
+    if all(record.worth is None for record in handy):
+        return handy, None
+    worth = [np.ones(len(r)) if r.worth is None else r.worth for r in handy]
+    return handy, tuple(np.sqrt(own / np.mean(own)) for own in worth)
 
 
 def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[Problem]) -> tuple[Array, ...] | None:

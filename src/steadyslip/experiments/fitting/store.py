@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import astuple, fields, replace
 from os import PathLike
 from typing import Any
 
@@ -13,27 +13,30 @@ from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import DRIVES, Plan, make_plan
 from steadyslip.experiments.fitting.result import Fit, SearchStory
+from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 2, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 3, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 _ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
-    "steadyslip": str,
+    "loading": str, "steadyslip": str,
 }  # fmt: skip
 _OPTIONS = {
     "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "loss": str,
     "width": {float, None}, "rtol": float,
 }  # fmt: skip
+_COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int)
 _FORMS = {
     "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool},
     "unidentified": [{"weights": {str: float}, "deviation": float}],
     "noise": [(float, bool, float)],
     "records": [(str, [str], bool)],
+    "loading": [[[_COURSE]]],
 }
 """What the attributes hold as JSON; see `steadyslip.files.tables.fits_form`."""
 
@@ -74,6 +77,7 @@ def to_dataset(fit: Fit) -> Any:
         "unidentified": json.dumps([vars(one) for one in fit.unidentified]),
         "noise": json.dumps([[n.lag1, n.correlated, n.innovation] for n in fit.noise]),
         "records": json.dumps([[r.source, list(r.notes), r.integrated] for r in fit.plan.records]),
+        "loading": json.dumps([_written(r.commanded) for r in fit.plan.records]),
         "steadyslip": fit.version,
     }
     return xr.Dataset(variables, coords={"parameter": names, "other": names}, attrs=attributes)
@@ -102,12 +106,15 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     """
     table = ExpectedTable(path, FIT, _ATTRIBUTES)
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
-    described, noises = stored["records"], stored["noise"]
+    described, noises, loading = stored["records"], stored["noise"], stored["loading"]
     weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")
-    if not 0 < len(described) == len(noises) == len(present):
+    if not 0 < len(described) == len(noises) == len(present) == len(loading):
         raise table.fault(f"it has {len(described)} records, {len(present)} sets of columns and {len(noises)} noises")
     found = table.columns(_columns(present, weighted))
-    records = tuple(_record(table, found, i, *about) for i, about in enumerate(described, start=1))
+    records = tuple(
+        _record(table, found, i, (source, notes, integrated), _read(own))
+        for i, ((source, notes, integrated), own) in enumerate(zip(described, loading, strict=True), start=1)
+    )
     weights = [found[f"weight_{i}"] for i in range(1, len(records) + 1)] if weighted else None
     plan = _plan(table, records, stored["options"], weights)
     names = [one.name for one in plan.space().unknowns]
@@ -152,14 +159,40 @@ def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
     return found
 
 
+def _written(loading: Loading | None) -> Any:
+    """A loading as plain data, a list for each channel; empty for a smooth curve, which is found again."""
+    if loading is None or any(c is not None and c.curve is not None for c in (loading.load, loading.stress)):
+        return []
+    return [[] if c is None else [_course(c)] for c in (loading.load, loading.stress)]
+
+
+def _course(course: Course) -> list[Any]:
+    changes = [list(astuple(change)) for change in course.changes]
+    return [course.first, changes, list(course.errors), course.strays, course.slips, course.glitches]
+
+
+def _read(written: list[Any]) -> Loading | None:
+    """The loading in such data."""
+    if len(written) != 2:
+        return None
+    load, stress = (_channel(one[0]) if one else None for one in written)
+    return Loading(load, stress)
+
+
+def _channel(one: list[Any]) -> Course:
+    first, changes, errors, *rest = one
+    return Course(first, tuple(Change(*change) for change in changes), np.array(errors), None, *rest)
+
+
 def _record(
-    table: ExpectedTable, found: dict[str, Any], i: int, source: str, notes: list[str], integrated: bool
-) -> Record:
+    table: ExpectedTable, found: dict[str, Any], i: int, about: tuple[str, list[str], bool], commanded: Loading | None
+) -> Record:  # fmt: skip
+    source, notes, integrated = about
     columns = {name: found.get(f"{name}_{i}") for name in ROLES}
     if columns["time"] is None or columns["friction"] is None:
         raise table.fault(f"record {i} has no time or no friction")
     try:
-        return whole_record(source=source, notes=tuple(notes), integrated=integrated, **columns)
+        return whole_record(source, tuple(notes), integrated, commanded, **columns)
     except ParameterError as error:
         raise table.fault(str(error)) from error
 

@@ -73,19 +73,19 @@ def split_name(name: str) -> tuple[str, str | None]:
     """
     name = name.strip().strip("\"'").strip()
     if match := _BRACKETS.match(name):
-        found = _known_unit(match[2])
+        found = known_unit(match[2])
         if found is not None and match[1]:
             return match[1].strip(), found
     for separator in (",", "_", " "):
         head, _, tail = name.rpartition(separator)
         tail = tail.strip()
-        plain = tail in _SUFFIXES or tail.lower() in _SPELLINGS or ("/" in tail and _known_unit(tail) is not None)
+        plain = tail in _SUFFIXES or tail.lower() in _SPELLINGS or ("/" in tail and known_unit(tail) is not None)
         if head and plain:
-            return head.strip(), _known_unit(tail)
+            return head.strip(), known_unit(tail)
     return name, None
 
 
-def _known_unit(text: str) -> str | None:
+def known_unit(text: str) -> str | None:
     """A unit in this package's spelling, None if it is none."""
     text = text.strip()
     spelled = _SPELLINGS.get(text.lower(), text)
@@ -98,7 +98,7 @@ def _known_unit(text: str) -> str | None:
     return spelled
 
 
-def _guessed_role(name: str, has_unit: str | None) -> str | None:
+def guessed_role(name: str, has_unit: str | None) -> str | None:
     """The role that a bare name, and its unit, suggest."""
     plain = re.sub(r"[^a-zµμστäöüßéè]+", " ", name.lower().replace("_", " ")).strip()
     words = set(plain.split())
@@ -162,7 +162,7 @@ def assigned(
     taken = {place for place, _ in chosen.values()}
     guesses: dict[str, list[int]] = {}
     for i, (head, _) in enumerate(bare):
-        guess = _guessed_role(head, units[i])
+        guess = guessed_role(head, units[i])
         if guess is not None and i not in taken:
             guesses.setdefault(guess, []).append(i)
     for role in ROLES:
@@ -200,7 +200,7 @@ def _as_given(
         stated, value = value.get("unit"), value.get("column")
     elif isinstance(value, (tuple, list)) and len(value) == 2:
         value, stated = value
-    if stated is not None and (not isinstance(stated, str) or _known_unit(stated) is None):
+    if stated is not None and (not isinstance(stated, str) or known_unit(stated) is None):
         return None, None, f"got unit {stated!r}; allowed: a unit such as that of {example(ROLES[role])}"
     if value is None:
         return None, stated, None
@@ -212,7 +212,7 @@ def _as_given(
         for known in (list(names), list(heads)):
             if known.count(value) == 1:
                 return known.index(value), stated, None
-        found = _known_unit(value)
+        found = known_unit(value)
         if stated is None and found is not None and _fits(role, found):
             return None, found, None
     return None, None, unknown_name("column", value, names)
@@ -244,7 +244,7 @@ def _with_unit(
 ) -> tuple[Column | None, str | None, list[str]]:
     """The unit of a column: its own and the stated one must agree, and fit the role."""
     notes: list[str] = []
-    stated = None if stated is None else _known_unit(stated)
+    stated = None if stated is None else known_unit(stated)
     if own is not None and stated is not None and unit(own) != unit(stated):
         fault = f"column {name!r} is in {own} by its name, but {stated} is asked for; make them agree"
         return None, fault, notes
@@ -274,7 +274,8 @@ def required(columns: Mapping[str, Column], names: Sequence[str]) -> list[Proble
     """What a record cannot do without."""
     problems = []
     if "time" not in columns:
-        problems.append(Problem("time", _missing("time", names)))
+        remedy = "; without one, give sampling (the time between rows), or rate (of the load point) with a displacement"
+        problems.append(Problem("time", _missing("time", names) + remedy))
     if "friction" not in columns and not {"shear", "normal"} <= set(columns):
         lacking = [role for role in ("shear", "normal") if role not in columns]
         message = f"no column for friction, nor for {' and '.join(lacking)} to compute it from; the file has "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,12 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import Parameter, checked_number, positive
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
-from steadyslip.experiments.measured.files import read_columns
+from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen, seconds
 
 Array = np.ndarray
 GAP = 10.0  # times the usual spacing
+AROUND = 25  # rows before and behind, from which that is told
 PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
 
 
@@ -29,6 +30,8 @@ def read_record(
     table: str | None = None,
     between: tuple[Any, Any] | None = None,
     skip_bad_lines: bool = False,
+    sampling: Any = None,
+    rate: Any = None,
     **columns: Any,
 ) -> Record:
     """Read a record of an experiment.
@@ -41,18 +44,24 @@ def read_record(
     ----------
     path : path
         Text with any of the usual separators, with or without header, times in numbers, as a clock (``12:30:01.5``) or
-        with a date (ISO 8601); HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``) or Parquet (``.parquet``); binary files of
-        XLOOK, whatever their name.
+        with a date (ISO 8601); HDF5 (``.h5``, ``.hdf5``), MATLAB (``.mat``), Parquet (``.parquet``), Excel (``.xlsx``),
+        TDMS (``.tdms``), netCDF (``.nc``, saved runs among them); binary files of XLOOK, whatever their name.
     area : float or str, optional
         Contact area, m^2, where shear and normal are forces; 1 m^2 unless given, so that forces stay forces.
     normal_stress : float or str, optional
         A constant normal stress, Pa, where there is no column of it.
     table : str, optional
-        Group of an HDF5 file, or variable of a MATLAB file.
+        Group of an HDF5 or TDMS file, variable of a MATLAB file (``p1``, or ``p1.data`` in a structure), or sheet of a
+        workbook.
     between : (start, end), optional
         Part to use, s.
     skip_bad_lines : bool, optional
         Leave damaged lines out, and note it, instead of refusing the file.
+    sampling : float or str, optional
+        Time between rows, s, of a file without a column of time.
+    rate : float or str, optional
+        Constant rate of the load point, m/s, of a file with its displacement and no time. With neither, and both
+        displacement and velocity measured, time is counted from these.
     **columns
         ``time``, ``displacement`` and ``velocity`` (of the load point), ``friction``, ``shear``, ``normal``.
 
@@ -78,6 +87,9 @@ def read_record(
     if normal_stress is not None and "normal" in found and "normal" not in columns:
         del found["normal"]
     asked = set(found) | ({"normal"} if normal_stress is not None else set())
+    clock = None if "time" in found else _clock(sampling, rate, set(found))
+    if clock is not None:
+        asked.add("time")
     faults += required({role: found.get(role) for role in asked}, raw.names)  # type: ignore[misc]
     if faults:
         raise ParameterError(faults, title=str(path))
@@ -90,10 +102,34 @@ def read_record(
         level = _checked("normal_stress", "Pa", normal_stress)
         si["normal"] = np.full(raw.values.shape[1], level)
         notes.append(f"normal: constant, {shown(level, 'Pa')}")
+    if clock is not None:
+        si["time"], how = clock(si, raw.values.shape[1])
+        notes.append(how)
     lines = raw.lines
     if between is not None:
         si, lines = _cut(si, lines, between, notes)
     return _cleaned(si, str(path), [*raw.notes, *notes], lines)
+
+
+def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Array], int], tuple[Array, str]] | None:
+    """How to make the times of a file that has none, and what to say of it; None if that cannot be."""
+    if sampling is not None:
+        every = _checked("sampling", "s", sampling)
+        return lambda si, rows: (every * np.arange(rows), f"time: counted, a row every {shown(every, 's')}")
+    if rate is not None and "displacement" in roles:
+        speed = _checked("rate", "m/s", rate)
+        said = f"time: displacement over the given rate, {shown(speed, 'm/s')}"
+        return lambda si, rows: ((si["displacement"] - si["displacement"][0]) / speed, said)
+    if {"displacement", "velocity"} <= roles:
+        return lambda si, rows: (_elapsed(si["displacement"], si["velocity"]), "time: displacement over its own rate")
+    return None
+
+
+def _elapsed(displacement: Array, velocity: Array) -> Array:
+    """The time that each stretch takes at the mean of its rates; where nothing moves there is no telling."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        spent = np.diff(displacement) / (0.5 * (velocity[1:] + velocity[:-1]))
+    return np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(spent), np.maximum(spent, 0.0), 0.0))])
 
 
 def _cut(
@@ -212,17 +248,11 @@ def _cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) 
         steps = 0.5 * (si["velocity"][1:] + si["velocity"][:-1]) * spacing
         si["displacement"] = np.concatenate([[0.0], np.cumsum(steps)])
         notes.append("displacement of the load point integrated from its velocity")
-    columns = {
-        name: None if name not in si else frozen(si[name]) for name in ("normal", "shear", "displacement", "velocity")
-    }
-    return Record(
-        frozen(si["time"]),
-        frozen(si["friction"]),
-        source=source,
-        notes=tuple(notes),
-        integrated=integrated,
-        **columns,
+    normal, shear, displacement, velocity = (
+        None if name not in si else frozen(si[name]) for name in ("normal", "shear", "displacement", "velocity")
     )
+    time, friction = frozen(si["time"]), frozen(si["friction"])
+    return Record(time, friction, normal, shear, displacement, velocity, source, tuple(notes), integrated)
 
 
 def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
@@ -237,7 +267,7 @@ def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) 
 
 
 def _in_order(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
-    """Rows whose time goes back are left out; rows at the same time become their mean."""
+    """Rows whose time goes back are left out, rows of one time told apart: see `_stamped`."""
     time = si["time"]
     high = np.maximum.accumulate(time)
     back = time < high
@@ -247,14 +277,38 @@ def _in_order(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dic
             f"{int(back.sum())} rows whose time goes back left out (lines {where}{', ...' if back.sum() > 5 else ''})"
         )
         si, lines, time = {role: values[~back] for role, values in si.items()}, lines[~back], time[~back]
+    return _stamped(si, lines, notes)
+
+
+def _stamped(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
+    """Rows of one time: a clock that is coarser than the sampling, or rows too many.
+
+    Where a group takes the place of so many samples at the usual spacing around it, its rows are spread evenly over
+    the time to the next stamp. Else it is one sample, its mean: another time for one of its rows would be an invention.
+    """
+    time = si["time"]
     unique, first, counts = np.unique(time, return_index=True, return_counts=True)
-    if len(unique) < len(time):
-        notes.append(
-            f"{len(time) - len(unique)} rows repeat the time of the row before; each such group became its mean"
-        )
-        si = {role: np.add.reduceat(values, first) / counts for role, values in si.items()}
-        si["time"], lines = unique, lines[first]
-    return si, lines
+    if len(unique) == len(time):
+        return si, lines
+    gaps = np.diff(unique, append=2 * unique[-1] - unique[-2])
+    around = np.clip(first[:, None] + np.array([-AROUND, AROUND]), 0, len(time) - 1)
+    usual = (time[around[:, 1]] - time[around[:, 0]]) / np.maximum(np.diff(around, axis=1)[:, 0], 1)
+    with np.errstate(divide="ignore"):
+        spread = (counts > 1) & (np.abs(np.log(gaps / (counts * usual))) < np.abs(np.log(gaps / usual)))
+    own = np.repeat(np.arange(len(unique)), counts)
+    place = np.arange(len(time)) - first[own]
+    time = np.where(spread[own], unique[own] + place * gaps[own] / counts[own], time)
+    starts = np.unique(time, return_index=True)[1]
+    sizes = np.diff(starts, append=len(time))
+    if np.any(spread):
+        rows = int(np.sum(counts[spread]))
+        notes.append(f"{rows} rows share a time with others; spread evenly to the next, as the usual spacing has it")
+    if len(starts) < len(time):
+        rows = len(time) - len(starts)
+        notes.append(f"{rows} rows repeat the time of the row before; each such group became its mean")
+    si = {role: np.add.reduceat(values, starts) / sizes for role, values in si.items()}
+    si["time"] = time[starts]
+    return si, lines[starts]
 
 
 def _local_median(spacing: Array) -> Array:

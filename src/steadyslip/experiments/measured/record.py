@@ -18,6 +18,7 @@ from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
 from steadyslip.experiments.measured.steps import LoadStep, steps_of
+from steadyslip.experiments.numerics.noise import lasting
 
 Array = np.ndarray
 FEWEST_ROWS = 20
@@ -44,6 +45,11 @@ class Record:
         Everything that was noticed or changed.
     integrated : bool
         Whether the displacement comes from the velocity.
+    worth : ndarray (n,) or None
+        How many measured samples each sample is worth that is a mean of several, less than their number where noise
+        lasts for several of them; None where each was measured. Fits weigh by it.
+    commanded : Loading or None
+        What was commanded, where it was found in more samples than these.
     """
 
     time: Array = field(repr=False)
@@ -55,6 +61,8 @@ class Record:
     source: str
     notes: tuple[str, ...] = ()
     integrated: bool = False
+    worth: Array | None = field(default=None, repr=False)
+    commanded: Loading | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -67,6 +75,8 @@ class Record:
     @cached_property
     def loading(self) -> Loading:
         """What was commanded, as found in the measured displacement and normal stress."""
+        if self.commanded is not None:
+            return self.commanded
         load = None if self.displacement is None else load_course(self.time, self.displacement, self.integrated)
         return Loading(load, None if self.normal is None else stress_course(self.time, self.normal))
 
@@ -92,8 +102,8 @@ class Record:
         def of(values: Array | None) -> Array | None:
             return None if values is None else frozen(values[rows])
 
-        columns = {name: of(getattr(self, name)) for name in ("time", "friction", *_OPTIONAL)}
-        return replace(self, **columns, notes=(*self.notes, note))  # type: ignore[arg-type]
+        columns = {name: of(getattr(self, name)) for name in ("time", "friction", *_OPTIONAL, "worth")}
+        return replace(self, **columns, commanded=None, notes=(*self.notes, note))  # type: ignore[arg-type]
 
     def between(self, start: Any, end: Any) -> Record:
         """The part between two times (s, or text such as ``"11.6e3 s"``).
@@ -112,14 +122,13 @@ class Record:
         return self.taken(rows, f"cut to {first:.6g} to {last:.6g} s, {np.sum(rows)} of {len(self)} samples")
 
     def decimated(self, count: int) -> Record:
-        """At most about `count` samples, dense after every step and thin where nothing happens.
+        """About `count` samples, dense after every step and thin where nothing happens.
 
-        The samples kept are as measured; nothing is averaged.
+        Each is the mean of the measured ones around it, and `worth` says how much; none lies across a step.
         """
         if count >= len(self):
             return self
-        rows = transient_rows(self, count)
-        return self.taken(rows, f"decimated to {len(rows)} of {len(self)} samples, dense after steps")
+        return binned(self, bin_starts(self, count))
 
     def detrended(self, order: int = 1) -> Record:
         """Friction without a polynomial in the load point's displacement (in time where that is unknown).
@@ -235,7 +244,9 @@ class Record:
 _OPTIONAL = ("normal", "shear", "displacement", "velocity")
 
 
-def whole_record(source: str, notes: tuple[str, ...], integrated: bool, **columns: Array | None) -> Record:
+def whole_record(
+    source: str, notes: tuple[str, ...], integrated: bool, commanded: Loading | None = None, **columns: Array | None
+) -> Record:
     """A record from columns that were clean once.
 
     Raises
@@ -256,7 +267,7 @@ def whole_record(source: str, notes: tuple[str, ...], integrated: bool, **column
         raise ParameterError(problems, title=source)
     return Record(
         **{name: present.get(name) for name in ("time", "friction", *_OPTIONAL)},  # type: ignore[arg-type]
-        source=source, notes=notes, integrated=integrated,
+        source=source, notes=notes, integrated=integrated, commanded=commanded,
     )  # fmt: skip
 
 
@@ -280,6 +291,42 @@ def seconds(name: str, value: Any) -> float:
 
 def transient_rows(record: Record, count: int) -> Array:
     """Rows to keep of a record: as many after every step as before the next, evenly in the logarithm of time."""
+    cumulated = np.cumsum(_wanted(record, count))
+    last = len(record) - 1
+    chosen = np.searchsorted(cumulated, np.arange(0.5, cumulated[-1], 1.0))
+    return np.unique(np.concatenate([[0], np.minimum(chosen, last), [last]]))
+
+
+def bin_starts(record: Record, count: int) -> Array:
+    """First rows of ranges whose means take the place of a record, none of them across a step; spread likewise."""
+    cumulated = np.cumsum(_wanted(record, count))
+    fresh = np.flatnonzero(np.diff(np.floor(cumulated - 1e-9), prepend=-1.0))
+    moments = [m for step in record.steps for m in (step.time, step.time + step.duration)]
+    edges = np.searchsorted(record.time, moments)
+    return np.unique(np.concatenate([[0], fresh, edges[edges < len(record)]]))
+
+
+def binned(record: Record, starts: Array) -> Record:
+    """Means over ranges of samples that begin at given rows."""
+    counts = np.diff(starts, append=len(record))
+    weights = np.ones(len(record)) if record.worth is None else record.worth
+    total = np.add.reduceat(weights, starts)
+    memory = lasting(record.friction)
+    k = np.maximum(counts, 1.0)  # variance of the mean of k samples whose correlation falls as memory**lag
+    variance = (1 + memory) / (1 - memory) / k - 2 * memory * (1 - memory**k) / ((1 - memory) * k) ** 2
+    worth = total / counts / variance
+
+    def mean(values: Array | None) -> Array | None:
+        return None if values is None else frozen(np.add.reduceat(weights * values, starts) / total)
+
+    columns = {name: mean(getattr(record, name)) for name in ("time", "friction", *_OPTIONAL)}
+    note = f"{len(record)} samples became {len(counts)} means of up to {counts.max()} of them, dense after steps"
+    notes = (*record.notes, note)
+    return replace(record, **columns, worth=frozen(worth), commanded=record.loading, notes=notes)  # type: ignore[arg-type]
+
+
+def _wanted(record: Record, count: int) -> Array:
+    """How many of so many samples each row would get: one at most."""
     time, n = record.time, len(record)
     usual = float(np.median(np.diff(time)))
     weight = np.full(n, 1.0 / (time[-1] - time[0]))  # samples wanted per second
@@ -296,6 +343,4 @@ def transient_rows(record: Record, count: int) -> Array:
             low = scale
         else:
             high = scale
-    cumulated = np.cumsum(np.minimum(weight * spacing * high, 1.0))
-    chosen = np.searchsorted(cumulated, np.arange(0.5, cumulated[-1], 1.0))
-    return np.unique(np.concatenate([[0], np.minimum(chosen, n - 1), [n - 1]]))
+    return np.asarray(np.minimum(weight * spacing * high, 1.0))

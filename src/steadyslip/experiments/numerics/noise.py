@@ -65,6 +65,16 @@ def white(residuals: Array, free: int = 0) -> Noise:
     return Noise(lag_one(residuals), False, np.empty(0), variance, np.array([variance]))
 
 
+def lasting(values: Array) -> float:
+    """Correlation of the noise of neighbouring samples on top of anything slow, 0 to .99.
+
+    Told from differences over one and over two samples: noise whose correlation falls as ρ**lag has
+    differences of variance 2σ²(1 - ρ) and 2σ²(1 - ρ²).
+    """
+    one, two = (float(np.median(np.abs(values[k:] - values[:-k]))) for k in (1, 2))
+    return float(np.clip((two / one) ** 2 - 1.0, 0.0, 0.99)) if one > 0 else 0.0
+
+
 def lag_one(residuals: Array) -> float:
     """Autocorrelation from one sample to the next."""
     r = residuals - residuals.mean()

@@ -1,0 +1,107 @@
+"""Numbers of a file as columns with names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.measured.columns import known_unit
+from steadyslip.experiments.measured.formats.moments import from_the_first
+
+Array = np.ndarray
+MOST_VALUES = 2**26
+"""Numbers of a file."""
+MISSING = {"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "nat", "#n/a", "-nan"}
+"""What stands in a cell that has no number."""
+
+
+@dataclass
+class Table:
+    """Numbers of a file.
+
+    Attributes
+    ----------
+    names : list of str
+    values : ndarray (columns, rows)
+        NaN where a cell is empty.
+    lines : ndarray of int (rows)
+        Line of the file, from 1, or row of the table.
+    units : list of str or None
+        Units stated apart from the names.
+    notes : list of str
+    """
+
+    names: list[str]
+    values: Array
+    lines: Array
+    units: list[str | None] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.units = self.units or [None] * len(self.names)
+
+
+def check_size(path: Path, size: int, remedy: str = "") -> None:
+    """Refuse more numbers than a record may have, before they are read."""
+    if size > MOST_VALUES:
+        raise NotAvailable(f"{str(path)!r} has {size} numbers; allowed: up to {MOST_VALUES}{remedy}")
+
+
+def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) -> str | None:
+    """The part of a file that is asked for, None for all of it.
+
+    Raises
+    ------
+    NotAvailable
+        If there is none of that name.
+    """
+    if table is not None and table not in parts:
+        raise NotAvailable(f"{str(path)!r} has no {kind} {table!r}; it has {', '.join(parts) or 'none'}")
+    return table
+
+
+def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes: Sequence[str] = ()) -> Table:
+    """Vectors of the most common length, by name; columns of a matrix by number."""
+    vectors: dict[str, tuple[Array, str | None]] = {}
+    for name, (values, unit) in found.items():
+        array = np.squeeze(np.asarray(values, dtype=float))
+        if array.ndim == 1 and array.size > 1:
+            vectors[name] = (array, unit)
+        elif array.ndim == 2:
+            matrix = array if array.shape[0] > array.shape[1] else array.T
+            for i, column in enumerate(matrix.T, start=1):
+                vectors[f"{name}.{i}" if len(found) > 1 else str(i)] = (column, None)
+    if not vectors:
+        raise NotAvailable(f"{str(path)!r} has no columns of numbers in it")
+    lengths = [len(values) for values, _ in vectors.values()]
+    usual = max(set(lengths), key=lambda n: (lengths.count(n), n))
+    left = [name for name, (values, _) in vectors.items() if len(values) != usual]
+    said = [*notes, f"left out, not {usual} values long: {', '.join(left)}"] if left else list(notes)
+    kept = {name: pair for name, pair in vectors.items() if name not in left}
+    return Table(
+        list(kept), np.array([values for values, _ in kept.values()]), np.arange(1, usual + 1),
+        [None if unit is None else known_unit(unit) for _, unit in kept.values()], said,
+    )  # fmt: skip
+
+
+def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[str], list[str | None]]:
+    """Names of the columns, and units from a line of their own, from lines above the numbers; else numbers as names."""
+    if not lines:
+        return [str(i) for i in range(1, count + 1)], [None] * count
+    *above, last = ([*cells] for cells in lines)
+    as_units = [known_unit(cell.strip("()[] ") or "1") for cell in last]
+    if above and all(unit is not None for unit in as_units):
+        return above[-1], as_units
+    return last, [None] * count
+
+
+def count_moments(table: Table, place: int) -> None:
+    """Make seconds since the first of a column of times of day or dates."""
+    table.values[place] = from_the_first(table.values[place])
+    table.units[place] = "s"
+    table.notes.append(f"column {table.names[place]!r} holds times of day or dates; counted in seconds from the first")

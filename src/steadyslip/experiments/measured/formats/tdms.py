@@ -1,0 +1,59 @@
+"""TDMS, the format of LabVIEW: channels in groups; where no channel is a time, their sampling interval is one."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nptdms import TdmsFile
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.measured.columns import guessed_role, split_name
+from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, from_vectors
+
+UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
+TIME = "time"
+logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # what is wrong is said once, by the error
+
+
+def read(path: Path, table: str | None) -> Table:
+    """Numeric channels of the group of that name, else of the only group that has any."""
+    with path.open("rb") as stream, TdmsFile.open(stream) as file:  # which leaves what it cannot read open
+        groups = {group.name: group for group in file.groups() if any(_numeric(c) for c in group.channels())}
+        part = chosen_part(path, "group", table, list(groups))
+        if part is None and len(groups) > 1:
+            raise NotAvailable(
+                f"{str(path)!r} has channels in several groups; say which with table=: {', '.join(groups)}"
+            )
+        chosen = list(groups.values()) if part is None else [groups[part]]
+        channels = [channel for group in chosen for channel in group.channels() if _numeric(channel)]
+        check_size(path, sum(len(channel) for channel in channels))
+        found = {channel.name: (_values(channel), _unit(channel)) for channel in channels}
+        notes = []
+        if channels and not any(guessed_role(*split_name(name)) == "time" for name in found):
+            every = float(channels[0].properties.get("wf_increment", 0.0))
+            if every > 0.0:
+                found[TIME] = (every * np.arange(len(channels[0])), "s")
+                notes.append(f"time counted from the sampling interval of the channels, {every:g} s")
+        return from_vectors(path, found, notes)
+
+
+def _numeric(channel: Any) -> bool:
+    return len(channel) > 1 and getattr(channel.dtype, "kind", "O") in "iufM"
+
+
+def _values(channel: Any) -> Any:
+    """Numbers; moments as seconds since the first."""
+    values = channel[:]
+    if values.dtype.kind == "M":
+        return (values - values[0]) / np.timedelta64(1, "s")
+    return values
+
+
+def _unit(channel: Any) -> str | None:
+    for name in UNITS:
+        if channel.properties.get(name):
+            return str(channel.properties[name])
+    return "s" if channel.dtype.kind == "M" else None

@@ -1,0 +1,253 @@
+"""Text with columns of numbers, as people and programs write it: any separator, decimal commas, clocks, headers."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.experiments.measured.columns import known_unit
+from steadyslip.experiments.measured.formats.moments import moment
+from steadyslip.experiments.measured.formats.table import MISSING, Table, check_size, count_moments, names_and_units
+from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
+from steadyslip.files.inputs import read_bytes
+
+Array = np.ndarray
+SHOWN = 8  # bad lines that a message lists
+MOST_TEXT = 2**30  # bytes of a file
+MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines that are looked at one by one; characters of one
+LARGE, LOOKED_AT = 2**20, 2**17  # bytes beyond which NumPy is tried first; from which it learns the columns
+_BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
+
+
+def read_text(path: Path, skip_bad_lines: bool) -> Table:
+    """Columns of a text, or of a file of XLOOK, which has no ending of its own.
+
+    Raises
+    ------
+    NotAvailable
+        If it is neither.
+    ParameterError
+        If lines are damaged.
+    """
+    raw = read_bytes(path, MOST_TEXT)
+    if is_xlook(raw):
+        names, units, values = read_xlook(raw, str(path))
+        known = [None if unit is None else known_unit(unit) for unit in units]
+        return Table(names, values, np.arange(1, values.shape[1] + 1), known, ["read as XLOOK file"])
+    if b"\0" in raw[:4096]:
+        raise NotAvailable(
+            f"{str(path)!r} is not text; endings of other formats: .h5, .hdf5, .nc, .mat, .parquet, .xlsx, .tdms"
+        )
+    if len(raw) > LARGE and (table := _plain(path, raw)) is not None:
+        return table
+    text, notes = _decoded(raw)
+    longest = max(map(len, text.splitlines()), default=0) if sum(map(text.count, _BREAKS)) <= MOST_LINES else None
+    if longest is None or longest > MOST_LINE:
+        which = f"lines of more than {MOST_LINE} characters" if longest else f"more than {MOST_LINES} lines"
+        raise NotAvailable(
+            f"{str(path)!r} has {which} and is not plain columns of numbers throughout; mend it, or give it as HDF5 or "
+            "Parquet"
+        )
+    layout = _layout(path, text)
+    notes += layout.notes
+    values, lines, faults = _numbers(layout.body, layout.delimiter, layout.comma, layout.names)
+    table = Table(layout.names, values, lines, layout.units, notes)
+    for k in layout.moments if len(lines) else ():
+        count_moments(table, k)
+    if faults and not skip_bad_lines:
+        more = [Problem("file", f"... and {len(faults) - SHOWN} more such lines")] if len(faults) > SHOWN else []
+        advice = Problem("file", "mend these lines, or leave them out with skip_bad_lines (--skip-bad-lines)")
+        raise ParameterError([*faults[:SHOWN], *more, advice], title=str(path))
+    if faults:
+        shown = ", ".join(str(f.line) for f in faults[:SHOWN])
+        notes.append(f"{len(faults)} damaged lines left out: {shown}{', ...' if len(faults) > SHOWN else ''}")
+    return table
+
+
+def _decoded(raw: bytes) -> tuple[str, list[str]]:
+    try:
+        return raw.decode("utf-8-sig"), []
+    except UnicodeDecodeError:
+        return raw.decode("latin-1"), ["the file is not UTF-8; read as Latin-1"]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """How a text is written: what stands where, with the lines of numbers and theirs in the file."""
+
+    names: list[str]
+    units: list[str | None]
+    delimiter: str | None
+    comma: bool
+    moments: tuple[int, ...]
+    body: list[tuple[int, str]]
+    notes: list[str]
+
+
+def _layout(path: Path, text: str) -> _Layout:
+    numbered = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    comments = [(i, line.lstrip("#%; \t")) for i, line in numbered if line.lstrip()[:1] in ("#", "%")]
+    rows = [(i, line) for i, line in numbered if line.lstrip()[:1] not in ("#", "%")]
+    if not rows:
+        raise NotAvailable(f"{str(path)!r} has no lines of numbers in it")
+    delimiter, comma = _format(rows)
+    header, body = _header(rows, delimiter, comma)
+    if not body:
+        raise NotAvailable(f"{str(path)!r} has no lines of numbers in it; it begins with {rows[0][1][:60]!r}")
+    count = _usual_count(body, delimiter)
+    names, units = _names(header, comments, body[0][0], delimiter, count)
+    cells = _cells(body[0][1], delimiter)[: len(names)]
+    moments = tuple(k for k, cell in enumerate(cells) if moment(cell.strip('"')) is not None)
+    notes = ["numbers are written with a decimal comma"] if comma else []
+    return _Layout(names, units, delimiter, comma, moments, body, notes)
+
+
+def _plain(path: Path, raw: bytes) -> Table | None:
+    """A large text of nothing but numbers below its header, at the speed of NumPy; None if it is not so plain."""
+    head, notes = _decoded(raw[: raw.rfind(b"\n", 0, LOOKED_AT) + 1])
+    if not head or head.count("\n") != len(head.splitlines()):
+        return None
+    layout = _layout(path, head)
+    first = layout.body[0][0]
+    if layout.comma or layout.moments:
+        return None
+    start = 0
+    for _ in range(first - 1):
+        start = raw.index(b"\n", start) + 1
+    check_size(path, (raw.count(b"\n", start) + 1) * len(layout.names))
+    try:
+        values = np.loadtxt(
+            io.BytesIO(raw[start:]), delimiter=layout.delimiter, comments=None, ndmin=2, encoding="latin-1"
+        )
+    except ValueError:
+        return None
+    if values.shape[1] != len(layout.names) or raw.rstrip().count(b"\n", start) + 1 != len(values):
+        return None
+    values[~np.isfinite(values)] = np.nan
+    lines = np.arange(first, first + len(values))
+    return Table(layout.names, np.ascontiguousarray(values.T), lines, layout.units, [*notes, *layout.notes])
+
+
+def _format(rows: list[tuple[int, str]]) -> tuple[str | None, bool]:
+    """Delimiter (None: blanks) and whether numbers have a decimal comma."""
+    sample = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
+    for mark in ("\t", ";"):
+        if all(mark in line for line in sample):
+            return mark, any(re.search(r"\d,\d", line) for line in sample)
+    if all("," in line for line in sample):
+        cells = [line.split(",") for line in sample]
+        if all(_number(c, False) is not None or c.strip().lower() in MISSING for row in cells for c in row):
+            return ",", False
+        if all(
+            re.fullmatch(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?(\s+[-+]?\d+(,\d+)?([eE][-+]?\d+)?)+\s*", x) for x in sample
+        ):
+            return None, True
+        return ",", False
+    return None, False
+
+
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return line.split()
+    cells = [cell.strip() for cell in line.rstrip("\r\n").split(delimiter)]
+    if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
+        while len(cells) > 1 and cells[-1] == "":
+            cells.pop()  # trailing delimiters
+    return cells
+
+
+def _number(cell: str, comma: bool) -> float | None:
+    """The number in a cell; NaN for an empty one, None for anything else."""
+    plain = cell.strip().strip('"')
+    if plain.lower() in MISSING:
+        return float("nan")
+    try:
+        return float(plain.replace(",", ".") if comma else plain)
+    except ValueError:
+        return moment(plain)
+
+
+def _header(
+    rows: list[tuple[int, str]], delimiter: str | None, comma: bool
+) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
+    """Lines before the first that holds numbers only, and the rest."""
+    for place, (_, line) in enumerate(rows):
+        cells = _cells(line, delimiter)
+        numbers = [_number(cell, comma) for cell in cells]
+        if all(n is not None for n in numbers) and any(n == n for n in numbers):
+            return rows[:place], rows[place:]
+    return rows, []
+
+
+def _usual_count(body: list[tuple[int, str]], delimiter: str | None) -> int:
+    counts = [len(_cells(line, delimiter)) for _, line in body[:200]]
+    return max(set(counts), key=counts.count)
+
+
+def _names(
+    header: list[tuple[int, str]], comments: list[tuple[int, str]], first: int, delimiter: str | None, count: int
+) -> tuple[list[str], list[str | None]]:
+    """Names of the columns, and units from a line of their own; numbers as names without a header."""
+    lines = [line for _, line in header] or [line for i, line in comments if i < first]
+    split = [cells for line in lines if len(cells := _header_cells(line, delimiter, count)) == count]
+    return names_and_units(split, count)
+
+
+def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
+    """Cells of a header, which may be separated otherwise than the numbers."""
+    marks = [re.escape(delimiter)] if delimiter else []
+    for pattern in [*marks, r"\t", r"\s{2,}", ",", ";", r"\s+(?![\[\(])", r"\s+"]:
+        cells = [cell.strip() for cell in re.split(pattern, line.strip())]
+        while len(cells) > count and cells[-1] == "":
+            cells.pop()
+        if len(cells) == count:
+            return cells
+    return []
+
+
+def _numbers(
+    body: list[tuple[int, str]], delimiter: str | None, comma: bool, names: list[str]
+) -> tuple[Array, Array, list[Problem]]:
+    """All numbers, their lines, and the lines that are damaged."""
+    count = len(names)
+    lines, table, faults = [], [], []
+    for number, line in body:
+        cells = _cells(line, delimiter)
+        if len(cells) != count:
+            faults.append(Problem("file", f"{_counted(len(cells))} where {count} are expected: {_cut(line)}", number))
+            continue
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            row = []
+            for name, cell in zip(names, cells, strict=True):
+                value = _number(cell, comma)
+                if value is None:
+                    fault = f"{cell!r} in column {name!r} is not a plain number" + _hint(cell)
+                    faults.append(Problem("file", fault, number))
+                    break
+                row.append(value)
+            if len(row) < count:
+                continue
+        lines.append(number)
+        table.append(row)
+    return np.array(table, dtype=float).reshape(-1, count).T.copy(), np.array(lines, dtype=int), faults
+
+
+def _counted(count: int) -> str:
+    return "1 column" if count == 1 else f"{count} columns"
+
+
+def _cut(line: str) -> str:
+    return repr(line.strip()[:50] + ("..." if len(line.strip()) > 50 else ""))
+
+
+def _hint(cell: str) -> str:
+    if re.match(r"^[-+]?[\d.]+(e[-+]?\d+)?\s*[a-zµ%/]+", cell, re.I):
+        return "; a unit belongs into the column's name, and is the same for the whole column"
+    return ""

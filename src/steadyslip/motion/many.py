@@ -12,7 +12,7 @@ import numpy as np
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import resolve
-from steadyslip.core.results import ReadOnly
+from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.kernels.program import STATUSES, TALLY
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.engine import (
@@ -75,8 +75,7 @@ class Ensemble(ReadOnly):
     @property
     def status(self) -> np.ndarray:
         """How each run ended, in words."""
-        words: np.ndarray = np.array(WORDS)[self.status_code]
-        return words
+        return np.asarray(read_only(np.array(WORDS)[self.status_code]))
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -252,8 +252,7 @@ class Fit(ReadOnly):
     @property
     def residuals(self) -> Array:
         """Data less model."""
-        found: Array = self.comparison.data - self.model
-        return found
+        return np.asarray(read_only(self.comparison.data - self.model))
 
     def part(self, values: Array, record: int = 0) -> Array:
         """Those of `values` at all samples that belong to one record."""
@@ -271,7 +270,7 @@ class Fit(ReadOnly):
             size = np.sqrt(np.diag(self.covariance))
             found: Array = self.covariance / np.outer(size, size)
         found[~np.isfinite(found)] = np.nan
-        return found
+        return np.asarray(read_only(found))
 
     def rig(self, record: int = 0) -> Slider:
         """The rig with fitted values, driven as a record drives it."""

@@ -13,6 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from steadyslip.core.results import ReadOnly, read_only
+
 Array = np.ndarray
 LoadCurve = Callable[[Array], Array]
 FELT = 1e-6  # of the highest level: uncertainty that could matter
@@ -57,7 +59,7 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Course(ReadOnly):
     """What one channel does: levels, changes between them, and a smooth curve on top.
 
     Attributes
@@ -88,7 +90,7 @@ class Course:
 
     @property
     def levels(self) -> Array:
-        return np.array([self.first, *(change.after for change in self.changes)])
+        return np.asarray(read_only(np.array([self.first, *(change.after for change in self.changes)])))
 
     def at(self, time: Array) -> Array:
         """Values at given times, s."""

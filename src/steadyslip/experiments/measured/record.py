@@ -14,6 +14,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import Parameter, checked_number, real
+from steadyslip.core.results import read_only
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
@@ -94,7 +95,7 @@ class Record:
         n = len(self.time)
         low, high = np.clip(np.arange(n) - half, 0, n - 1), np.clip(np.arange(n) + half, 0, n - 1)
         rate: Array = (self.displacement[high] - self.displacement[low]) / (self.time[high] - self.time[low])
-        return rate
+        return np.asarray(read_only(rate))
 
     def taken(self, rows: Any, note: str) -> Record:
         """Some of the samples, with a note that says which."""

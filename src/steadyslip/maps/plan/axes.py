@@ -12,6 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.records import Parameter, checked_number
+from steadyslip.core.results import ReadOnly
 from steadyslip.model.point import checked_array
 
 Array = np.ndarray
@@ -66,7 +67,7 @@ class Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(ReadOnly):
     """Values of one parameter along a dimension of its own."""
 
     name: str
@@ -153,7 +154,7 @@ def _hypercube(of: Generated) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Listed:
+class Listed(ReadOnly):
     """Sample points given one by one, such as draws of a fit.
 
     Attributes

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from steadyslip.core.results import ReadOnly
 from steadyslip.nonlinear.continuation import Curve, Failure
 from steadyslip.nonlinear.orbits.flow import Runs
 
@@ -20,7 +21,7 @@ ONE = np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
+class Orbit(ReadOnly):
     """A cycle: states at the starts of its segments (K, n), period, parameter, shares of the period (K,)."""
 
     states: Array

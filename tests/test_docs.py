@@ -1,6 +1,7 @@
 """Pages that are made from the code are up to date, point at what exists, and show what really happens."""
 
 import doctest
+import os
 import re
 import runpy
 import shlex
@@ -97,6 +98,30 @@ def test_the_arrow_line_is_the_same_everywhere():
     for path in ("README.md", "docs/explanation/how-it-works.md"):
         assert arrow in " ".join((ROOT / path).read_text(encoding="utf-8").split())
     assert arrow in " ".join(ss.__doc__.replace(" (`analyze`)", "").split())
+
+
+# --- what is added in one file ----------------------------------------------------------------------
+
+ADDED = {"add-an-event": r"EVENTS = \(\n.*?\n(?=\))", "add-an-integrator": r"\Z"}
+
+
+@pytest.mark.parametrize("page", ADDED)
+def test_what_a_page_adds_to_one_file_works(page, tmp_path):
+    """The page's code put into a copy of the package, at the place that it names; then its script."""
+    text = (ROOT / "docs/how-to" / f"{page}.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n# ([\w/-]+\.py)[^\n]*\n(.*?)^```", text, re.M | re.S)
+    (path, added), (_, script) = blocks
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    source = tmp_path / path
+    before = source.read_text(encoding="utf-8")
+    place = re.search(ADDED[page], before, re.S)
+    assert place, f"no place for it in {path}"
+    source.write_text(before[: place.end()] + added + before[place.end() :], encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=os.environ | {"PYTHONPATH": str(tmp_path / "src")}, capture_output=True,
+        encoding="utf-8",
+    )  # fmt: skip
+    assert done.stdout == re.search(r"^```text\n(.*?)^```", text, re.M | re.S)[1], done.stderr
 
 
 # --- the command line as shown ----------------------------------------------------------------------

@@ -42,6 +42,47 @@ def test_lanes_equal_single_runs():
         assert ensemble.events["peak_velocity"][i] == pytest.approx(max(e.velocity for e in peaks), rel=1e-9)
 
 
+STICKING = ss.Slider(
+    friction=ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5),
+    contact=ss.Constant(preload=1e5), stiffness=1e8, mass=100.0, drive=ss.Steady(1e-3),
+)  # fmt: skip
+WATCHED = {
+    # rig, protocol, start: of slip events, of small oscillations, under inputs that change, with mass, without ln v
+    "stick-slip": (unit_rig("aging", 0.5, 0.4, 1e-3), STEP, {"v": 1.2}, 60.0),
+    "spiral": (unit_rig("slip", 0.5, 0.6), None, {"v": 1.2}, 60.0),
+    "waves": (unit_rig("aging", 0.5, 0.4, 1e-3), ss.VelocityHarmonic(amplitude=0.3, period=7.0), {"v": 1.2}, 60.0),
+    "mass": (unit_rig("slip", 0.5, 0.4, 1e-3, 1e-3), [ss.Hold(at=5.0, duration=20.0)], {"x": 1.0}, 60.0),
+    "Coulomb": (STICKING, ss.VelocityStep(at=0.01, to=1.1e-3), {}, 0.3),
+}
+
+
+@pytest.mark.parametrize("case", WATCHED)
+def test_lanes_see_what_single_runs_see(case):
+    """The tally that lanes keep within the step is that of the driver's log: all counts, every digit that matters."""
+    a_rig, protocol, initial, until = WATCHED[case]
+    k = float(a_rig.stiffness) * np.random.default_rng(0).uniform(0.75, 1.5, 24)
+    tally = ss.simulate_many(a_rig, {"stiffness": k}, protocol, until=until, initial=initial).events
+    for i in (0, 5, 11, 23):
+        run = ss.simulate(a_rig.with_values({"stiffness": k[i]}), protocol, until=until, initial=initial)
+        kinds = [event.kind for event in run.events]
+        peaks = [event for event in run.events if event.kind == "velocity peak"]
+        assert tally["events"][i] == len(run.slip_events)
+        assert tally["velocity_peaks"][i] == len(peaks) > 0
+        assert tally["arrests"][i] == kinds.count("arrest")
+        assert tally["last_peak_time"][i] == pytest.approx(peaks[-1].time, rel=1e-11)
+        assert tally["peak_velocity"][i] >= max(peak.velocity for peak in peaks) * (1 - 1e-12)
+        if len(peaks) > 1:
+            assert tally["peak_period"][i] == pytest.approx(peaks[-1].time - peaks[-2].time, rel=1e-9)
+        if run.slip_events:
+            last = run.slip_events[-1]
+            found = [
+                tally[f"event_{name}"][i] for name in ("begin", "duration", "slip", "stress_drop", "peak_velocity")
+            ]
+            expected = [last.begin, last.duration, last.slip, last.stress_drop, last.peak_velocity]
+            assert found == pytest.approx(expected, rel=1e-9)
+            assert tally["recurrence"][i] == pytest.approx(last.recurrence, rel=1e-9, nan_ok=True)
+
+
 def test_samples_equal_single_runs():
     k, times = kappas(20), np.linspace(0, 60, 31)
     ensemble = many(k, times=times, observables=["v", "x", "friction"])

@@ -23,7 +23,7 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
-from steadyslip.kernels.driver import SLIP_EVENT
+from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.model.steady import steady_state
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS

@@ -35,7 +35,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 from steadyslip.kernels import driver, lockstep_driver
-from steadyslip.kernels.layout import Cursor, Final, Kind as Event, Layout, Out, Routines, Row, Setting, Status
+from steadyslip.kernels.layout import Cursor, Event, Final, Kind, Layout, Out, Routines, Row, Setting, Status
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.printers import python
 
@@ -288,7 +288,7 @@ def _text(module: str) -> str:
     return files("steadyslip.kernels").joinpath(f"{module}.py").read_text(encoding="utf-8")
 
 
-_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Final, Out)}
+_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Final, Out)}
 _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 

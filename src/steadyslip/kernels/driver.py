@@ -18,8 +18,10 @@ import numpy as np
 from steadyslip.kernels.layout import (
     INPUTS,
     MOST_FAILURES,
+    SLIP_EVENT,
     Array,
     Cursor,
+    Event,
     Final,
     Kind,
     Layout,
@@ -31,8 +33,6 @@ from steadyslip.kernels.layout import (
     call,
 )
 
-SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
-# slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)
 Arrays = tuple[Array, Array, Array, Array, Array]
 Results = tuple[Array, Array, Array, Array, Array, Array]
 
@@ -186,12 +186,13 @@ def start_job(
     R[Row.PEAK_PERIOD] = math.nan
     R[Row.PEAK_GROWTH] = math.nan
     R[Row.NOW_BEGIN] = math.nan
+    R[Row.NOW_AT] = -1.0
+    R[Row.CROSSED] = -1.0
+    R[Row.LOG] = 1.0 if log.shape[0] > 0 else 0.0
     R[Row.NOW_FROM] = math.inf
-    R[Row.SLIPPING] = 1.0 if R[Row.GAP] > 0.0 else 0.0
-    R[Row.RESTING] = 1.0 if abs(v) < own[Setting.V_LOW] else 0.0
-    if R[Row.WATCH] > 0.0 and R[Row.SLIPPING] > 0.0:
+    if R[Row.WATCH] > 0.0 and R[layout.mark + Event.SLIP] > 0.0:
         look_now(R, layout, routines, 0.0, y)
-        note(R, layout, Kind.EVENT_BEGINS, 0.0, y, log, cursor)
+        note(R, layout, routines, Kind.SLIP_BEGINS, 0.0, y, log, cursor)
     return True
 
 
@@ -211,22 +212,8 @@ def look_back(R: Array, routines: Routines, theta: float, y: Array) -> None:
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
     """Positive before the event of a kind, not after."""
     look_back(R, routines, theta, y)
-    n = layout.size
-    v, faster = y[n + Out.V], max(1.000001 * y[n + Out.V_LP], R[Row.V_LOW])
-    value = y[n + Out.SIGMA] - R[Row.SIGMA_LOW]
-    if kind == Kind.PEAK:
-        value = y[n + Out.ACCELERATION]
-    elif kind == Kind.TROUGH:
-        value = -y[n + Out.ACCELERATION]
-    elif kind == Kind.EVENT_BEGINS:
-        value = faster - v
-    elif kind == Kind.EVENT_ENDS:
-        value = v - faster
-    elif kind == Kind.ARREST:
-        value = abs(v) - R[Row.V_LOW]
-    elif kind == Kind.RESTART:
-        value = R[Row.V_LOW] - abs(v)
-    return float(value)
+    value = y[layout.size + Out.COUNT + (kind - 1) // 2]
+    return float(value if kind % 2 == 1 else -value)
 
 
 def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -> float:
@@ -263,28 +250,16 @@ def follow(
     R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array, order: Array
 ) -> bool:  # fmt: skip
     """Events within the step just taken, in the order of time. True if the contact is lost in it."""
-    tau_old, h = R[Row.TAU_OLD], R[Row.DONE]
-    v, sigma = R[Row.V], R[Row.SIGMA]
-    slipping = 1.0 if R[Row.GAP] > 0.0 else 0.0
-    resting = 1.0 if abs(v) < R[Row.V_LOW] else 0.0
+    tau_old, h, v = R[Row.TAU_OLD], R[Row.DONE], R[Row.V]
     count = 0
-    if sigma <= R[Row.SIGMA_LOW]:
-        order[count, 1] = Kind.LOST
-        count += 1
-    if slipping != R[Row.SLIPPING]:
-        order[count, 1] = Kind.EVENT_BEGINS if slipping > 0.0 else Kind.EVENT_ENDS
-        count += 1
-    if resting != R[Row.RESTING]:
-        order[count, 1] = Kind.ARREST if resting > 0.0 else Kind.RESTART
-        count += 1
-    if R[Row.ACCELERATION_OLD] * h > 1e-10 * abs(v) and R[Row.ACCELERATION] <= 0.0:
-        order[count, 1] = Kind.PEAK
-        count += 1
-    elif R[Row.ACCELERATION_OLD] * h < -1e-10 * abs(v) and R[Row.ACCELERATION] >= 0.0:
-        order[count, 1] = Kind.TROUGH
-        count += 1
-    for i in range(count):
-        order[i, 0] = located(R, layout, routines, int(order[i, 1]), y)
+    for e in range(layout.events if R[Row.HAPPENED] > 0.0 else 0):
+        change = R[layout.happened + e]
+        if change != 0.0 and (e <= Event.CONTACT or log.shape[0] > 0):
+            kind = 2 * e + (2 if change > 0.0 else 1)
+            known = kind == Kind.SLIP_ENDS and R[Row.CROSSED] >= 0.0
+            order[count, 0] = R[Row.CROSSED] if known else located(R, layout, routines, kind, y)
+            order[count, 1] = kind
+            count += 1
     for _ in range(count):
         first = 0
         for i in range(count):
@@ -294,18 +269,21 @@ def follow(
         order[first, 0] = 2.0
         look_back(R, routines, theta, y)
         tau = tau_old + theta * h
-        note(R, layout, kind, tau, y, log, cursor)
+        note(R, layout, routines, kind, tau, y, log, cursor)
         if kind == Kind.LOST:
             R[Row.TAU] = tau
             for i in range(layout.size):
                 R[layout.state + i] = y[i]
+            for i in range(count):  # what would have come later was counted by the step
+                if order[i, 0] < 2.0:
+                    R[layout.counted + int(order[i, 1]) - 1] -= 1.0
             return True
-    R[Row.SLIPPING] = slipping
-    R[Row.RESTING] = resting
+    R[Row.HAPPENED] = 0.0
+    R[Row.CROSSED] = -1.0
     R[Row.PEAK_VELOCITY] = max(R[Row.PEAK_VELOCITY], v)
     R[Row.LOWEST_VELOCITY] = min(R[Row.LOWEST_VELOCITY], v)
     R[Row.NOW_PEAK] = max(R[Row.NOW_PEAK], v)
-    if R[Row.NOW_EVENT] == 0.0 and v >= SLIP_EVENT * R[Row.NOW_FROM]:
+    if R[Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.END] and v >= SLIP_EVENT * R[Row.NOW_FROM]:
         look_now(R, layout, routines, R[Row.TAU], y)
         quicken(R, layout, y, log, cursor)
     return False
@@ -324,6 +302,19 @@ def outrun(R: Array, layout: Layout, slowest: float, tau: float, y: Array) -> No
     R[Row.NOW_STRESS] = y[n + Out.T]
     R[Row.NOW_X] = y[layout.x] + R[Row.LOAD_MOVED] + load_advance(R, layout, tau)
     R[Row.NOW_SEGMENT] = R[Row.SEGMENT]
+    R[Row.NOW_AT] = -1.0
+
+
+def recall(R: Array, layout: Layout, routines: Routines, y: Array) -> None:
+    """What was observed where slip began, if only state and time were kept: before its segment ends."""
+    tau, highest, event = R[Row.NOW_AT], R[Row.NOW_PEAK], R[Row.NOW_EVENT]
+    if tau < 0.0:
+        return
+    for i in range(layout.size):
+        y[i] = R[layout.now + i]
+    call(routines.outputs, R, tau, y)
+    outrun(R, layout, R[Row.NOW_FROM], tau, y)
+    R[Row.NOW_PEAK], R[Row.NOW_EVENT] = highest, event
 
 
 def quicken(R: Array, layout: Layout, y: Array, log: Array, cursor: Array) -> None:
@@ -338,23 +329,25 @@ def quicken(R: Array, layout: Layout, y: Array, log: Array, cursor: Array) -> No
     R[Row.NOW_EVENT] = 1.0
     if log.shape[0] > 0:
         i = cursor[Cursor.LOGGED]
-        log[i, 0], log[i, 1], log[i, 2] = Kind.EVENT_BEGINS, R[Row.NOW_BEGIN], R[Row.NOW_V]
+        log[i, 0], log[i, 1], log[i, 2] = Kind.SLIP_BEGINS, R[Row.NOW_BEGIN], R[Row.NOW_V]
         log[i, 3], log[i, 4], log[i, 5] = R[Row.NOW_SIGMA], R[Row.NOW_TAU], R[Row.NOW_STRESS]
         log[i, 6], log[i, 7] = R[Row.NOW_X], R[Row.NOW_SEGMENT]
         cursor[Cursor.LOGGED] = i + 1
 
 
-def note(R: Array, layout: Layout, kind: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
+def note(
+    R: Array, layout: Layout, routines: Routines, kind: int, tau: float, y: Array, log: Array, cursor: Array
+) -> None:  # fmt: skip
     """Keep the tally of events, and the log where there is one."""
     n = layout.size
     time = clock(R, tau)
     place = y[layout.x] + R[Row.LOAD_MOVED] + load_advance(R, layout, tau)
     v, stress = y[n + Out.V], y[n + Out.T]
-    if kind == Kind.EVENT_BEGINS:  # logged once it is fast, if ever: see quicken
+    if kind == Kind.SLIP_BEGINS:  # logged once it is fast, if ever: see quicken
         outrun(R, layout, v, tau, y)
         return
     is_event = R[Row.NOW_EVENT] > 0.0
-    if kind == Kind.EVENT_ENDS:
+    if kind == Kind.SLIP_ENDS:
         R[Row.NOW_FROM] = math.inf
         R[Row.NOW_EVENT] = 0.0
         if not is_event:
@@ -364,7 +357,8 @@ def note(R: Array, layout: Layout, kind: int, tau: float, y: Array, log: Array, 
         log[i, 0], log[i, 1], log[i, 2], log[i, 3] = kind, time, v, y[n + Out.SIGMA]
         log[i, 4], log[i, 5], log[i, 6], log[i, 7] = y[n + Out.TAU], stress, place, R[Row.SEGMENT]
         cursor[Cursor.LOGGED] = i + 1
-    if kind == Kind.EVENT_ENDS:
+    if kind == Kind.SLIP_ENDS:
+        recall(R, layout, routines, y)
         begin = R[Row.NOW_BEGIN]
         if R[Row.ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
             R[Row.RECURRENCE] = begin - R[Row.EVENT_BEGIN]
@@ -375,15 +369,12 @@ def note(R: Array, layout: Layout, kind: int, tau: float, y: Array, log: Array, 
         R[Row.EVENT_SLIP] = place - R[Row.NOW_X]
         R[Row.EVENT_STRESS_DROP] = R[Row.NOW_STRESS] - stress
         R[Row.EVENT_PEAK_VELOCITY] = R[Row.NOW_PEAK]
-    elif kind == Kind.ARREST:
-        R[Row.ARRESTS] += 1.0
     elif kind == Kind.PEAK:
         size = math.log(abs(v / y[n + Out.V_LP])) if y[n + Out.V_LP] != 0.0 else math.inf
-        if R[Row.VELOCITY_PEAKS] > 0.0:
+        if R[Row.LAST_PEAK_TIME] >= 0.0:
             R[Row.PEAK_PERIOD] = time - R[Row.LAST_PEAK_TIME]
             R[Row.PEAK_GROWTH] = abs(size) - abs(R[Row.PEAK_SIZE])
         R[Row.PEAK_SIZE] = size
-        R[Row.VELOCITY_PEAKS] += 1.0
         R[Row.LAST_PEAK_TIME] = time
         R[Row.PEAK_VELOCITY] = max(R[Row.PEAK_VELOCITY], v)
         R[Row.NOW_PEAK] = max(R[Row.NOW_PEAK], v)
@@ -447,8 +438,11 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
     final[row, Final.REJECTED] = R[Row.REJECTED]
     for i in range(layout.size):
         final[row, Final.STATE + i] = R[layout.state + i]
-    for i in range(tally.shape[1]):
+    first = Row.PEAK_SIZE - Row.EVENTS
+    for i in range(first):
         tally[row, i] = R[Row.EVENTS + i]
+    for i in range(2 * layout.events):
+        tally[row, first + i] = R[layout.counted + i]
     R[Row.ACTIVE] = 0.0
     R[Row.FLAG] = 0.0
 
@@ -484,7 +478,8 @@ def go_on(
         s = j if segments.shape[0] > 1 else 0
         if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
             return Status.DONE
-        h, before = R[Row.H], R[Row.V]
+        h, before, slipping = R[Row.H], R[Row.V], R[layout.mark + Event.SLIP]
+        recall(R, layout, routines, y)
         if not enter_segment(R, layout, routines, j, k, segments, y):
             return Status.NO_VELOCITY
         await_sample(R, times)
@@ -492,24 +487,23 @@ def go_on(
         if R[Row.RECORD] > 0.0:
             record(R, layout, cursor, recorded)
         if R[Row.WATCH] > 0.0:
-            crossed(R, layout, routines, before, cursor, log, y)
+            crossed(R, layout, routines, before, slipping > 0.0, cursor, log, y)
     return Status.RUNNING
 
 
 def crossed(
-    R: Array, layout: Layout, routines: Routines, before: float, cursor: Array, log: Array, y: Array
+    R: Array, layout: Layout, routines: Routines, before: float, was_slipping: bool, cursor: Array, log: Array,
+    y: Array,
 ) -> None:  # fmt: skip
     """A jump from the velocity `before` can begin or end a slip event at once."""
     look_now(R, layout, routines, 0.0, y)
     v = y[layout.size + Out.V]
-    slipping = 1.0 if R[Row.GAP] > 0.0 else 0.0
-    if slipping != R[Row.SLIPPING]:
-        note(R, layout, Kind.EVENT_BEGINS if slipping > 0.0 else Kind.EVENT_ENDS, 0.0, y, log, cursor)
-        R[Row.SLIPPING] = slipping
-    if slipping > 0.0 and R[Row.NOW_EVENT] == 0.0 and before < min(v, R[Row.NOW_FROM]):
+    slipping = R[layout.mark + Event.SLIP] > 0.0
+    if slipping != was_slipping:
+        note(R, layout, routines, Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS, 0.0, y, log, cursor)
+    if slipping and R[Row.NOW_EVENT] == 0.0 and before < min(v, R[Row.NOW_FROM]):
         outrun(R, layout, before, 0.0, y)
         quicken(R, layout, y, log, cursor)
-    R[Row.RESTING] = 1.0 if abs(v) < R[Row.V_LOW] else 0.0
     R[Row.PEAK_VELOCITY] = max(R[Row.PEAK_VELOCITY], v)
     R[Row.LOWEST_VELOCITY] = min(R[Row.LOWEST_VELOCITY], v)
 
@@ -546,6 +540,14 @@ def attend(
     R[Row.END] = 1e300
 
 
+def flagged(S: Array, lanes: int) -> int:
+    """How many lanes need attention."""
+    count = 0
+    for lane in range(lanes):
+        count += 1 if S[Row.FLAG * lanes + lane] != 0.0 else 0
+    return count
+
+
 def advance(
     layout: Layout, routines: Routines, S: Array, ids: Array, cursor: Array, constants: Array, initial: Array,
     settings: Array, segments: Array, times: Array, statuses: Array, final: Array, tally: Array, samples: Array,
@@ -561,8 +563,9 @@ def advance(
     arrays = (constants, initial, settings, segments, times)
     results = (statuses, final, tally, samples, log, recorded)
     lanes = layout.lanes
-    y, order = np.empty(layout.size + Out.COUNT), np.empty((5, 2))
+    y, order = np.empty(layout.size + Out.COUNT + layout.events), np.empty((layout.events, 2))
     R = S if lanes == 1 else np.zeros(layout.rows)
+    together = layout.watched > 0 and log.shape[0] == 0 and settings[0, Setting.WATCH] > 0.0
     steps = 0
     if cursor[Cursor.PAUSED] < 0:
         for lane in range(lanes):
@@ -574,9 +577,10 @@ def advance(
             call(routines.step, S, 0.0, y)
             steps += 1
         cursor[Cursor.PAUSED] = 0
-        attention = 0
-        for lane in range(lanes):
-            attention += 1 if S[Row.FLAG * lanes + lane] != 0.0 else 0
+        attention = flagged(S, lanes)
+        if attention > 0 and together:
+            call(routines.watch_lanes, S, 0.0, y)
+            attention = flagged(S, lanes)
         if attention > 0:
             if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes > log.shape[0]) or (
                 recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + 4 * lanes > recorded.shape[0]
@@ -629,7 +633,7 @@ def observe(
     `states` is (m, size); `inputs` (m, 7) holds v_lp, q, p, their slopes and the time; `own` the rig's row.
     `values` is (m, 5 + kept).
     """
-    R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT)
+    R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
     rig = -1
     for m in range(states.shape[0]):
         if own[m] != rig:
@@ -649,7 +653,7 @@ def field(
     values: Array,
 ) -> None:  # fmt: skip
     """Rates at given states, (m, size); arguments as for `observe`."""
-    R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT)
+    R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
     for m in range(states.shape[0]):
         R[Row.Z] = settings[own[m] if settings.shape[0] > 1 else 0, Setting.GUESS]
         placed(R, layout, routines, constants, settings, states[m], inputs[m], own[m], y)

@@ -10,26 +10,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import sympy as sp
 
-from steadyslip.kernels.layout import MOST_FAILURES, Layout, Out, Row, make_layout
+from steadyslip.kernels.events import EVENTS, faster
+from steadyslip.kernels.layout import Layout, Out, Row, make_layout
 from steadyslip.kernels.methods import METHODS, Method
-from steadyslip.kernels.nodes import Loop, Node, Program, Value, exp, larger, log, primitive, select, smaller, weighted
-from steadyslip.kernels.rosenbrock import Pattern, factorised, substituted
+from steadyslip.kernels.nodes import Program, Value, weighted
+from steadyslip.kernels.record import CHANNELS, Record, horner, slope_of, total
+from steadyslip.kernels.rosenbrock import Pattern
 from steadyslip.kernels.source import Constants, Formulas
-from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
+from steadyslip.kernels.step import Step
+from steadyslip.kernels.watch import Watch
+from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction, W
 
 LEVELS = ("constant", "linear", "harmonic")
-CHANNELS = ("v", "q", "p")
 OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 _SLOPE_NAMES = {s: f"slope_{c}" for s, c in zip(SLOPES[:3], CHANNELS, strict=True)}
 _INPUT_NAMES = {s: f"in_{c}" for s, c in zip(INPUTS[:3], CHANNELS, strict=True)} | {TIME: "time"}
-NEWTON_STEPS = 6
-FASTER = 1.000001  # than the load point, beyond rounding: slipping
-PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
-# hardly any rejections, and an end error near rtol after tens of cycles
-Point = dict[str, Value]
 
 
 @dataclass(frozen=True)
@@ -154,12 +153,27 @@ class Kernel:
             if self.timed:
                 entries += [self._fixed(e) for e in reduction.time_derivative()]
             self.jacobian = self._formulas(entries)
+        self._write_velocity()
         self.restart: Formulas | None = None
         if reduction.restart is not None:
             w = sp.Symbol("w", real=True)
             known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | {w: "w"} | _INPUT_NAMES | _SLOPE_NAMES
             pair = (reduction.restart, sp.diff(reduction.restart, w))
             self.restart = Formulas([self._fixed(e) for e in pair], known)
+
+    def _write_velocity(self) -> None:
+        """Velocity as a function of w alone, and w of velocity, where w is integrated and memory is not needed."""
+        reduction, v = self.reduction, self.reduction.model.symbols["v"]
+        speed, inverse = reduction.outputs["v"], reduction.w_of_v
+        variables = {*reduction.state, *reduction.continuous, *INPUTS}
+        if reduction.unknown is not None:
+            variables.add(reduction.unknown)
+        self.speed: Formulas | None = None
+        self.limit: Formulas | None = None
+        alone = speed.free_symbols & variables == {W} and not inverse.free_symbols & variables
+        if self.choice.dense and alone:
+            self.speed = self._formulas([self._fixed(speed)])
+            self.limit = Formulas([self._fixed(inverse.xreplace({v: W}))], {W: "v"})
 
     def _made_layout(self) -> Layout:
         reduction, choice = self.reduction, self.choice
@@ -175,15 +189,20 @@ class Kernel:
             solved=massless and reduction.unknown is not None,
             w=reduction.names.index("w") if "w" in reduction.names else -1,
             x=reduction.names.index("x"),
+            events=len(EVENTS) if choice.dense else 0,
+            watched=choice.dense and choice.lanes > 1 and self.speed is not None,
         )
 
     @cached_property
     def programs(self) -> tuple[Program, ...]:
         """All programs, in the order of `Routines`."""
-        return (
+        found = (
             self._step(), self._rates_program(), self._outputs_program(), self._restore_program(),
             self._place_program(), self._balance_program(), self._dense_program(),
         )  # fmt: skip
+        if self.layout.watched and self.speed is not None:
+            return (*found, Watch(self, self.speed).write())
+        return found
 
     # -- the step
 
@@ -204,7 +223,12 @@ class Kernel:
             record.program.store(self.layout.rate + i, found[i])
         for i, row in enumerate((Row.V, Row.ACCELERATION, Row.SIGMA)):
             record.program.store(row, found[self.size + i])
-        record.program.store(Row.GAP, found[self.size] - record.faster(point))
+        moment = record.moment(point, found[self.size :])
+        for e, value in enumerate(record.marks(moment) if self.choice.dense else ()):
+            record.program.store(self.layout.mark + e, value)
+        if self.choice.dense and self.limit is not None:
+            for row, v in ((Row.W_LIMIT, faster(moment)), (Row.W_LP, moment.v_lp)):
+                record.program.store(row, self.limit(record.constants | {"v": v})[0])
         record.keep_unknown()
         return record.program
 
@@ -212,9 +236,15 @@ class Kernel:
         record = Record(self, Program("outputs"))
         program, n = record.program, self.size
         point = record.inputs(program.number) | {f"y{i}": program.load(i, "y") for i in range(n)}
-        for i, value in enumerate(record.evaluated(self.outputs, point)):
+        found = record.evaluated(self.outputs, point)
+        for i, value in enumerate(found):
             program.store(n + i, value, "y")
         program.store(n + Out.V_LP, point["in_v"], "y")
+        if self.choice.dense:
+            if self.speed is not None:  # an extreme of velocity is one of the dense output in w
+                found[1] = program.load(n + Out.W_SLOPE, "y")
+            for e, value in enumerate(record.marks(record.moment(point, found))):
+                program.store(n + Out.COUNT + e, value, "y")
         return program
 
     def _restore_program(self) -> Program:
@@ -251,259 +281,37 @@ class Kernel:
 
     def _dense_program(self) -> Program:
         program = Program("dense")
+        theta = program.number
         if self.choice.dense:
             for i in range(self.size):
-                program.store(i, self._interpolated(program, i, program.number), "y")
+                program.store(i, horner(self.polynomial(program, i), theta), "y")
+            if self.speed is not None:
+                slope = horner(slope_of(self.course(program, self.layout.w)), theta)
+                program.store(self.size + Out.W_SLOPE, slope, "y")
         return program
 
-    def _interpolated(self, program: Program, i: int, theta: Node) -> Value:
-        """State variable i at the fraction theta of the last step."""
+    def polynomial(self, program: Program, i: int) -> list[Value]:
+        """Dense output of state variable i: coefficients of powers of the fraction of the last step."""
         method, n = self.method, self.size
         old = program.load(self.layout.old + i)
         stages = [program.load(self.layout.stage + s * n + i) for s in range(method.stages)]
         if not method.implicit:
-            weights = [theta * horner(polynomial, theta) for polynomial in method.dense]
-            terms = [weight * k for weight, k in zip(weights, stages, strict=True)]
-            return old + program.load(Row.DONE) * total(terms)
-        inner = horner([weighted(row, stages) for row in method.dense], theta)
+            h, columns = program.load(Row.DONE), zip(*method.dense, strict=True)
+            return [old, *(h * weighted(column, stages) for column in columns)]
         change = weighted(method.arguments()[method.stages], stages)
-        return old + theta * (change + (1.0 - theta) * inner)
+        inner = [weighted(row, stages) for row in method.dense]  # of θ (1 − θ) inner(θ)
+        sums = [change + inner[0], *(after - now for now, after in pairwise(inner)), -inner[-1]]
+        return [old, *sums]
 
-
-def horner(coefficients: Sequence[Value], x: Node) -> Value:
-    """A polynomial, lowest coefficient first."""
-    value: Value = 0.0
-    for coefficient in reversed(coefficients):
-        value = coefficient + x * value
-    return value
-
-
-def total(terms: Sequence[Value]) -> Value:
-    """Their sum, from the left."""
-    value = terms[0]
-    for term in terms[1:]:
-        value = value + term
-    return value
-
-
-class Record:
-    """What every evaluation within one program reads: constants, inputs, the unknown."""
-
-    def __init__(self, kernel: Kernel, program: Program) -> None:
-        self.kernel, self.program = kernel, program
-        layout, load = kernel.layout, program.load
-        self.constants: Point = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
-        self.z: Value = 0.0
-        if kernel.reduction.unknown is not None:
-            self.z, self.z_scale = load(Row.Z), load(Row.Z_SCALE)
-
-    def inputs(self, moment: Value) -> Point:
-        """Inputs and their slopes at a local time of the segment."""
-        choice, layout, load, found = self.kernel.choice, self.kernel.layout, self.program.load, {}
-        for i, c in enumerate(CHANNELS):
-            value: Value = load(Row.INPUT + i)
-            if choice.level != "constant":
-                slope: Value = load(Row.SLOPE + i)
-                value = value + slope * moment
-                for h in range(choice.harmonics):
-                    k = i * choice.harmonics + h
-                    amplitude, omega = load(layout.amplitude + k), load(layout.omega + k)
-                    angle = omega * moment + load(layout.phase + k)
-                    value = value + amplitude * primitive("sin", angle)
-                    slope = slope + amplitude * omega * primitive("cos", angle)
-                found[f"slope_{c}"] = slope
-            found[f"in_{c}"] = value
-        if self.kernel.reduction.model.imposed != 0:
-            found["time"] = load(Row.START) + moment
+    def course(self, program: Program, i: int) -> list[Value]:
+        """The same with the rates at both ends, which the dense output of a Rosenbrock method does not have."""
+        found = self.polynomial(program, i)
+        if not self.method.implicit:
+            return found
+        h = program.load(Row.DONE)
+        first = h * program.load(Row.W_RATE_OLD) - found[1]
+        last = h * program.load(self.layout.rate + i) - total(slope_of(found))
+        found[1] = found[1] + first
+        found[2] = found[2] - (2.0 * first + last)
+        found[3] = found[3] + (first + last)
         return found
-
-    def state(self) -> list[Node]:
-        """The record's own state."""
-        return [self.program.load(self.kernel.layout.state + i) for i in range(self.kernel.size)]
-
-    def point(self, moment: Value) -> Point:
-        """The record's state and the inputs at a local time."""
-        return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
-
-    def evaluated(self, formulas: Formulas, point: Point, solved: bool = True) -> list[Value]:
-        """Formulas at a point, the unknown solved for there."""
-        if solved and self.kernel.residual is not None:
-            self.z = self._solved(self.kernel.residual, point)
-        return formulas(self.constants | point | {"z": self.z})
-
-    def _solved(self, residual: Formulas, point: Point) -> Value:
-        """Newton's method for the unknown, a fixed number of steps; the failure is NaN."""
-        reduction = self.kernel.reduction
-        clamped = not (str(reduction.unknown) == "a_x" or reduction.velocity == "linear")
-
-        def improved(z: Node) -> tuple[list[Value], list[Value]]:
-            value, slope = residual(self.constants | point | {"z": z})
-            change = value / slope
-            if clamped:
-                change = smaller(larger(change, -2.0), 2.0)
-            z = z - change
-            return [z], [z, change]
-
-        z, change = Loop(NEWTON_STEPS, [self.z], improved).outcome()
-        found: Value = select(abs(change) <= 1e-7 * abs(z) + 1e-9 * abs(self.z_scale), z, float("nan"))
-        return found
-
-    def keep_unknown(self) -> None:
-        """Store it, as a guess for the next time."""
-        if self.kernel.reduction.unknown is not None:
-            self.program.store(Row.Z, self.z)
-
-    def faster(self, point: Point) -> Value:
-        """The velocity above which the block slips."""
-        limit: Value = larger(FASTER * point["in_v"], self.program.load(Row.V_LOW))
-        return limit
-
-
-class Step(Record):
-    """Writes one step."""
-
-    def __init__(self, kernel: Kernel, name: str = "step") -> None:
-        super().__init__(kernel, Program(name))
-        load, layout, n = self.program.load, kernel.layout, kernel.size
-        self.old = self.state()
-        self.first: list[Value] = [load(layout.rate + i) for i in range(n)]
-        self.atol, self.rtol = [load(layout.atol + i) for i in range(n)], load(Row.RTOL)
-        self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.END)
-        rest = self.end - self.tau
-        self.rest = rest
-        self.last = self.proposed >= rest * 0.99999999
-        self.h: Value = select(self.last, rest, self.proposed)
-        self.new: Sequence[Value] = ()
-        self.steady = None if kernel.timed else self.inputs(self.tau)
-
-    def advance(self) -> None:
-        """The step itself, its error and the size of the next."""
-        method = self.kernel.method
-        errors = self._rosenbrock() if method.implicit else self._runge_kutta()
-        error: Value = 0.0
-        for i, e in enumerate(errors):
-            scaled = e / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i])))
-            error = error + scaled * scaled
-        error = error * (1 / self.kernel.counted)
-        self.good = error <= 1.0
-        self.size = log(smaller(larger(error, 1e-10), 1e30))
-        self.earlier = self.program.load(Row.ERROR)
-        kept = -0.5 * PROPORTIONAL / method.order * self.size + 0.5 * INTEGRAL / method.order * self.earlier
-        factor = 0.8 * exp(select(self.good, kept, -0.5 / method.order * self.size))
-        factor = select(error < 1e60, smaller(larger(factor, 0.2), 6.0), 0.2)
-        self.after = select(self.last, self.end, self.tau + self.h)
-        next_h = self.h * factor
-        self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
-
-    def _inputs_of(self, s: int) -> Point:
-        """Inputs at stage s."""
-        if self.steady is not None:
-            return self.steady
-        return self.inputs(self.tau + self.kernel.method.nodes[s] * self.h)
-
-    def _found(self, formulas: Formulas, y: Sequence[Value], inputs: Point) -> list[Value]:
-        return self.evaluated(formulas, inputs | {f"y{i}": value for i, value in enumerate(y)})
-
-    def _runge_kutta(self) -> list[Value]:
-        method, n, h = self.kernel.method, self.kernel.size, self.h
-        self.stages: list[Sequence[Value]] = [self.first]
-        for s in range(1, method.stages):
-            y = [self.old[i] + h * weighted(method.a[s], [k[i] for k in self.stages]) for i in range(n)]
-            whole = s == method.stages - 1
-            self.here = self._inputs_of(s)
-            found = self._found(self.kernel.full if whole else self.kernel.rates, y, self.here)
-            self.stages.append(found[:n])
-        self.new, self.rates, self.outputs = y, found[:n], found[n:]
-        return [h * weighted(method.error, [k[i] for k in self.stages]) for i in range(n)]
-
-    def _rosenbrock(self) -> list[Value]:
-        kernel, method, n, h = self.kernel, self.kernel.method, self.kernel.size, self.h
-        beginning = self.steady if self.steady is not None else self.inputs(self.tau)
-        point = beginning | {f"y{i}": value for i, value in enumerate(self.old)}
-        entries = self.evaluated(kernel.jacobian, point, solved=False)
-        jacobian = dict(zip(sorted(kernel.pattern), entries, strict=False))
-        in_time = entries[len(jacobian) :]
-        inverse = 1.0 / h
-        matrix = factorised(n, jacobian, inverse * (1 / method.gamma))
-        arguments = method.arguments()
-        self.stages = []
-        y: list[Value] = list(self.old)
-        for s in range(method.stages):
-            rates: Sequence[Value] = self.first
-            if s:
-                if s < len(method.a):
-                    y = [self.old[i] + weighted(arguments[s], [u[i] for u in self.stages]) for i in range(n)]
-                else:
-                    y = [y[i] + self.stages[-1][i] for i in range(n)]
-                rates = self._found(kernel.rates, y, self._inputs_of(s))
-            right = list(rates)
-            for i in range(n):
-                if s and any(method.c[s]):
-                    right[i] = right[i] + inverse * weighted(method.c[s], [u[i] for u in self.stages])
-                if kernel.timed and abs(method.time_weights[s]) > 1e-12:
-                    right[i] = right[i] + h * method.time_weights[s] * in_time[i]
-            self.stages.append(substituted(matrix, right))
-        self.new = [y[i] + self.stages[-1][i] for i in range(n)]
-        self.here = self.steady if self.steady is not None else self.inputs(self.tau + h)
-        found = self._found(kernel.full, self.new, self.here)
-        self.rates, self.outputs = found[:n], found[n:]
-        return list(self.stages[-1])
-
-    def keep(self) -> None:
-        """Keep or reject the step; raise the flag where the driver is needed."""
-        load, store, good = self.program.load, self.program.store, self.good
-        if self.kernel.choice.dense:
-            self._keep_stages()
-        self._keep_state()
-        before = [load(row) for row in (Row.V, Row.ACCELERATION, Row.SIGMA)]
-        v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs, before, strict=True))
-        for row, value in ((Row.V, v), (Row.ACCELERATION, acceleration), (Row.SIGMA, sigma)):
-            store(row, value)
-        moved = select(good, self.after, self.tau)
-        store(Row.TAU, moved)
-        store(Row.H, self.next_h)
-        store(Row.GOOD, select(good, 1.0, 0.0))
-        accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
-        store(Row.ACCEPTED, accepted)
-        store(Row.REJECTED, rejected)
-        failures = select(good, 0.0, load(Row.FAILURES) + 1.0)
-        store(Row.FAILURES, failures)
-        gap = select(good, v - self.faster(self.here), load(Row.GAP))
-        store(Row.GAP, gap)
-        slipping, resting = select(gap > 0.0, 1.0, 0.0), select(abs(v) < load(Row.V_LOW), 1.0, 0.0)
-        change, rounding = before[1] * self.h, 1e-10 * abs(v)  # a turn is more than rounding
-        event = select((change > rounding) & (acceleration <= 0.0), 1.0, 0.0)
-        event = event + select((change < -rounding) & (acceleration >= 0.0), 1.0, 0.0)
-        event = event + (abs(slipping - load(Row.SLIPPING)) + abs(resting - load(Row.RESTING)))
-        reasons = [
-            moved >= self.end,
-            accepted + rejected >= load(Row.MOST),
-            failures >= MOST_FAILURES,
-            abs(v) >= load(Row.V_HIGH),
-            sigma <= load(Row.SIGMA_LOW),
-            moved > load(Row.NEXT),
-        ]
-        flag = total([select(reason, 1.0, 0.0) for reason in reasons])
-        flag = flag + load(Row.RECORD) * select(good, 1.0, 0.0)
-        store(Row.FLAG, (flag + event * load(Row.WATCH)) * load(Row.ACTIVE))
-
-    def _keep_state(self) -> None:
-        layout, store, good = self.kernel.layout, self.program.store, self.good
-        for i in range(self.kernel.size):
-            store(layout.state + i, select(good, self.new[i], self.old[i]))
-            store(layout.rate + i, select(good, self.rates[i], self.first[i]))
-        store(Row.ERROR, select(good, self.size, self.earlier))
-        if self.kernel.reduction.unknown is not None:
-            store(Row.Z, select(good, self.z, self.program.load(Row.Z)))
-
-    def _keep_stages(self) -> None:
-        layout, n, load, store = self.kernel.layout, self.kernel.size, self.program.load, self.program.store
-        for i in range(n):
-            store(layout.old + i, self.old[i])
-        for s, stage in enumerate(self.stages):
-            for i in range(n):
-                store(layout.stage + s * n + i, stage[i])
-        for row, now in ((Row.V_OLD, Row.V), (Row.ACCELERATION_OLD, Row.ACCELERATION), (Row.SIGMA_OLD, Row.SIGMA)):
-            store(row, load(now))
-        store(Row.DONE, self.h)
-        store(Row.TAU_OLD, self.tau)

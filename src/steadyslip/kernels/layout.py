@@ -19,14 +19,12 @@ class Row(IntEnum):
 
     V, ACCELERATION, SIGMA = 0, 1, 2
     """Outputs at the end of the step."""
-    GAP = 3
-    """How much faster than the load point (and than the limit of arrest) the block is."""
-    Z, Z_SCALE = 4, 5
+    Z, Z_SCALE = 3, 4
     """The unknown of the balance, or a guess of it, and its scale."""
-    TAU, H, END = 6, 7, 8
+    TAU, H, END = 5, 6, 7
     """Time since the start of the segment, next step, length of the segment."""
-    START, SEGMENT = 9, 10
-    """Start of the segment since that of the run, and its number."""
+    START, STOP, SEGMENT = 8, 9, 10
+    """Start and end of the segment since the start of the run, and its number."""
     RTOL = 11
     INPUT, SLOPE = 12, 15
     """v_lp, q and p at the start of the segment and their slopes: three each."""
@@ -34,35 +32,41 @@ class Row(IntEnum):
     """Whether there is a job, whether it needs the driver, whether the last step was accepted."""
     ACCEPTED, REJECTED, FAILURES, ERROR = 21, 22, 23, 24
     MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 25, 26, 27, 28, 29, 30
-    NEXT = 31
-    """How far into the segment the next sample is."""
-    SLIPPING, RESTING = 32, 33
-    DONE, TAU_OLD = 34, 35
-    """Length of the last step and where it began."""
-    V_OLD, ACCELERATION_OLD, SIGMA_OLD = 36, 37, 38
+    NEXT, TAKEN = 31, 32
+    """How far into the segment the next sample is, and its number."""
+    V_DRIVE, LOG = 33, 34
+    """Velocity of the drive, and whether there is a log."""
+    DONE, TAU_OLD, W_RATE_OLD = 35, 36, 37
+    """Length of the last step, where it began, and the rate of the velocity variable there."""
+    EXTENDED = 38
+    """Whether the stages are there that only dense output needs."""
+    HAPPENED, CROSSED = 39, 40
+    """How many events there are in the last step, and where in it, as a share, slip was found to end (-1: not known)."""
+    W_LIMIT, W_LP = 41, 42
+    """Velocity variable above which the block slips and that of the load point, while inputs are constant."""
     # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
-    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 39, 40, 41
-    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 42, 43, 44, 45, 46, 47
-    ARRESTS, VELOCITY_PEAKS, LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 48, 49, 50, 51, 52
-    NOW_BEGIN, NOW_STRESS, NOW_X, NOW_PEAK, LOAD_MOVED, TAKEN, PEAK_SIZE, ANY_BEGIN = 53, 54, 55, 56, 57, 58, 59, 60
-    STOP = 61
-    """End of the segment since the start of the run."""
-    NOW_FROM, NOW_EVENT, NOW_V, NOW_SIGMA, NOW_TAU, NOW_SEGMENT = 62, 63, 64, 65, 66, 67
-    V_DRIVE = 68
+    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 43, 44, 45
+    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 46, 47, 48, 49, 50, 51
+    LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 52, 53, 54
+    PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 55, 56, 57
+    # slip that may become a slip event: since when, and what was there
+    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN, NOW_AT = 58, 59, 60, 61, 62
+    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 63, 64, 65, 66, 67, 68
 
 
-TALLY = tuple(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH)
-"""Columns of the tally of events, a result."""
 INPUTS = 3
 MOST_FAILURES = 400.0
 """Steps in a row that may be refused. A block with mass that is stopped falls by hundreds of decades in a moment: so
 much shorter may the step have to be than the one before."""
+SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
+# slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)
 
 
 class Out(IntEnum):
     """Places of the outputs, counted from the end of the state."""
 
-    V, ACCELERATION, SIGMA, TAU, T, V_LP, COUNT = 0, 1, 2, 3, 4, 5, 6
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, W_SLOPE, COUNT = 0, 1, 2, 3, 4, 5, 6, 7
+    """W_SLOPE is that of the dense output of the velocity variable; events follow from COUNT on."""
 
 
 class Setting(IntEnum):
@@ -87,10 +91,16 @@ class Status(IntEnum):
     RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
 
 
-class Kind(IntEnum):
-    """What a row of the log says."""
+class Event(IntEnum):
+    """Places of the events that the driver knows in `steadyslip.kernels.events.EVENTS`."""
 
-    NONE, EVENT_BEGINS, EVENT_ENDS, PEAK, ARREST, RESTART, LOST, BLOWN, TROUGH = 0, 1, 2, 3, 4, 5, 6, 7, 8
+    SLIP, TURN, CONTACT = 0, 1, 2
+
+
+class Kind(IntEnum):
+    """What a row of the log says: 2 e + 1 where event number e falls, 2 e + 2 where it rises."""
+
+    SLIP_ENDS, SLIP_BEGINS, PEAK, TROUGH, LOST = 1, 2, 3, 4, 5
 
 
 LOG_COLUMNS = 8
@@ -115,6 +125,10 @@ class Layout(NamedTuple):
     harmonics: int
     stages: int
     """That are kept for dense output; none without."""
+    events: int
+    """That are watched; none without dense output."""
+    watched: int
+    """Whether frequent events are found in all lanes at once."""
     massless: int
     solved: int
     """Whether the balance has to be solved to restore the variables that jumps leave alone."""
@@ -135,6 +149,14 @@ class Layout(NamedTuple):
     constant: int
     old: int
     stage: int
+    mark: int
+    """Values of the functions of events."""
+    happened: int
+    """Which of them changed sign in the last step: 1 rose, -1 fell."""
+    counted: int
+    """How often each kind of event happened."""
+    now: int
+    """State at the begin of slip that may become a slip event."""
     seen: int
     before: int
     rows: int
@@ -142,13 +164,15 @@ class Layout(NamedTuple):
 
 def make_layout(
     *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, massless: bool = False,
-    solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0, seen: int = 0,
+    solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0, seen: int = 0, events: int = 0,
+    watched: bool = False,
 ) -> Layout:  # fmt: skip
     """Put the groups one behind the other."""
     waves = INPUTS * harmonics
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "amplitude": waves, "omega": waves,
-        "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages, "seen": seen,
+        "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages,
+        "mark": events, "happened": events, "counted": 2 * events, "now": size if events else 0, "seen": seen,
         "before": own if seen else 0,
     }  # fmt: skip
     places, position = {}, max(Row) + 1
@@ -157,7 +181,8 @@ def make_layout(
         position += count
     return Layout(
         lanes=lanes, size=size, kept=kept, constants=constants, harmonics=harmonics, stages=stages,
-        massless=int(massless), solved=int(solved), w=w, own=own, directions=directions, x=x, rows=position, **places,
+        massless=int(massless), solved=int(solved), w=w, own=own, directions=directions, x=x, events=events,
+        watched=int(watched), rows=position, **places,
     )  # fmt: skip
 
 
@@ -174,11 +199,12 @@ class Routines(NamedTuple):
     ----------
     step : one step of every lane
     rates : rates, outputs and gap of the record's state
-    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`
+    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events
     restore : the variables that a jump leaves alone, from the record's state
     place : the record's state from them and the velocity variable `number`
     balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
-    dense : ``array[:size]`` = state at the fraction `number` of the last step
+    dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`
+    watch_lanes : of every lane: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed
     """
 
@@ -189,6 +215,7 @@ class Routines(NamedTuple):
     place: Routine
     balance: Routine
     dense: Routine
+    watch_lanes: Routine
     rates_lanes: Routine
     see_lanes: Routine
 

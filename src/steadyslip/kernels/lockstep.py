@@ -12,9 +12,11 @@ from functools import cached_property
 
 import sympy as sp
 
-from steadyslip.kernels.kernel import Choice, Kernel, Record, Step
+from steadyslip.kernels.kernel import Choice, Kernel
 from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
+from steadyslip.kernels.record import Record
+from steadyslip.kernels.step import Step
 from steadyslip.model.reduction import V_LP, P, Q, Reduction
 
 

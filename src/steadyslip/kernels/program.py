@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip.kernels.build import Code, compiled, interpreted
+from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.kernel import Choice, Kernel
-from steadyslip.kernels.layout import SETTINGS, TALLY, Status
+from steadyslip.kernels.layout import SETTINGS, Status
 from steadyslip.model import Model
 from steadyslip.model.reduction import Reduction, reduce_model
 
 STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
-LOG_KINDS = (
-    "", "slip begins", "slip ends", "velocity peak", "arrest", "restart", "contact lost", "blow-up", "velocity trough",
-)  # fmt: skip
 __all__ = ["LOG_KINDS", "SETTINGS", "STATUSES", "TALLY", "Program", "program"]
 
 

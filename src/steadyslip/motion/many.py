@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -32,9 +33,8 @@ from steadyslip.motion.status import WORDS
 from steadyslip.protocol import Protocol
 
 DONE = STATUSES.index("done")
-EVENT_UNITS = dict(
-    zip(TALLY, ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "1", "1", "s", "s", "1"), strict=True)
-)
+_UNITS = ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "s", "s", "1")
+EVENT_UNITS = {name: unit for name, unit in zip_longest(TALLY, _UNITS, fillvalue="1") if name}
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +274,7 @@ class _Store:
         self.steps = np.zeros(size, dtype=np.int64)
         self.rejected = np.zeros(size, dtype=np.int64)
         self.final: dict[str, np.ndarray] = {name: np.full(size, np.nan) for name in wanted}
-        self.events = {name: np.full(size, np.nan) for name in TALLY} if events else {}
+        self.events = {name: np.full(size, np.nan) for name in EVENT_UNITS} if events else {}
         self.samples: dict[str, np.ndarray] = {}
         if len(times):
             self.samples = {name: np.full((size, len(times)), np.nan) for name in wanted}
@@ -288,7 +288,8 @@ class _Store:
         self.end[where] = np.where(absent, np.nan, outcome.final[:, 0])
         counts = np.nan_to_num(outcome.final[:, 2:4])  # NaN where a run was never finished
         self.steps[where], self.rejected[where] = counts.T
-        for i, name in enumerate(TALLY if self.watch else ()):
+        for name in self.events:
+            i = TALLY.index(name)
             self.events[name][where] = np.where(absent, np.nan, outcome.tally[:, i])
         if not self.final:
             return

@@ -14,6 +14,7 @@ from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, 
 from steadyslip.core.expressions import array_function
 from steadyslip.core.records import parameters, twin
 from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.program import Program, program
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -22,8 +23,7 @@ from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W, reduce_mo
 from steadyslip.model.steady import steady_stress
 from steadyslip.protocol import Protocol, Segments, pack
 
-METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4", "tsit5": "tsit5", "rodas4": "rodas4",
-           "rodas5p": "rodas5p"}  # fmt: skip
+METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 LEAST_WEIGHT = 1e-5  # db/da below which a memory variable is not eliminated: rounding is amplified by its inverse
 BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
 CONTACT_SHARE = 1e-9  # of the steady normal stress: below, contact is lost

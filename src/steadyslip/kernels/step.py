@@ -1,0 +1,193 @@
+"""The program of one step: explicit or Rosenbrock, its error, the size of the next, and what asks for the driver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from steadyslip.kernels.events import COUNTED, EVENTS
+from steadyslip.kernels.layout import MOST_FAILURES, Event, Row
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, exp, larger, log, select, smaller, weighted
+from steadyslip.kernels.record import Point, Record, total
+from steadyslip.kernels.rosenbrock import factorised, substituted
+from steadyslip.kernels.source import Formulas
+
+if TYPE_CHECKING:
+    from steadyslip.kernels.kernel import Kernel
+
+PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
+# hardly any rejections, and an end error near rtol after tens of cycles
+
+
+class Step(Record):
+    """Writes one step."""
+
+    def __init__(self, kernel: Kernel, name: str = "step") -> None:
+        super().__init__(kernel, Program(name))
+        load, layout, n = self.program.load, kernel.layout, kernel.size
+        self.old = self.state()
+        self.first: list[Value] = [load(layout.rate + i) for i in range(n)]
+        self.atol, self.rtol = [load(layout.atol + i) for i in range(n)], load(Row.RTOL)
+        self.tau, self.proposed, self.end = load(Row.TAU), load(Row.H), load(Row.END)
+        rest = self.end - self.tau
+        self.rest = rest
+        self.last = self.proposed >= rest * 0.99999999
+        self.h: Value = select(self.last, rest, self.proposed)
+        self.new: Sequence[Value] = ()
+        self.steady = None if kernel.timed else self.inputs(self.tau)
+
+    def advance(self) -> None:
+        """The step itself, its error and the size of the next."""
+        method = self.kernel.method
+        errors = self._rosenbrock() if method.implicit else self._runge_kutta()
+        error: Value = 0.0
+        for i, e in enumerate(errors):
+            scaled = e / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i])))
+            error = error + scaled * scaled
+        error = error * (1 / self.kernel.counted)
+        self.good = error <= 1.0
+        self.size = log(smaller(larger(error, 1e-10), 1e30))
+        self.earlier = self.program.load(Row.ERROR)
+        kept = -0.5 * PROPORTIONAL / method.order * self.size + 0.5 * INTEGRAL / method.order * self.earlier
+        factor = 0.8 * exp(select(self.good, kept, -0.5 / method.order * self.size))
+        factor = select(error < 1e60, smaller(larger(factor, 0.2), 6.0), 0.2)
+        self.after = select(self.last, self.end, self.tau + self.h)
+        next_h = self.h * factor
+        self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
+
+    def _inputs_of(self, s: int) -> Point:
+        """Inputs at stage s."""
+        if self.steady is not None:
+            return self.steady
+        return self.inputs(self.tau + self.kernel.method.nodes[s] * self.h)
+
+    def _found(self, formulas: Formulas, y: Sequence[Value], inputs: Point) -> list[Value]:
+        return self.evaluated(formulas, inputs | {f"y{i}": value for i, value in enumerate(y)})
+
+    def _runge_kutta(self) -> list[Value]:
+        method, n, h = self.kernel.method, self.kernel.size, self.h
+        self.stages: list[Sequence[Value]] = [self.first]
+        for s in range(1, method.stages):
+            y = [self.old[i] + h * weighted(method.a[s], [k[i] for k in self.stages]) for i in range(n)]
+            whole = s == method.stages - 1
+            self.here = self._inputs_of(s)
+            found = self._found(self.kernel.full if whole else self.kernel.rates, y, self.here)
+            self.stages.append(found[:n])
+        self.new, self.rates, self.outputs = y, found[:n], found[n:]
+        return [h * weighted(method.error, [k[i] for k in self.stages]) for i in range(n)]
+
+    def _rosenbrock(self) -> list[Value]:
+        kernel, method, n, h = self.kernel, self.kernel.method, self.kernel.size, self.h
+        beginning = self.steady if self.steady is not None else self.inputs(self.tau)
+        point = beginning | {f"y{i}": value for i, value in enumerate(self.old)}
+        entries = self.evaluated(kernel.jacobian, point, solved=False)
+        jacobian = dict(zip(sorted(kernel.pattern), entries, strict=False))
+        in_time = entries[len(jacobian) :]
+        inverse = 1.0 / h
+        matrix = factorised(n, jacobian, inverse * (1 / method.gamma))
+        arguments = method.arguments()
+        self.stages = []
+        y: list[Value] = list(self.old)
+        for s in range(method.stages):
+            rates: Sequence[Value] = self.first
+            if s:
+                if s < len(method.a):
+                    y = [self.old[i] + weighted(arguments[s], [u[i] for u in self.stages]) for i in range(n)]
+                else:
+                    y = [y[i] + self.stages[-1][i] for i in range(n)]
+                rates = self._found(kernel.rates, y, self._inputs_of(s))
+            right = list(rates)
+            for i in range(n):
+                if s and any(method.c[s]):
+                    right[i] = right[i] + inverse * weighted(method.c[s], [u[i] for u in self.stages])
+                if kernel.timed and abs(method.time_weights[s]) > 1e-12:
+                    right[i] = right[i] + h * method.time_weights[s] * in_time[i]
+            self.stages.append(substituted(matrix, right))
+        self.new = [y[i] + self.stages[-1][i] for i in range(n)]
+        self.here = self.steady if self.steady is not None else self.inputs(self.tau + h)
+        found = self._found(kernel.full, self.new, self.here)
+        self.rates, self.outputs = found[:n], found[n:]
+        return list(self.stages[-1])
+
+    def keep(self) -> None:
+        """Keep or reject the step; raise the flag where the driver is needed."""
+        load, store, good = self.program.load, self.program.store, self.good
+        if self.kernel.choice.dense:
+            self._keep_stages()
+        self._keep_state()
+        before = [load(row) for row in (Row.V, Row.ACCELERATION, Row.SIGMA)]
+        v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs, before, strict=True))
+        for row, value in ((Row.V, v), (Row.ACCELERATION, acceleration), (Row.SIGMA, sigma)):
+            store(row, value)
+        moved = select(good, self.after, self.tau)
+        store(Row.TAU, moved)
+        store(Row.H, self.next_h)
+        store(Row.GOOD, select(good, 1.0, 0.0))
+        accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
+        store(Row.ACCEPTED, accepted)
+        store(Row.REJECTED, rejected)
+        failures = select(good, 0.0, load(Row.FAILURES) + 1.0)
+        store(Row.FAILURES, failures)
+        reasons = [
+            moved >= self.end,
+            accepted + rejected >= load(Row.MOST),
+            failures >= MOST_FAILURES,
+            abs(v) >= load(Row.V_HIGH),
+            sigma <= load(Row.SIGMA_LOW),
+            moved > load(Row.NEXT),
+        ]
+        flag = total([select(reason, 1.0, 0.0) for reason in reasons])
+        flag = flag + load(Row.RECORD) * select(good, 1.0, 0.0)
+        if self.kernel.choice.dense:
+            happened = self._events()
+            flag = flag + select(happened > 0.0, 1.0, 0.0)
+        store(Row.FLAG, flag * load(Row.ACTIVE))
+
+    def _events(self) -> Node:
+        """Which functions of events changed sign; returns how many, where that is watched."""
+        load, store, layout = self.program.load, self.program.store, self.kernel.layout
+        at = self.moment(self.here, self.outputs, self.h)
+        count = as_node(0.0)
+        for e, (event, value) in enumerate(zip(EVENTS, self.marks(at), strict=True)):
+            before = load(layout.mark + e)
+            small = event.rounding(at) if event.rounding is not None else 0.0
+            change = as_node(0.0)
+            if event.falls:
+                change = select((before > small) & (value <= 0.0), -1.0, change)
+            if event.rises:
+                change = select((before <= -small) & (value > 0.0), 1.0, change)
+            change = select(self.good, change, 0.0)
+            change = change * load(Row.WATCH)
+            store(layout.happened + e, change)
+            for kind, own in ((2 * e, change < 0.0), (2 * e + 1, change > 0.0)):
+                if COUNTED[kind]:
+                    place = layout.counted + kind
+                    store(place, load(place) + select(own, 1.0, 0.0))
+            store(layout.mark + e, select(self.good, value, before))
+            if e not in tuple(Event):  # its count is all there is to the tally
+                change = select(load(Row.LOG) > 0.0, change, 0.0)
+            count = count + abs(change)
+        happened = count * load(Row.ACTIVE)
+        store(Row.HAPPENED, happened)
+        return happened
+
+    def _keep_state(self) -> None:
+        layout, store, good = self.kernel.layout, self.program.store, self.good
+        for i in range(self.kernel.size):
+            store(layout.state + i, select(good, self.new[i], self.old[i]))
+            store(layout.rate + i, select(good, self.rates[i], self.first[i]))
+        store(Row.ERROR, select(good, self.size, self.earlier))
+        if self.kernel.reduction.unknown is not None:
+            store(Row.Z, select(good, self.z, self.program.load(Row.Z)))
+
+    def _keep_stages(self) -> None:
+        layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
+        for i in range(n):
+            store(layout.old + i, self.old[i])
+        for s, stage in enumerate(self.stages):
+            for i in range(n):
+                store(layout.stage + s * n + i, stage[i])
+        if layout.w >= 0:
+            store(Row.W_RATE_OLD, self.first[layout.w])
+        store(Row.DONE, self.h)
+        store(Row.TAU_OLD, self.tau)

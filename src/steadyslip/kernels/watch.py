@@ -1,0 +1,132 @@
+"""The program that finds frequent events in all lanes at once, and keeps the tally of lanes without a log.
+
+Extremes of velocity and the begin and end of slip are roots of the dense output's polynomial in the velocity variable,
+or of its derivative. A lane where that is not enough keeps its flag and is left to the driver: slip events that end,
+contact that is lost, several events within a step, slip that begins or ends while inputs change, a root that is not
+found at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from steadyslip.kernels.layout import SLIP_EVENT, Event, Row
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, larger, log, select, smaller
+from steadyslip.kernels.record import Record, horner, slope_of
+from steadyslip.kernels.source import Formulas
+
+if TYPE_CHECKING:
+    from steadyslip.kernels.kernel import Kernel
+
+ROUNDS = 2  # of Halley's method, from the root of a straight line
+FOUND = 3e-4  # last change, as a share of the step, of a root that is found to the cube of that
+
+
+class Watch(Record):
+    """Writes it."""
+
+    def __init__(self, kernel: Kernel, speed: Formulas) -> None:
+        super().__init__(kernel, Program("watch_lanes"))
+        self.speed = speed
+        load, layout = self.program.load, kernel.layout
+        slip, turn = load(layout.happened + Event.SLIP), load(layout.happened + Event.TURN)
+        self.begins, self.ends = slip > 0.0, slip < 0.0
+        self.peak, self.trough = turn < 0.0, turn > 0.0
+        self.turns = self.peak | self.trough
+        self.tau_old, self.h = load(Row.TAU_OLD), load(Row.DONE)
+        self.now_from, self.now_event = load(Row.NOW_FROM), load(Row.NOW_EVENT)
+
+    def write(self) -> Program:
+        """The whole program."""
+        load, store, layout = self.program.load, self.program.store, self.kernel.layout
+        self._locate()
+        count = load(Row.HAPPENED)
+        left = (load(layout.happened + Event.CONTACT) < 0.0) | (self.turns & (self.begins | self.ends)) | ~self.found
+        if self.kernel.choice.level != "constant":
+            left = left | self.begins | self.ends
+        located, left = ~left, left | (self.ends & (self.now_event > 0.0))
+        store(Row.CROSSED, select(located & self.ends, self.theta, -1.0))
+        self.here = (count > 0.0) & ~left
+        store(Row.HAPPENED, select(self.here, 0.0, count))
+        self._turn()
+        self._slip()
+        store(Row.FLAG, load(Row.FLAG) - select(self.here, 1.0, 0.0))
+        return self.program
+
+    def _locate(self) -> None:
+        """The fraction of the step at which velocity turns or slip begins."""
+        kernel, program, w = self.kernel, self.program, self.kernel.layout.w
+        own, course = kernel.polynomial(program, w), kernel.course(program, w)
+        limit = program.load(Row.W_LIMIT)
+        crossing: list[Value] = [own[0] - limit, *own[1:]]
+        turning = slope_of(course)
+        turning += [0.0] * (len(crossing) - len(turning))
+        crossing += [0.0] * (len(turning) - len(crossing))
+        wanted = [select(self.turns, a, b) for a, b in zip(turning, crossing, strict=True)]
+        rates = program.load(Row.W_RATE_OLD), program.load(kernel.layout.rate + w)
+        first = select(self.turns, self.h * rates[0], own[0] - limit)
+        last = select(self.turns, self.h * rates[1], program.load(kernel.layout.state + w) - limit)
+        theta: Node = first / (first - last)
+        change: Node = theta
+        slopes = slope_of(wanted)
+        bends = slope_of(slopes)
+        for _ in range(ROUNDS):
+            value, slope, bend = (as_node(horner(c, theta)) for c in (wanted, slopes, bends))
+            change = 2.0 * value * slope / (2.0 * slope * slope - value * bend)
+            theta = smaller(larger(theta - change, 0.0), 1.0)
+        self.theta, self.found = theta, abs(change) <= FOUND
+        self.tau = self.tau_old + theta * self.h
+        self.there: list[Value] = [horner(kernel.polynomial(program, i), theta) for i in range(kernel.size)]
+        start, stop = program.load(Row.START), program.load(Row.STOP)
+        self.time = select(self.tau < program.load(Row.END), smaller(start + self.tau, stop), stop)
+        point = self.inputs(self.tau) | {f"y{i}": y for i, y in enumerate(self.there)}
+        self.v, self.v_lp = self.speed(self.constants | point)[0], point["in_v"]
+
+    def _kept(self, row: int, condition: Node, value: Value) -> Node:
+        """Store a value where a condition holds, and return what is there now."""
+        new: Node = select(condition, value, self.program.load(row))
+        self.program.store(row, new)
+        return new
+
+    def _turn(self) -> None:
+        """Peaks and troughs of velocity."""
+        load = self.program.load
+        peak = self.here & self.peak
+        self._kept(Row.PEAK_VELOCITY, peak, larger(load(Row.PEAK_VELOCITY), self.v))
+        self._kept(Row.LOWEST_VELOCITY, self.here & self.trough, smaller(load(Row.LOWEST_VELOCITY), self.v))
+        size = self._size()
+        last, before = load(Row.LAST_PEAK_TIME), load(Row.PEAK_SIZE)
+        again = peak & (last >= 0.0)
+        self._kept(Row.PEAK_PERIOD, again, self.time - last)
+        self._kept(Row.PEAK_GROWTH, again, abs(size) - abs(before))
+        self._kept(Row.PEAK_SIZE, peak, size)
+        self._kept(Row.LAST_PEAK_TIME, peak, self.time)
+
+    def _size(self) -> Node:
+        """ln of velocity over that of the load point."""
+        kernel, v_lp = self.kernel, as_node(self.v_lp)
+        size: Value = log(abs(as_node(self.v) / v_lp))
+        if kernel.reduction.velocity == "logarithm" and kernel.choice.level == "constant":
+            size = self.there[kernel.layout.w] - self.program.load(Row.W_LP)
+        found: Node = select((v_lp > 0.0) | (v_lp < 0.0), size, float("inf"))
+        return found
+
+    def _slip(self) -> None:
+        """Slip that begins, that becomes a slip event at a peak, or that ends before it does."""
+        load, here = self.program.load, self.here
+        anew = self.trough & (self.now_event <= 0.0) & (as_node(self.v) < self.now_from)
+        anew = here & (self.begins | (anew & (self.now_from < float("inf"))))
+        over = here & self.ends
+        self._kept(Row.NOW_FROM, anew | over, select(anew, self.v, float("inf")))
+        v_lp, least = as_node(self.v_lp), load(Row.V_LOW)
+        asked = select(v_lp > least, v_lp, load(Row.V_DRIVE))
+        quick = here & self.peak & (as_node(self.v) >= SLIP_EVENT * larger(asked, self.now_from))
+        event = select(quick, 1.0, self.now_event)
+        self.program.store(Row.NOW_EVENT, select(anew | over, 0.0, event))
+        highest = select(here & self.peak, larger(load(Row.NOW_PEAK), self.v), load(Row.NOW_PEAK))
+        self.program.store(Row.NOW_PEAK, select(anew, self.v, highest))
+        kept: Sequence[tuple[int, Value]] = [(Row.NOW_BEGIN, self.time), (Row.NOW_AT, self.tau)]
+        kept = [*kept, *((self.kernel.layout.now + i, y) for i, y in enumerate(self.there))]
+        for row, value in kept:
+            self._kept(row, anew, value)

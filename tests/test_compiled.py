@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -17,11 +18,11 @@ import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.files.sealed import write_sealed
 from steadyslip.kernels import build, driver, primitives
-from steadyslip.kernels.layout import Cursor, Row, make_layout
-from steadyslip.kernels.methods import METHODS, Method, explicit, order_defect, rodas4, rooted_trees
+from steadyslip.kernels.layout import Cursor, Out, Routines, Row, make_layout
+from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
 from steadyslip.kernels.printers import python as plain
-from steadyslip.kernels.program import Program
+from steadyslip.kernels.program import Program, program
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.setup import Options, prepare
@@ -80,6 +81,23 @@ def test_numbers_of_rooted_trees():
     assert [len(rooted_trees(n)) for n in range(1, 8)] == [1, 1, 2, 4, 9, 20, 48]
 
 
+def test_the_pair_of_order_8_is_that_of_scipy():
+    """Its coefficients, its combined error estimate and its dense output are those of SciPy's DOP853."""
+    from scipy.integrate import DOP853
+
+    solver = DOP853(lambda t, y: [np.cos(t) * y[0]], 0.0, [1.0], np.inf, rtol=1e-6, atol=1e-9, first_step=0.3)
+    solver.step()
+    method, h = dop853(), solver.t - solver.t_old
+    output = solver.dense_output()
+    stages = solver.K_extended[:, 0]
+    np.testing.assert_allclose(method.nodes[: method.stages - 1], solver.C, atol=1e-13)
+    for theta in (0.2, 0.5, 0.9):
+        between = solver.y_old[0] + h * method.dense_weights(theta) @ stages
+        assert between == pytest.approx(output(solver.t_old + theta * h)[0], rel=1e-13)
+    np.testing.assert_allclose(method.error, solver.E5, atol=1e-15)
+    np.testing.assert_allclose(method.lower_error, solver.E3, atol=1e-15)
+
+
 @pytest.mark.parametrize("name", METHODS)
 def test_order_is_exactly_what_is_claimed(name):
     method = METHODS[name]()
@@ -92,23 +110,22 @@ def test_order_is_exactly_what_is_claimed(name):
     assert np.allclose(method.dense_weights(1.0), b, atol=1e-12)
 
 
-@pytest.mark.parametrize("make", [explicit, rodas4])
+@pytest.mark.parametrize("make", [explicit, dop853, rodas4])
 def test_a_wrong_digit_in_a_tableau_is_refused(make):
     good = make()
     a = [list(row) for row in good.a]
     a[3][1] += 1e-6
     with pytest.raises(ValueError, match="order condition"):
-        Method(good.name, good.order, good.error_order, good.dense_order, tuple(map(tuple, a)), good.c, good.error,
-               good.dense, good.gamma)  # fmt: skip
+        replace(good, a=tuple(map(tuple, a)))
 
 
-def fixed_step(a_rig, method, protocol, until, steps, initial):
-    """End state with a given number of equal steps: the text's step with an infinite tolerance."""
-    jobs = prepare(a_rig, protocol, until, {}, initial, Options(method=method))
-    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
-    layout, routines = machine.code.layout, machine.code.routines
+def fixed_step(machine, jobs, until, steps):
+    """End state with a given number of equal steps: the machine code's step with an infinite tolerance."""
+    layout = machine.code.layout
+    routines = Routines(*(routine_at(address) for address in machine.code.routines))
     constants, start, settings, segments = jobs.tables(machine, 0, 1, False, False)
-    work, cursor, y = np.zeros(layout.rows), np.zeros(len(Cursor), dtype=np.int64), np.empty(layout.size + 6)
+    work, cursor = np.zeros(layout.rows), np.zeros(len(Cursor), dtype=np.int64)
+    y = np.empty(layout.size + Out.COUNT + layout.events)
     arrays = (constants, start, settings, segments, np.empty(0))
     with np.errstate(all="ignore"):
         driver.start_job(work, layout, routines, 0, cursor, np.zeros((0, 8)), arrays, y)
@@ -119,21 +136,31 @@ def fixed_step(a_rig, method, protocol, until, steps, initial):
     return work[layout.state : layout.state + layout.size].copy()
 
 
+def routine_at(address):
+    """A routine of machine code as a Python function."""
+    pointer = ctypes.POINTER(ctypes.c_double)
+    function = ctypes.CFUNCTYPE(None, pointer, ctypes.c_double, pointer)(address)
+    return lambda record, number, array: function(record.ctypes.data_as(pointer), number, array.ctypes.data_as(pointer))
+
+
+HEAVY = {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}
 ORDERS = {
-    # method, order, inputs vary, rig, counts of steps over 4 (3) units of time
-    "tsit5": ("tsit5", 5, False, {"stiffness": 1e10, "radiation_damping": 2e10}, (20, 40)),
-    "tsit5 with waves": ("tsit5", 5, True, {"stiffness": 2e10}, (40, 80)),
-    "rodas4": ("rodas4", 4, False, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (48, 96)),
-    "rodas4 with waves": ("rodas4", 4, True, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (48, 96)),
-    "rodas5p": ("rodas5p", 5, False, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (24, 48)),
-    "rodas5p with waves": ("rodas5p", 5, True, {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}, (24, 48)),
+    # method, order, inputs vary, rig, end, counts of steps
+    "tsit5": ("tsit5", 5, False, {"stiffness": 1e10, "radiation_damping": 2e10}, 4.0, (20, 40)),
+    "tsit5 with waves": ("tsit5", 5, True, {"stiffness": 2e10}, 4.0, (40, 80)),
+    "dop853": ("dop853", 8, False, {"stiffness": 1e10, "radiation_damping": 2e10}, 40.0, (16, 24)),
+    "dop853 with waves": ("dop853", 8, True, {"stiffness": 2e10}, 20.0, (48, 64)),
+    "rodas4": ("rodas4", 4, False, HEAVY, 3.0, (48, 96)),
+    "rodas4 with waves": ("rodas4", 4, True, HEAVY, 3.0, (48, 96)),
+    "rodas5p": ("rodas5p", 5, False, HEAVY, 3.0, (24, 48)),
+    "rodas5p with waves": ("rodas5p", 5, True, HEAVY, 3.0, (24, 48)),
 }
 
 
 @pytest.mark.parametrize("case", ORDERS, ids=str)
 def test_measured_order(case):
-    """Halving the step divides the error, summed over several kicks, by 2^order; also if inputs vary within it."""
-    method, order, varying, changes, counts = ORDERS[case]
+    """The error, summed over several kicks, falls with the step to the power of the order; also if inputs vary."""
+    method, order, varying, changes, until, counts = ORDERS[case]
     a_rig = rig(contact=CONTACTS[1], friction=ONE_MEMORY[1], **changes)
     waves = [
         ss.VelocityHarmonic(amplitude=1e-7, period=7.0),
@@ -142,11 +169,13 @@ def test_measured_order(case):
     ]
     squares = np.zeros(2)
     for kick in (-2e-6, -1e-6, 1e-6, 2e-6):
-        until = 4.0 if method == "tsit5" else 3.0
-        ends = [fixed_step(a_rig, method, waves if varying else None, until, n, {"x": kick}) for n in (*counts, 1500)]
+        jobs = prepare(a_rig, waves if varying else None, until, {}, {"x": kick}, Options(method=method))
+        machine = program(jobs.reduction.model, jobs.choice(1, True), jobs.eliminate)
+        ends = [fixed_step(machine, jobs, until, n) for n in (*counts, 1500)]
         scale = np.array([1e-6, *[1.0] * (len(ends[0]) - 1)])
         squares += [np.sum(((end - ends[-1]) / scale) ** 2) for end in ends[:2]]
-    assert np.log2(squares[0] / squares[1]) / 2 == pytest.approx(order, abs=0.15), squares
+    measured = np.log(squares[0] / squares[1]) / 2 / np.log(counts[1] / counts[0])
+    assert measured == pytest.approx(order, abs=0.15), squares
 
 
 # -- text and constants
@@ -210,10 +239,8 @@ def test_all_printers_agree():
 
 def called(address, record, number=0.0):
     """Call machine code from here."""
-    pointer = ctypes.POINTER(ctypes.c_double)
-    function = ctypes.CFUNCTYPE(None, pointer, ctypes.c_double, pointer)(address)
     scratch = np.zeros(8)
-    function(record.ctypes.data_as(pointer), number, scratch.ctypes.data_as(pointer))
+    routine_at(address)(record, number, scratch)
     return scratch
 
 
@@ -232,11 +259,12 @@ def test_a_plain_program_is_readable():
 
 
 def test_no_two_quantities_of_a_record_share_a_place():
-    layout = make_layout(lanes=1, size=3, kept=4, constants=5, harmonics=2, stages=7, seen=2, own=3)
+    layout = make_layout(lanes=1, size=3, kept=4, constants=5, harmonics=2, stages=7, seen=2, own=3, events=4)
     places = [(row, 1) for row in Row if row not in (Row.INPUT, Row.SLOPE)] + [(Row.INPUT, 3), (Row.SLOPE, 3)]
     places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 6)]
     places += [(layout.omega, 6), (layout.phase, 6), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
-    places += [(layout.seen, 2), (layout.before, 3)]
+    places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 4), (layout.happened, 4), (layout.counted, 8)]
+    places += [(layout.now, 3)]
     taken = [place + i for place, count in places for i in range(count)]
     assert sorted(taken) == list(range(layout.rows))
 

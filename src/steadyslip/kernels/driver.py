@@ -33,6 +33,7 @@ from steadyslip.kernels.layout import (
     call,
 )
 
+BETWEEN = 3  # points that are recorded between the ends of a step whose dense output has stages of its own
 Arrays = tuple[Array, Array, Array, Array, Array]
 Results = tuple[Array, Array, Array, Array, Array, Array]
 
@@ -203,15 +204,22 @@ def look_now(R: Array, layout: Layout, routines: Routines, tau: float, y: Array)
     call(routines.outputs, R, tau, y)
 
 
-def look_back(R: Array, routines: Routines, theta: float, y: Array) -> None:
-    """State and outputs at the fraction theta of the last step, in y."""
+def between(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
+    """The state at the fraction theta of the last step, in y."""
+    if layout.extra > 0 and R[Row.EXTENDED] == 0.0:
+        call(routines.extend, R, 0.0, y)
     call(routines.dense, R, theta, y)
+
+
+def look_back(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
+    """State and outputs at the fraction theta of the last step, in y."""
+    between(R, layout, routines, theta, y)
     call(routines.outputs, R, R[Row.TAU_OLD] + theta * R[Row.DONE], y)
 
 
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
     """Positive before the event of a kind, not after."""
-    look_back(R, routines, theta, y)
+    look_back(R, layout, routines, theta, y)
     value = y[layout.size + Out.COUNT + (kind - 1) // 2]
     return float(value if kind % 2 == 1 else -value)
 
@@ -267,7 +275,7 @@ def follow(
                 first = i
         theta, kind = order[first, 0], int(order[first, 1])
         order[first, 0] = 2.0
-        look_back(R, routines, theta, y)
+        look_back(R, layout, routines, theta, y)
         tau = tau_old + theta * h
         note(R, layout, routines, kind, tau, y, log, cursor)
         if kind == Kind.LOST:
@@ -410,7 +418,7 @@ def take_samples(
         else:
             if times[k] >= R[Row.STOP] or (tau >= R[Row.TAU] and not arrived):
                 break
-            call(routines.dense, R, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
+            between(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
         for i in range(layout.size):
             samples[row, k, i] = y[i]
         k += 1
@@ -418,14 +426,23 @@ def take_samples(
     await_sample(R, times)
 
 
-def record(R: Array, layout: Layout, cursor: Array, recorded: Array) -> None:
-    """The solver's own step."""
+def record(R: Array, layout: Layout, tau: float, state: Array, first: int, cursor: Array, recorded: Array) -> None:
+    """Write down a state, numbers from `first` of an array, at tau into the segment."""
     i = cursor[Cursor.RECORDED]
-    recorded[i, 0] = clock(R, R[Row.TAU])
+    recorded[i, 0] = clock(R, tau)
     recorded[i, 1] = R[Row.SEGMENT]
     for c in range(layout.size):
-        recorded[i, 2 + c] = R[layout.state + c]
+        recorded[i, 2 + c] = state[first + c]
     cursor[Cursor.RECORDED] = i + 1
+
+
+def record_step(R: Array, layout: Layout, routines: Routines, cursor: Array, recorded: Array, y: Array) -> None:
+    """The solver's own step; steps of high order are long, and get points between."""
+    for i in range(1, BETWEEN + 1 if layout.extra > 0 else 1):
+        theta = i / (BETWEEN + 1)
+        between(R, layout, routines, theta, y)
+        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], y, 0, cursor, recorded)
+    record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
 
 
 def finish(R: Array, layout: Layout, row: int, status: int, results: Results) -> None:
@@ -461,8 +478,10 @@ def go_on(
     if layout.stages > 0 and good:
         lost = R[Row.WATCH] > 0.0 and follow(R, layout, routines, cursor, log, y, order)
         take_samples(R, layout, routines, j - j0, times, samples, False, y)
-        if R[Row.RECORD] > 0.0:
-            record(R, layout, cursor, recorded)
+        if R[Row.RECORD] > 0.0 and lost:
+            record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
+        elif R[Row.RECORD] > 0.0:
+            record_step(R, layout, routines, cursor, recorded, y)
         if lost:
             return Status.CONTACT_LOST
     if abs(R[Row.V]) >= R[Row.V_HIGH]:
@@ -485,7 +504,7 @@ def go_on(
         await_sample(R, times)
         R[Row.H] = h
         if R[Row.RECORD] > 0.0:
-            record(R, layout, cursor, recorded)
+            record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
         if R[Row.WATCH] > 0.0:
             crossed(R, layout, routines, before, slipping > 0.0, cursor, log, y)
     return Status.RUNNING
@@ -528,7 +547,7 @@ def attend(
         ids[lane] = j
         if start_job(R, layout, routines, j, cursor, results[4], arrays, y):
             if R[Row.RECORD] > 0.0:
-                record(R, layout, cursor, results[5])
+                record(R, layout, R[Row.TAU], R, layout.state, cursor, results[5])
             return
         finish(R, layout, j - cursor[Cursor.FIRST_JOB], Status.NO_VELOCITY, results)
     ids[lane] = -1
@@ -583,7 +602,7 @@ def advance(
             attention = flagged(S, lanes)
         if attention > 0:
             if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes > log.shape[0]) or (
-                recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + 4 * lanes > recorded.shape[0]
+                recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + (4 + BETWEEN) * lanes > recorded.shape[0]
             ):
                 cursor[Cursor.PAUSED] = 1
                 return 1

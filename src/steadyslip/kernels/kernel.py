@@ -10,15 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import sympy as sp
 
 from steadyslip.kernels.events import EVENTS, faster
 from steadyslip.kernels.layout import Layout, Out, Row, make_layout
 from steadyslip.kernels.methods import METHODS, Method
-from steadyslip.kernels.nodes import Program, Value, weighted
-from steadyslip.kernels.record import CHANNELS, Record, horner, slope_of, total
+from steadyslip.kernels.nodes import Program, Value
+from steadyslip.kernels.record import CHANNELS, Record, horner, slope_of
 from steadyslip.kernels.rosenbrock import Pattern
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.kernels.step import Step
@@ -184,7 +183,8 @@ class Kernel:
             kept=len(reduction.continuous),
             constants=len(self.constants.all),
             harmonics=choice.harmonics,
-            stages=self.method.stages if choice.dense else 0,
+            stages=self.method.all_stages if choice.dense else 0,
+            extra=choice.dense and self.method.all_stages > self.method.stages,
             massless=massless,
             solved=massless and reduction.unknown is not None,
             w=reduction.names.index("w") if "w" in reduction.names else -1,
@@ -196,10 +196,12 @@ class Kernel:
     @cached_property
     def programs(self) -> tuple[Program, ...]:
         """All programs, in the order of `Routines`."""
-        found = (
+        found: tuple[Program, ...] = (
             self._step(), self._rates_program(), self._outputs_program(), self._restore_program(),
             self._place_program(), self._balance_program(), self._dense_program(),
         )  # fmt: skip
+        if self.layout.extra:
+            found = (*found, self._extend_program())
         if self.layout.watched and self.speed is not None:
             return (*found, Watch(self, self.speed).write())
         return found
@@ -279,39 +281,22 @@ class Kernel:
             program.store(Row.Z, program.number)
         return program
 
+    def _extend_program(self) -> Program:
+        """Stages that only dense output needs."""
+        record, n = Record(self, Program("extend")), self.size
+        for s, stage in enumerate(record.extra_stages()[self.method.stages :], start=self.method.stages):
+            for i in range(n):
+                record.program.store(self.layout.stage + s * n + i, stage[i])
+        record.program.store(Row.EXTENDED, 1.0)
+        return record.program
+
     def _dense_program(self) -> Program:
-        program = Program("dense")
+        record = Record(self, Program("dense"))
+        program = record.program
         theta = program.number
         if self.choice.dense:
-            for i in range(self.size):
-                program.store(i, horner(self.polynomial(program, i), theta), "y")
+            for i, y in enumerate(record.between(theta)):
+                program.store(i, y, "y")
             if self.speed is not None:
-                slope = horner(slope_of(self.course(program, self.layout.w)), theta)
-                program.store(self.size + Out.W_SLOPE, slope, "y")
+                program.store(self.size + Out.W_SLOPE, horner(slope_of(record.course(self.layout.w)), theta), "y")
         return program
-
-    def polynomial(self, program: Program, i: int) -> list[Value]:
-        """Dense output of state variable i: coefficients of powers of the fraction of the last step."""
-        method, n = self.method, self.size
-        old = program.load(self.layout.old + i)
-        stages = [program.load(self.layout.stage + s * n + i) for s in range(method.stages)]
-        if not method.implicit:
-            h, columns = program.load(Row.DONE), zip(*method.dense, strict=True)
-            return [old, *(h * weighted(column, stages) for column in columns)]
-        change = weighted(method.arguments()[method.stages], stages)
-        inner = [weighted(row, stages) for row in method.dense]  # of θ (1 − θ) inner(θ)
-        sums = [change + inner[0], *(after - now for now, after in pairwise(inner)), -inner[-1]]
-        return [old, *sums]
-
-    def course(self, program: Program, i: int) -> list[Value]:
-        """The same with the rates at both ends, which the dense output of a Rosenbrock method does not have."""
-        found = self.polynomial(program, i)
-        if not self.method.implicit:
-            return found
-        h = program.load(Row.DONE)
-        first = h * program.load(Row.W_RATE_OLD) - found[1]
-        last = h * program.load(self.layout.rate + i) - total(slope_of(found))
-        found[1] = found[1] + first
-        found[2] = found[2] - (2.0 * first + last)
-        found[3] = found[3] + (first + last)
-        return found

@@ -41,7 +41,7 @@ class Row(IntEnum):
     EXTENDED = 38
     """Whether the stages are there that only dense output needs."""
     HAPPENED, CROSSED = 39, 40
-    """How many events there are in the last step, and where in it, as a share, slip was found to end (-1: not known)."""
+    """How many events the last step has, and where in it, as a share, slip was found to end (-1: not known)."""
     W_LIMIT, W_LP = 41, 42
     """Velocity variable above which the block slips and that of the load point, while inputs are constant."""
     # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
@@ -125,6 +125,8 @@ class Layout(NamedTuple):
     harmonics: int
     stages: int
     """That are kept for dense output; none without."""
+    extra: int
+    """Whether some of the stages are computed only where they are needed."""
     events: int
     """That are watched; none without dense output."""
     watched: int
@@ -165,7 +167,7 @@ class Layout(NamedTuple):
 def make_layout(
     *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, massless: bool = False,
     solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0, seen: int = 0, events: int = 0,
-    watched: bool = False,
+    watched: bool = False, extra: bool = False,
 ) -> Layout:  # fmt: skip
     """Put the groups one behind the other."""
     waves = INPUTS * harmonics
@@ -182,7 +184,7 @@ def make_layout(
     return Layout(
         lanes=lanes, size=size, kept=kept, constants=constants, harmonics=harmonics, stages=stages,
         massless=int(massless), solved=int(solved), w=w, own=own, directions=directions, x=x, events=events,
-        watched=int(watched), rows=position, **places,
+        watched=int(watched), extra=int(extra), rows=position, **places,
     )  # fmt: skip
 
 
@@ -204,6 +206,7 @@ class Routines(NamedTuple):
     place : the record's state from them and the velocity variable `number`
     balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
     dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`
+    extend : the stages that only dense output needs
     watch_lanes : of every lane: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed
     """
@@ -215,6 +218,7 @@ class Routines(NamedTuple):
     place: Routine
     balance: Routine
     dense: Routine
+    extend: Routine
     watch_lanes: Routine
     rates_lanes: Routine
     see_lanes: Routine

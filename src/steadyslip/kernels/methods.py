@@ -1,4 +1,4 @@
-"""The integration methods: one explicit and one Rosenbrock pair, checked against their order conditions.
+"""The integration methods: explicit and Rosenbrock pairs, checked against their order conditions.
 
 An explicit Runge-Kutta step is y1 = y0 + h Σ b_i k_i with k_i = f(y0 + h Σ a_ij k_j); a Rosenbrock step in
 the form of Hairer & Wanner (Solving ODEs II, IV.7) solves (1/(hγ) − J) u_i = f(y0 + Σ A_ij u_j) +
@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+
+from steadyslip.kernels import dop853 as table
 
 Tree = tuple["Tree", ...]
 _ROUNDING = 2e-9  # published coefficients carry about ten digits beyond the point where they cancel
@@ -46,21 +48,29 @@ def _density(tree: Tree) -> int:
     return product
 
 
-def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
+Known = dict[Tree, np.ndarray]
+
+
+def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray, known: Known) -> np.ndarray:
     """Elementary weights of every stage; a node with one branch sees the linear part too (beta)."""
-    through = beta if len(tree) == 1 else alpha
-    product = np.ones(len(alpha))
-    for branch in tree:
-        product = product * (through @ _weights(branch, alpha, beta))
-    return product
+    if tree not in known:
+        through = beta if len(tree) == 1 else alpha
+        product = np.ones(len(alpha))
+        for branch in tree:
+            product = product * (through @ _weights(branch, alpha, beta, known))
+        known[tree] = product
+    return known[tree]
 
 
-def order_defect(b: np.ndarray, alpha: np.ndarray, beta: np.ndarray, order: int, theta: float = 1.0) -> float:
+def order_defect(
+    b: np.ndarray, alpha: np.ndarray, beta: np.ndarray, order: int, theta: float = 1.0, known: Known | None = None
+) -> float:
     """The largest violation of an order condition up to `order`, for the result at t0 + theta h."""
-    worst = 0.0
+    worst, known = 0.0, {} if known is None else known
     for nodes in range(1, order + 1):
         for tree in rooted_trees(nodes):
-            worst = max(worst, abs(float(b @ _weights(tree, alpha, beta)) - theta**nodes / _density(tree)))
+            defect = float(b @ _weights(tree, alpha, beta, known)) - theta**nodes / _density(tree)
+            worst = max(worst, abs(defect))
     return worst
 
 
@@ -76,10 +86,16 @@ class Method:
     a, c : tuple of tuple of float
         Explicit: a_ij (the last row gives y1) and nothing. Rosenbrock: A_ij and C_ij; from the stage after
         the last row of A on, each argument is the one before plus the newest stage, and so is y1.
+        An explicit method may have rows beyond that of y1, of stages that only its dense output needs.
     error : tuple of float
         Weights of the stages in the error estimate.
+    lower_error : tuple of float
+        The same of a second estimate e of lower order, which makes E² / sqrt(E² + e²/100) of the first, E, as DOP853
+        does; empty for none.
+    lower_order : int
+        Of the second embedded result.
     dense : tuple of tuple of float
-        Explicit: b_i(θ) = Σ_j dense[i][j] θ^(j+1). Rosenbrock: rows of the polynomial
+        Explicit: b_i(θ) = Σ_j dense[i][j] θ^(j+1), extra stages included. Rosenbrock: rows of the polynomial
         (1−θ) y0 + θ (y1 + (1−θ)(r_1 + θ (r_2 + ...))) with r_j = Σ dense[j][i] u_i.
     gamma : float
         Diagonal of a Rosenbrock method, 0 if explicit.
@@ -94,16 +110,21 @@ class Method:
     error: tuple[float, ...]
     dense: tuple[tuple[float, ...], ...]
     gamma: float = 0.0
+    lower_error: tuple[float, ...] = ()
+    lower_order: int = 0
 
     def __post_init__(self) -> None:
         b, embedded, alpha, beta = self._canonical()
-        checks = {
-            "result": order_defect(b, alpha, beta, self.order),
-            "error estimate": order_defect(embedded, alpha, beta, self.error_order),
-        } | {
-            f"dense output at {theta}": order_defect(self.dense_weights(theta), alpha, beta, self.dense_order, theta)
-            for theta in (0.25, 0.6)
-        }
+        known: Known = {}
+
+        def violated(weights: np.ndarray, order: int, theta: float = 1.0) -> float:
+            return order_defect(weights, alpha, beta, order, theta, known)
+
+        checks = {"result": violated(b, self.order), "error estimate": violated(embedded, self.error_order)}
+        if self.lower_error:
+            checks["lower estimate"] = violated(b - self._padded(self.lower_error), self.lower_order)
+        for theta in (0.25, 0.6):
+            checks[f"dense output at {theta}"] = violated(self.dense_weights(theta), self.dense_order, theta)
         for what, defect in checks.items():
             if not defect < _ROUNDING:
                 raise ValueError(f"{self.name}: {what} violates an order condition by {defect:.3g}")
@@ -114,12 +135,18 @@ class Method:
 
     @property
     def stages(self) -> int:
+        """Of a step."""
         return len(self.error)
+
+    @property
+    def all_stages(self) -> int:
+        """Those of dense output included."""
+        return self.stages if self.implicit else len(self.a)
 
     def arguments(self) -> list[tuple[float, ...]]:
         """For every stage and then the result: weights of the earlier stages in its argument."""
         rows = [tuple(row) for row in self.a]
-        while len(rows) <= self.stages:
+        while self.implicit and len(rows) <= self.stages:
             rows.append((*rows[-1], *(0.0,) * (len(rows) - 1 - len(rows[-1])), 1.0))
         return rows
 
@@ -132,18 +159,20 @@ class Method:
         return np.linalg.inv(matrix)
 
     def _full(self, rows: list[tuple[float, ...]]) -> np.ndarray:
-        matrix = np.zeros((len(rows), self.stages))
+        matrix = np.zeros((len(rows), self.all_stages))
         for i, row in enumerate(rows):
             matrix[i, : len(row)] = row
         return matrix
 
+    def _padded(self, weights: tuple[float, ...]) -> np.ndarray:
+        return np.pad(np.array(weights), (0, self.all_stages - len(weights)))
+
     def _canonical(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """b, embedded b, α and β in the notation of the order conditions."""
         rows = self._full(self.arguments())
-        error = np.array(self.error)
+        error = self._padded(self.error)
         if not self.implicit:
-            alpha, b = rows[: self.stages], rows[self.stages - 1]
-            return b, b - error, alpha, alpha
+            return rows[self.stages - 1], rows[self.stages - 1] - error, rows, rows
         gamma = self._lower
         alpha = rows[: self.stages] @ gamma
         b = rows[self.stages] @ gamma
@@ -340,4 +369,29 @@ def rodas5p() -> Method:
     )
 
 
-METHODS: dict[str, Callable[[], Method]] = {"tsit5": explicit, "rodas4": rodas4, "rodas5p": rodas5p}
+@cache
+def dop853() -> Method:
+    """DOP853 of Hairer, Nørsett & Wanner (1993), order 8(5,3), with its dense output of order 7."""
+    first, last = np.zeros(len(table.DENSE[0])), np.zeros(len(table.DENSE[0]))
+    result = np.pad(table.STEP[-1], (0, len(first) - len(table.STEP[-1])))
+    first[0], last[len(table.STEP) - 1] = 1.0, 1.0
+    terms = [result, first - result, 2 * result - first - last, *np.array(table.DENSE)]
+    theta, rest = np.polynomial.Polynomial([0.0, 1.0]), np.polynomial.Polynomial([1.0, -1.0])
+    rows = []
+    for weights in np.transpose(terms):  # θ (f0 + (1-θ) (f1 + θ (f2 + (1-θ) (...))))
+        value = np.polynomial.Polynomial([0.0])
+        for i, weight in enumerate(reversed(weights)):
+            value = (value + weight) * (rest if i % 2 else theta)
+        rows.append(tuple(float(c) for c in np.pad(value.coef[1:], (0, len(terms) + 1 - len(value.coef)))))
+    return Method(
+        name="dop853", order=8, error_order=5, dense_order=7, a=table.STEP + table.EXTRA, c=(), error=table.ERROR,
+        dense=tuple(rows), lower_error=table.LOWER_ERROR, lower_order=3,
+    )  # fmt: skip
+
+
+METHODS: dict[str, Callable[[], Method]] = {
+    "tsit5": explicit,
+    "dop853": dop853,
+    "rodas4": rodas4,
+    "rodas5p": rodas5p,
+}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Row
-from steadyslip.kernels.nodes import Loop, Node, Program, Value, larger, primitive, select, smaller
+from steadyslip.kernels.nodes import Loop, Node, Program, Value, larger, primitive, select, smaller, weighted
 from steadyslip.kernels.source import Formulas
 
 if TYPE_CHECKING:
@@ -132,6 +134,56 @@ class Record:
         """Store it, as a guess for the next time."""
         if self.kernel.reduction.unknown is not None:
             self.program.store(Row.Z, self.z)
+
+    # -- the last step
+
+    @cached_property
+    def stages(self) -> list[list[Value]]:
+        """Stages of the last step, as they were kept."""
+        layout, n, method = self.kernel.layout, self.kernel.size, self.kernel.method
+        place = [[layout.stage + s * n + i for i in range(n)] for s in range(method.all_stages)]
+        return [[self.program.load(row) for row in rows] for rows in place]
+
+    def extra_stages(self) -> list[list[Value]]:
+        """All stages, those that only dense output needs computed."""
+        kernel, method, load, n = self.kernel, self.kernel.method, self.program.load, self.kernel.size
+        found, h = self.stages[: method.stages], load(Row.DONE)
+        old = [load(kernel.layout.old + i) for i in range(n)]
+        for s in range(method.stages, method.all_stages):
+            y = [old[i] + h * weighted(method.a[s], [k[i] for k in found]) for i in range(n)]
+            point = self.inputs(load(Row.TAU_OLD) + method.nodes[s] * h)
+            found.append(self.evaluated(kernel.rates, point | {f"y{i}": value for i, value in enumerate(y)}))
+        return found
+
+    def polynomial(self, i: int) -> list[Value]:
+        """Dense output of state variable i: coefficients of powers of the fraction of the last step."""
+        method, load = self.kernel.method, self.program.load
+        old, stages = load(self.kernel.layout.old + i), [stage[i] for stage in self.stages]
+        if not method.implicit:
+            h, columns = load(Row.DONE), zip(*method.dense, strict=True)
+            return [old, *(h * weighted(column, stages) for column in columns)]
+        change = weighted(method.arguments()[method.stages], stages)
+        inner = [weighted(row, stages) for row in method.dense]  # of θ (1 − θ) inner(θ)
+        return [old, change + inner[0], *(after - now for now, after in pairwise(inner)), -inner[-1]]
+
+    def course(self, i: int) -> list[Value]:
+        """The same with the rates at both ends, which the dense output of a Rosenbrock method does not have."""
+        found = self.polynomial(i)
+        if not self.kernel.method.implicit:
+            return found
+        h = self.program.load(Row.DONE)
+        first = h * self.program.load(Row.W_RATE_OLD) - found[1]
+        last = h * self.program.load(self.kernel.layout.rate + i) - total(slope_of(found))
+        found[1] = found[1] + first
+        found[2] = found[2] - (2.0 * first + last)
+        found[3] = found[3] + (first + last)
+        return found
+
+    def between(self, theta: Node) -> list[Value]:
+        """The state at a fraction of the last step."""
+        return [horner(self.polynomial(i), theta) for i in range(self.kernel.size)]
+
+    # -- events
 
     def moment(self, point: Point, found: Sequence[Value], h: Value = 1.0) -> Moment:
         """What events are functions of, from the outputs v, acceleration and sigma at a point."""

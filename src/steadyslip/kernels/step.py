@@ -40,11 +40,11 @@ class Step(Record):
         """The step itself, its error and the size of the next."""
         method = self.kernel.method
         errors = self._rosenbrock() if method.implicit else self._runge_kutta()
-        error: Value = 0.0
-        for i, e in enumerate(errors):
-            scaled = e / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i])))
-            error = error + scaled * scaled
+        error = self._squared(errors)
         error = error * (1 / self.kernel.counted)
+        if method.lower_error:
+            lower = self._squared(self._estimate(method.lower_error)) * (1 / self.kernel.counted)
+            error = error * error / larger(error + 0.01 * lower, 1e-300)
         self.good = error <= 1.0
         self.size = log(smaller(larger(error, 1e-10), 1e30))
         self.earlier = self.program.load(Row.ERROR)
@@ -54,6 +54,18 @@ class Step(Record):
         self.after = select(self.last, self.end, self.tau + self.h)
         next_h = self.h * factor
         self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
+
+    def _squared(self, errors: Sequence[Value]) -> Value:
+        """Sum of squares of errors as shares of what is allowed."""
+        found: Value = 0.0
+        for i, e in enumerate(errors):
+            scaled = e / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i])))
+            found = found + scaled * scaled
+        return found
+
+    def _estimate(self, weights: Sequence[float]) -> list[Value]:
+        """Errors of an explicit method."""
+        return [self.h * weighted(weights, [k[i] for k in self.stages]) for i in range(self.kernel.size)]
 
     def _inputs_of(self, s: int) -> Point:
         """Inputs at stage s."""
@@ -66,7 +78,7 @@ class Step(Record):
 
     def _runge_kutta(self) -> list[Value]:
         method, n, h = self.kernel.method, self.kernel.size, self.h
-        self.stages: list[Sequence[Value]] = [self.first]
+        self.stages: list[list[Value]] = [self.first]
         for s in range(1, method.stages):
             y = [self.old[i] + h * weighted(method.a[s], [k[i] for k in self.stages]) for i in range(n)]
             whole = s == method.stages - 1
@@ -74,7 +86,7 @@ class Step(Record):
             found = self._found(self.kernel.full if whole else self.kernel.rates, y, self.here)
             self.stages.append(found[:n])
         self.new, self.rates, self.outputs = y, found[:n], found[n:]
-        return [h * weighted(method.error, [k[i] for k in self.stages]) for i in range(n)]
+        return self._estimate(method.error)
 
     def _rosenbrock(self) -> list[Value]:
         kernel, method, n, h = self.kernel, self.kernel.method, self.kernel.size, self.h
@@ -189,5 +201,7 @@ class Step(Record):
                 store(layout.stage + s * n + i, stage[i])
         if layout.w >= 0:
             store(Row.W_RATE_OLD, self.first[layout.w])
+        if layout.extra:
+            store(Row.EXTENDED, 0.0)
         store(Row.DONE, self.h)
         store(Row.TAU_OLD, self.tau)

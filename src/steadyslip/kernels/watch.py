@@ -57,7 +57,9 @@ class Watch(Record):
     def _locate(self) -> None:
         """The fraction of the step at which velocity turns or slip begins."""
         kernel, program, w = self.kernel, self.program, self.kernel.layout.w
-        own, course = kernel.polynomial(program, w), kernel.course(program, w)
+        if kernel.layout.extra:
+            self.stages = self.extra_stages()
+        own, course = self.polynomial(w), self.course(w)
         limit = program.load(Row.W_LIMIT)
         crossing: list[Value] = [own[0] - limit, *own[1:]]
         turning = slope_of(course)
@@ -77,7 +79,7 @@ class Watch(Record):
             theta = smaller(larger(theta - change, 0.0), 1.0)
         self.theta, self.found = theta, abs(change) <= FOUND
         self.tau = self.tau_old + theta * self.h
-        self.there: list[Value] = [horner(kernel.polynomial(program, i), theta) for i in range(kernel.size)]
+        self.there = self.between(theta)
         start, stop = program.load(Row.START), program.load(Row.STOP)
         self.time = select(self.tau < program.load(Row.END), smaller(start + self.tau, stop), stop)
         point = self.inputs(self.tau) | {f"y{i}": y for i, y in enumerate(self.there)}

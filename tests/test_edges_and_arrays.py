@@ -143,3 +143,15 @@ def test_matrices_that_overflow_are_not_available():
     small = rig(friction=rate_state(a=1e-300), mass=0.0, radiation_damping=0.0, damping=0.0)
     with pytest.raises(ss.NotAvailable, match="floating point"):
         ss.state_space(small.with_values({"contact.preload": 1e-10, "stiffness": 1e300}))
+
+
+@pytest.mark.parametrize("value", [1e300, 1.7e308, 1e-308])
+@pytest.mark.parametrize("name", ["mass", "stiffness", "friction.d_c"])
+def test_search_ends_with_floating_point(name, value):
+    """Six decades beyond such a number there is nothing; that is no fault of a parameter."""
+    try:
+        edges = ss.boundary(rig(mass=1e3).with_values({name: value}), name)
+    except ss.NotAvailable as error:
+        assert "floating point" in str(error)  # noqa: PT017
+    else:
+        assert all(math.isfinite(edge.value) for edge in edges)

@@ -144,6 +144,11 @@ def test_a_damaged_chunk_is_an_error_where_it_is_read(tmp_path):
     content = file.read_bytes()
     file.write_bytes(content[:-6] + bytes([content[-6] ^ 1]) + content[-5:])
     assert len(found.damaged()) == 1
+    data = found.dataset
+    with pytest.raises(ss.NotAvailable, match="damaged"):
+        data["status"].load()
+    with pytest.raises(ss.NotAvailable, match="damaged"):
+        data["status"][::-1, 2:].sum()
     with pytest.raises(ss.NotAvailable, match="damaged"):
         found.to_netcdf(tmp_path / "map.nc")
     assert not (tmp_path / "map.nc").exists()

@@ -177,7 +177,7 @@ def fit(
     skip_bad_lines: Annotated[
         bool, typer.Option("--skip-bad-lines", help="leave damaged lines out, and say so")
     ] = False,
-    bootstrap: Annotated[int, typer.Option(min=0, help="also refit this many resampled records")] = 0,
+    bootstrap: Annotated[int, typer.Option(min=0, max=1_000_000, help="also refit this many resampled records")] = 0,
     output: Annotated[
         list[Path] | None,
         typer.Option("-o", "--output", help="write .nc, .html, .json, .png, .svg or .pdf; repeatable"),
@@ -245,7 +245,7 @@ def simulate(
         list[Path] | None,
         typer.Option("-o", "--output", help="write .nc, .csv, .png, .svg or .pdf; repeatable"),
     ] = None,
-    samples: Annotated[int | None, typer.Option(min=2, help="report at this many even times")] = None,
+    samples: Annotated[int | None, typer.Option(min=2, max=10_000_000, help="report at this many even times")] = None,
     phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,
     method: Annotated[str, typer.Option(help="auto, explicit or rosenbrock")] = "auto",
     rtol: Annotated[float, typer.Option(help="error allowed per step")] = 1e-7,

@@ -102,7 +102,9 @@ class Search:
         else:
             size = abs(self.value) or self.natural_size()
             count = 2 * _DECADES * _PER_DECADE + 1
-            samples = size * np.geomspace(10.0**-_DECADES, 10.0**_DECADES, count)
+            with np.errstate(all="ignore"):
+                samples = size * np.geomspace(10.0**-_DECADES, 10.0**_DECADES, count)
+            samples = samples[np.isfinite(samples) & (samples > 0)]  # the ends of floating point are no parameters
             if domain.low < 0:
                 samples = np.concatenate([-samples[::-1], [0.0], samples])
             elif domain.low_allowed and not self.role.adds_state:

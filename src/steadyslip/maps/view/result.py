@@ -84,11 +84,19 @@ class MapResult:
 
     @property
     def dataset(self) -> Any:
-        """An xarray.Dataset that reads from disk what is used of it; units are in the attributes."""
+        """An xarray.Dataset that reads from disk what is used of it; units are in the attributes.
+
+        Raises
+        ------
+        NotAvailable
+            If a file is damaged; of chunks, when they are read.
+        """
         import xarray as xr
 
+        from steadyslip.maps.view.lazy import lazily
+
         try:
-            return xr.open_zarr(
+            data = xr.open_zarr(
                 self._store.folder.with_read_only(True),
                 chunks=None,
                 consolidated=True,
@@ -97,6 +105,7 @@ class MapResult:
             )
         except (ValueError, RuntimeError, OSError) as error:  # coordinates are read at once
             raise self._store.damage("coordinates", error) from error
+        return lazily(data, self._store)
 
     def words(self, name: str) -> tuple[str, ...]:
         """What the numbers 0, 1, ... of an array of kinds stand for; empty for other arrays."""

@@ -4,10 +4,10 @@ import re
 import tomllib
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 import steadyslip as ss
+from file_schema import file_schema
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.toml"))
 
@@ -24,7 +24,7 @@ def test_verdict_is_that_of_the_comment(path):
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_example_keeps_to_the_schema(path):
-    jsonschema.validate(tomllib.loads(path.read_text(encoding="utf-8")), ss.json_schema())
+    file_schema().validate(tomllib.loads(path.read_text(encoding="utf-8")))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)

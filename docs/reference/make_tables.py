@@ -1,4 +1,4 @@
-"""Write rig-file.md and python.md from the package's own declarations: python docs/reference/make_tables.py"""
+"""Write the lists of keys and names from the package's own declarations: python docs/reference/make_tables.py"""
 
 from __future__ import annotations
 
@@ -11,12 +11,17 @@ from pathlib import Path
 import steadyslip
 from steadyslip import figures
 from steadyslip.core.quantities import is_per_area, total_unit
-from steadyslip.core.records import FrozenRecord, Option, Parameter, Part, Series
+from steadyslip.core.records import FrozenRecord, Named, Option, Parameter, Part, Series, Settings, key_of
+from steadyslip.core.settings import Setting
+from steadyslip.experiments.spec import TABLES as FIT_TABLES
 from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan.measures import Measure
+from steadyslip.maps.plan.settings import GridSettings, MapSettings, RangeSettings, SampleSettings
 from steadyslip.protocol import Protocol
 
 HERE = Path(__file__).parent
+EXAMPLE = steadyslip.read_rig(HERE.parents[1] / "examples" / "inclined-spring.toml")
 
 # --- rig-file.md ------------------------------------------------------------------------------------
 
@@ -42,8 +47,8 @@ table `[protocol]` may say what is done to the rig in an experiment. A whole one
 - A table `[map]` says what to compute for many rigs at once: see [Table of a map](map-file.md).
 - `law` may also name a law of yours: see [Add a friction law](../how-to/add-a-friction-law.md).
 
-`steadyslip schema` prints the JSON schema of this format, for editors. This page is written by `make_tables.py` from
-the declarations in the source.
+`steadyslip schema` prints the JSON schema of this format, maps and fits included, for editors. This page is written by
+`make_tables.py` from the declarations in the source.
 """
 
 
@@ -54,32 +59,46 @@ def default_of(item) -> str:
         return ""
     if isinstance(item.default, FrozenRecord):
         return f"`{item.default.name}`"
+    if isinstance(item.default, tuple):
+        return ", ".join(f"`{word}`" for word in item.default)
     if isinstance(item.default, bool):
         return f"`{str(item.default).lower()}`"
     return f"`{item.default:g}`" if isinstance(item.default, float) else f"`{item.default}`"
 
 
-def unit_of(role) -> str:
+def unit_of(role, totals: bool) -> str:
     if role.unit == "1":
         return "–"
-    return f"{role.unit} or {total_unit(role.unit)}" if is_per_area(role.unit) else role.unit
+    return f"{role.unit} or {total_unit(role.unit)}" if totals and is_per_area(role.unit) else role.unit
 
 
-def row(item, role) -> str:
-    if isinstance(role, Parameter):
-        unit, allowed = unit_of(role), role.domain.text
+def row(item, role, totals: bool) -> str:
+    if isinstance(role, Setting):
+        unit, allowed = getattr(role, "unit", ""), role.allowed()
+    elif isinstance(role, Named):
+        unit, allowed = "", "table of names"
+    elif isinstance(role, Part) and not has_choice(role.family) and not role.many:
+        short = role.family.short
+        unit, allowed = "", f"{' or '.join(short)}, or a table with {' and '.join(short)}" if short else "table"
+    elif isinstance(role, Parameter):
+        unit, allowed = unit_of(role, totals), role.domain.text
     elif isinstance(role, Series):
-        unit, allowed = unit_of(role), "list of finite numbers"
+        unit, allowed = unit_of(role, totals), "list of finite numbers"
     elif isinstance(role, Option):
         unit, allowed = "", ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)
     else:
         words = ", ".join(f"`{name}`" for name in role.family.registry)
         unit, allowed = "", "list of tables" if role.many else f"one of {words}"
-    return f"| `{item.name}` | {unit} | {allowed} | {default_of(item)} | {role.doc} |"
+    return f"| `{key_of(item)}` | {unit} | {allowed} | {default_of(item)} | {role.doc} |"
 
 
 def table(law) -> list[str]:
-    rows = [row(item, role) for item, role in own_fields(law)]
+    """The keys of a record; those of settings have one unit only, whatever the rig's area."""
+    rows = [
+        row(item, role, not issubclass(law, Settings))
+        for item, role in own_fields(law)
+        if not getattr(role, "by_name", False)
+    ]
     if not rows:
         return ["No parameters.", ""]
     return ["| key | unit | allowed | default | meaning |", "|---|---|---|---|---|", *rows, ""]
@@ -123,6 +142,113 @@ def rig_page() -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
+# --- fit-file.md ------------------------------------------------------------------------------------
+
+FIT_HEAD = """# File of a fit
+
+It is a [rig file](rig-file.md) with two more tables. In the tables of the rig, what is missing is fitted: `a`, `b`,
+`d_c`, `mu_ref`, α (with `normal_memory = "linker-dieterich"`) and the stiffness; what is given is kept. If nothing is
+missing, all of the friction law and the stiffness are fitted. `[contact]`, `[drive]` and `v_ref` may be missing too:
+normal stress and rates are those of the records. A `[protocol]` says what moved the load point where the records do
+not; the rate before it is that of the record, or `[drive] velocity` where the record does not show it.
+
+```toml
+[friction]
+evolution = "aging"                # what is missing is fitted
+normal_memory = "linker-dieterich"
+
+[slider]
+stiffness = "40 GPa/m"             # what is given is kept
+
+[record]
+normal = "MPa"                     # the unit of a column whose name does not say it
+friction = "mu_corrected"          # the name of a column
+between = ["10 s", "900 s"]
+
+[fit]
+trend = 1
+```
+
+A column of `[record]` is given by its name, by its number from 1, by its unit, or by a table of both,
+`{column = "Fn", unit = "kN"}`. A bare number is in the unit of the table, also where the rig has an `area`. This page
+is written by `make_tables.py` from the declarations in the source.
+"""
+
+
+def fit_page() -> str:
+    lines = [FIT_HEAD]
+    for section in FIT_TABLES:
+        lines += [f"## `[{section.name}]`", "", summary(section.family), "", *table(section.family)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+# --- map-file.md ------------------------------------------------------------------------------------
+
+MAP_HEAD = """# Table of a map
+
+A [rig file](rig-file.md) may have a table `[map]`, read by `steadyslip map`, `steadyslip sensitivity` and `read_map`;
+other commands pass it over.
+
+```toml
+[map]
+compute = ["status", "events"]
+chunk = 1000
+
+[map.over]
+angle = { from = "-30 deg", to = "30 deg", points = 61 }
+stiffness = { from = "1 GPa/m", to = "100 GPa/m", points = 41, spacing = "log" }
+"friction.d_c" = ["1 um", "10 um"]
+
+[map.samples]
+points = 256
+method = "sobol"
+seed = 0
+
+[map.samples.over]
+friction.a = { from = 0.012, to = 0.016 }
+
+[map.events]
+until = "500 s"
+```
+
+`over` and `samples` may both be there; one of them must be. The dimensions of the map are the parameters of `over`,
+in order, then `sample`. With `area` in `[slider]`, values are for the whole contact here too (N, N/m, ...); text may
+give either. Arrays of the map are per unit area. This page is written by `make_tables.py` from the declarations in
+the source.
+"""
+MAP_TAIL = """An installed package may offer further results, as [laws](../how-to/add-a-friction-law.md): a class
+derived from `steadyslip.Measure`, named in the entry-point group `steadyslip.laws`.
+"""
+
+
+def arrays_of(measure) -> str:
+    """The arrays of a result for an ordinary rig, with units and what their numbers stand for."""
+    texts = []
+    for output in measure().outputs(EXAMPLE, ()):
+        unit = "" if output.unit == "1" else f" ({output.unit})"
+        texts.append(f"`{output.name}`{unit}" + (f": {', '.join(output.flags)}" if output.flags else ""))
+    return "; ".join(texts)
+
+
+def map_page() -> str:
+    lines = [MAP_HEAD]
+    for name, family in (
+        ("[map]", MapSettings),
+        ("A parameter in `over`", GridSettings),
+        ("[map.samples]", SampleSettings),
+        ("A parameter in `samples.over`", RangeSettings),
+    ):
+        head = f"`{name}`" if name.startswith("[") else name
+        lines += [f"## {head}", "", summary(family), "", *table(family)]
+    lines += ["## Results", "", "| result | what it is | arrays |", "|---|---|---|"]
+    lines += [f"| `{n}` | {summary(law)} | {arrays_of(law)} |" for n, law in Measure.registry.items()]
+    lines.append("")
+    for name, law in Measure.registry.items():
+        if list(own_fields(law)):
+            lines += [f"## `[map.{name}]`", "", f"Options of `{name}`.", "", *table(law)]
+    return "\n".join([*lines, MAP_TAIL]).rstrip() + "\n"
+
+
 # --- python.md --------------------------------------------------------------------------------------
 
 PYTHON_HEAD = """# Python
@@ -137,6 +263,7 @@ GROUPS = {
     "": "Modules",
     "verdict": "The verdict",
     "files.specifications": "Rig files",
+    "schemas": "Schema of files",
     "laws.contact": "Contact laws",
     "machine.drive": "Drives",
     "core.errors": "Exceptions",
@@ -154,6 +281,7 @@ GROUPS = {
 }
 ORDER = (
     *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
+    "schemas",
     *("verdict", "model.steady", "linear", "model", "core.records"),
     *("core.errors", "experiments", "motion", "nonlinear", "maps"),
 )
@@ -194,7 +322,7 @@ def python_page() -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-PAGES = {"rig-file.md": rig_page, "python.md": python_page}
+PAGES = {"rig-file.md": rig_page, "fit-file.md": fit_page, "map-file.md": map_page, "python.md": python_page}
 
 if __name__ == "__main__":
     for file, page in PAGES.items():

@@ -45,7 +45,6 @@ from .experiments import (
     record_from_arrays as record_from_arrays,
 )
 from .files.specifications import (
-    json_schema as json_schema,
     piece_from_text as piece_from_text,
     protocol_from_text as protocol_from_text,
     read_protocol as read_protocol,
@@ -188,6 +187,7 @@ from .protocol import (
     VelocityRamp as VelocityRamp,
     VelocityStep as VelocityStep,
 )
+from .schemas import json_schema as json_schema
 from .verdict import (
     Analysis as Analysis,
     analyze as analyze,

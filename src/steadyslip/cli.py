@@ -425,10 +425,10 @@ def reproduce(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON schema of rig files."""
+    """Print the JSON schema of the files that are read: rigs, protocols, maps and fits."""
     import json
 
-    from steadyslip.files.specifications import json_schema
+    from steadyslip.schemas import json_schema
 
     say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
 

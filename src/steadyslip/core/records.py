@@ -20,6 +20,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError, came, unknown_name
 from steadyslip.core.quantities import example, numbers, parse
+from steadyslip.core.settings import Setting
 
 
 @dataclass(frozen=True)
@@ -97,12 +98,25 @@ class Series:
 
 @dataclass(frozen=True)
 class Part:
-    """A field that holds another record; ``inline`` puts its parameters beside the owner's."""
+    """A field that holds another record; ``inline`` puts its parameters beside the owner's.
+
+    With ``many`` it holds a tuple of them: a list of tables, or with ``by_name`` tables named after their laws.
+    """
 
     family: type[FrozenRecord]
     doc: str
     inline: bool = False
     many: bool = False
+    by_name: bool = False
+
+
+@dataclass(frozen=True)
+class Named:
+    """A field that holds a record for each of some dotted names; ``listed`` lets a list of values stand for one."""
+
+    family: type[FrozenRecord]
+    doc: str
+    listed: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,8 +151,8 @@ class Condition:
         return Problem(name or self.name, self.message.format(*(repr(float(a[where])) for a in arrays[1:])) + place)
 
 
-Role = Parameter | Option | Part | Series
-_ROLE = "steadyslip"
+Role = Parameter | Option | Part | Named | Series | Setting
+_ROLE, _KEY = "steadyslip", "key"
 R = TypeVar("R", bound="FrozenRecord")
 
 
@@ -172,13 +186,25 @@ def part(family: type[FrozenRecord], doc: str, *, default: Any = MISSING, inline
     return field(default=default, metadata={_ROLE: Part(family, doc, inline)})
 
 
-def parts(family: type[FrozenRecord], doc: str, *, default: tuple[()]) -> Any:
+def parts(family: type[FrozenRecord], doc: str, *, default: tuple[()], by_name: bool = False) -> Any:
     """Declare a field that holds a tuple of records; the default is the empty one."""
-    return field(default=default, metadata={_ROLE: Part(family, doc, many=True)})
+    return field(default=default, metadata={_ROLE: Part(family, doc, many=True, by_name=by_name)})
+
+
+def named(family: type[FrozenRecord], doc: str, *, listed: bool = False) -> Any:
+    """Declare a field that holds a mapping of dotted names to records, None by default."""
+    return field(default=None, metadata={_ROLE: Named(family, doc, listed)})
+
+
+def setting(role: Setting, *, default: Any = MISSING, key: str = "") -> Any:
+    """Declare a field of another kind; ``key`` is its name in files where Python keeps that word for itself."""
+    return field(default=default, metadata={_ROLE: role, _KEY: key})
 
 
 @dataclass_transform(
-    kw_only_default=True, frozen_default=True, field_specifiers=(parameter, option, samples, part, parts)
+    kw_only_default=True,
+    frozen_default=True,
+    field_specifiers=(parameter, option, samples, part, parts, named, setting),
 )
 class FrozenRecord:
     """Frozen, checked when built, addressed by dotted names.
@@ -192,6 +218,8 @@ class FrozenRecord:
     name: ClassVar[str] = ""
     family: ClassVar[str] = ""
     section: ClassVar[str] = ""
+    short: ClassVar[tuple[str, ...]] = ()
+    """Keys of its table that a single value, or a list of values in their order, stands for."""
     registry: ClassVar[dict[str, type[FrozenRecord]]] = {}
 
     def __init_subclass__(
@@ -243,6 +271,21 @@ class FrozenRecord:
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
+class Settings(FrozenRecord):
+    """Base of tables that say what to do with a rig; what is right in a faulty one helps to find further faults."""
+
+
+def key_of(item: Field[Any]) -> str:
+    """The key that stands for a field in files."""
+    return item.metadata.get(_KEY) or item.name
+
+
+def given(record: FrozenRecord) -> dict[str, Any]:
+    """The fields of a record that differ from their default."""
+    found = {item.name: getattr(record, item.name) for item in fields(record)}  # type: ignore[arg-type]
+    return {item.name: found[item.name] for item in fields(record) if found[item.name] != item.default}  # type: ignore[arg-type]
+
+
 def role_of(item: Field[Any]) -> Role:
     """The declaration behind a dataclass field."""
     role: Role | None = item.metadata.get(_ROLE)
@@ -279,11 +322,24 @@ def checked(item: Field[Any], value: Any) -> Any:
             return numbers(value, role.unit)
         except QuantityError as error:
             raise _fault(str(error)) from error
+    if isinstance(role, Setting):
+        return role.checked(value)
+    if isinstance(role, Named):
+        return _checked_named(role, value)
     if role.many:
         if not isinstance(value, (list, tuple)):
             raise _fault(f"got {came(value)}; allowed: a list of {role.family.__name__}")
         return tuple(_checked_part(role, v, f"{i}") for i, v in enumerate(value, start=1))
     return _checked_part(role, value, "")
+
+
+def _checked_named(role: Named, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise _fault(f"got {came(value)}; allowed: names and their values")
+    for name, one in value.items():
+        if not (isinstance(one, role.family) or (role.listed and isinstance(one, (list, tuple)))):
+            raise ParameterError([Problem(name, f"got {came(one)}; allowed: a {role.family.__name__}")])
+    return dict(value)
 
 
 def _checked_part(role: Part, value: Any, index: str) -> FrozenRecord:
@@ -432,8 +488,10 @@ def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")
         elif isinstance(role, Series):
             shape.append("samples")
-        elif role.many:
+        elif isinstance(role, Part) and role.many:
             shape.append(tuple(shape_of(member) for member in value))
-        else:
+        elif isinstance(role, Part):
             shape.append(None if value is None else shape_of(value))
+        else:
+            shape.append(value)
     return tuple(shape)

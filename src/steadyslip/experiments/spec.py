@@ -9,33 +9,24 @@ from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
-from steadyslip.core.errors import (
-    InternalError,
-    NotAvailable,
-    ParameterError,
-    Problem,
-    RigFileError,
-    UnknownNameError,
-    unknown_name,
-)
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.progress import progress_text
-from steadyslip.core.records import Parameter, checked_number, positive, resolve
+from steadyslip.core.records import Parameter, checked_number, given, positive, resolve
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
-from steadyslip.experiments.fitting.plan import AXES, DRIVES
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.starts import STARTS
-from steadyslip.experiments.measured.columns import ROLES
+from steadyslip.experiments.fitting.settings import MOST_STATES, FitSettings
 from steadyslip.experiments.measured.read import read_record
 from steadyslip.experiments.measured.record import Record
-from steadyslip.files.specifications.lines import line_of
-from steadyslip.files.specifications.read import from_tables, parsed, text_of
+from steadyslip.experiments.measured.settings import RecordSettings
+from steadyslip.files.specifications.layout import Section
+from steadyslip.files.specifications.read import read_specification, text_of
+from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-RECORD_KEYS = (*ROLES, "area", "normal_stress", "table", "between", "skip_bad_lines", "decimate")
-FIT_KEYS = ("free", "fixed", "separate", "states", "trend", "trend_axis", "offset", "drive", "loss", "width", "errors",
-            "starts", "windows", "compare")  # fmt: skip
+TABLES = (Section("record", RecordSettings), Section("fit", FitSettings))
+"""The tables of such a file besides those of a rig."""
 _STANDING = {
     "friction.a": 0.01,
     "friction.b": 0.01,
@@ -56,8 +47,8 @@ class Spec:
     ----------
     rig : Slider
     protocol : Protocol or None
-    record : dict
-        Arguments of `read_record`, and ``decimate``.
+    record : RecordSettings
+        How to read records.
     options : dict
         Arguments of `fit`.
     laws : tuple of str
@@ -74,7 +65,7 @@ class Spec:
 
     rig: Slider
     protocol: Protocol | None = None
-    record: dict[str, Any] = field(default_factory=dict)
+    record: RecordSettings = field(default_factory=RecordSettings)
     options: dict[str, Any] = field(default_factory=dict)
     laws: tuple[str, ...] = ()
     windows: bool = False
@@ -84,7 +75,7 @@ class Spec:
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
         """Read a record as the file says."""
-        options = dict(self.record)
+        options = self.record.arguments()
         decimate = options.pop("decimate", None)
         options["skip_bad_lines"] = skip_bad_lines or options.get("skip_bad_lines", False)
         record = read_record(path, **options)
@@ -148,42 +139,23 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
 
 def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec:
     """Read the text of such a file; see `read_spec`."""
-    tables, lines, problems = parsed(text, source, ())
-    own, others = _sorted_changes(changes)
-    record = _table(tables, "record", RECORD_KEYS, problems)
-    options = _table(tables, "fit", FIT_KEYS, problems)
-    for target, name, raw in own:
-        (record if target == "record" else options)[name] = raw
-    for target, found, keys in (("record", record, RECORD_KEYS), ("fit", options, FIT_KEYS)):
-        problems += [Problem(f"{target}.{k}", unknown_name("key", k, keys)) for k in found if k not in keys]
-    problems += _checked_record(record) + _checked_fit(options)
-    v_ref_given = isinstance(tables.get("friction"), dict) and "v_ref" in tables["friction"]
-    contact_given = "contact" in tables
-    drive_given = isinstance(tables.get("drive"), dict) and "velocity" in tables["drive"]
-    missing = _completed(tables, options.pop("states", None), problems)
-    from steadyslip.files.specifications.changes import apply, full_name
-
-    for change in others:
-        problems += apply(change, tables, lines)
-        named = full_name(change.partition("=")[0].strip(), tables)[0]
-        missing.discard(named)
-        drive_given |= named == "drive.velocity"
-    try:
-        rig, protocol = from_tables(tables, lines, source, [])
-    except RigFileError as error:
-        raise RigFileError([*_placed(problems, lines), *error.problems], title=source) from None
-    if rig is None:
-        raise InternalError("rig is not None")
-    problems = problems or _left_open(missing, options, rig)
-    if problems:
-        raise RigFileError(_placed(problems, lines), title=source)
-    laws = options.pop("compare", ())
-    windows = options.pop("windows", False)
-    if "free" not in options and missing:
+    filled = _Filled()
+    found = read_specification(text, source, changes, TABLES, filled.complete)
+    record, settings = found.further.get("record"), found.further.get("fit")
+    settings = settings if isinstance(settings, FitSettings) else FitSettings()
+    missing = filled.missing - found.changed
+    left = () if found.problems or found.rig is None else _left_open(missing, settings, found.rig)
+    rig = found.checked_rig(*filled.problems, *left)
+    own = ("states", "compare", "windows")
+    options = {n: list(v) if isinstance(v, tuple) else v for n, v in given(settings).items() if n not in own}
+    if settings.free is None and missing:
         options["free"] = sorted(name for name in missing if name in rig.parameters())
         if "friction.mu_ref" not in missing and "friction.mu_ref" in rig.parameters():
-            options["fixed"] = [*options.get("fixed", []), "friction.mu_ref"]
-    return Spec(rig, protocol, record, options, tuple(laws), windows, v_ref_given, contact_given, drive_given)
+            options["fixed"] = [*settings.fixed, "friction.mu_ref"]
+    return Spec(
+        rig, found.protocol, record if isinstance(record, RecordSettings) else RecordSettings(), options,
+        settings.compare, settings.windows, *(filled.given(name, found.changed) for name in _Filled.FROM_RECORDS),
+    )  # fmt: skip
 
 
 def default_spec(evolution: str = "slip") -> Spec:
@@ -230,133 +202,88 @@ def _checked(name: str, unit: str, value: Any) -> float:
         raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
 
-def _sorted_changes(changes: Iterable[str]) -> tuple[list[tuple[str, str, Any]], list[str]]:
-    """Changes of the tables of a fit, and those of the rig."""
-    from steadyslip.files.specifications.changes import value_of
+class _Filled:
+    """Puts values where a file has none, and knows which of them are to be fitted or are those of the records."""
 
-    own, others = [], []
-    for change in [changes] if isinstance(changes, str) else changes:
-        name, equals, raw = (part.strip() for part in change.partition("="))
-        target, _, key = name.partition(".")
-        if target in ("record", "fit") and equals and key:
-            own.append((target, key, value_of(raw, name)))
-        else:
-            others.append(change)
-    return own, others
+    FROM_RECORDS = ("friction.v_ref", "contact.steady_normal_stress", "drive.velocity")
 
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.missing: set[str] = set()
+        self.standing: set[str] = set()
 
-def _table(tables: dict[str, Any], name: str, keys: Sequence[str], problems: list[Problem]) -> dict[str, Any]:
-    raw = tables.pop(name, {})
-    if not isinstance(raw, dict):
-        problems.append(Problem(name, f"got {raw!r}; allowed: a table [{name}]"))
-        return {}
-    return dict(raw)
+    def given(self, name: str, changed: set[str]) -> bool:
+        """Whether the file, or a change, says what records would say otherwise."""
+        return name not in self.standing or name in changed
 
+    def complete(self, tables: Table) -> None:
+        """Fill the tables."""
+        wanted = tables.get("fit", {})
+        states = wanted.get("states") if isinstance(wanted, dict) else None
+        friction = tables.setdefault("friction", {})
+        pressed = "contact" in tables
+        contact, drive, slider = (tables.setdefault(n, {}) for n in ("contact", "drive", "slider"))
+        if any(not isinstance(table, dict) for table in (friction, contact, drive, slider)):
+            return
+        if friction.setdefault("law", "rate-state") == "rate-state":
+            self._friction(friction, states)
+        elif isinstance(states, int) and states > 1:
+            message = f"got {states!r}; the law {friction['law']!r} has no number of states"
+            self.problems.append(Problem("fit.states", message))
+        if not {"stiffness", "axial_stiffness"} & set(slider) and not drive.get("kp"):
+            self._fit(slider, "stiffness", "slider.stiffness", _STANDING["slider.stiffness"])
+        self._stand(drive, "drive.velocity")
+        if not pressed:
+            contact["law"] = "constant"
+        if contact.get("law") == "constant" and not {"preload", "steady_normal_stress"} & set(contact):
+            self._stand(contact, "contact.steady_normal_stress")
 
-def _checked_record(record: dict[str, Any]) -> list[Problem]:
-    problems = []
-    between = record.get("between")
-    if between is not None and not (isinstance(between, list) and len(between) == 2):
-        problems.append(Problem("record.between", f"got {between!r}; allowed: [start, end] in s"))
-    count = record.get("decimate")
-    if count is not None and not (isinstance(count, int) and count >= 50):
-        problems.append(Problem("record.decimate", f"got {count!r}; allowed: a whole number >= 50"))
-    skip = record.get("skip_bad_lines", False)
-    if not isinstance(skip, bool):
-        problems.append(Problem("record.skip_bad_lines", f"got {skip!r}; allowed: true or false"))
-    return problems
-
-
-def _checked_fit(options: dict[str, Any]) -> list[Problem]:
-    """Kinds of values; what they mean is checked by the fit itself."""
-    problems = []
-    for name in ("free", "fixed", "separate", "compare"):
-        value = options.get(name)
-        if isinstance(value, str):
-            options[name] = [value]
-        elif value is not None and not (isinstance(value, list) and all(isinstance(x, str) for x in value)):
-            problems.append(Problem(f"fit.{name}", f"got {value!r}; allowed: a list of names"))
-    for name, allowed in (("trend_axis", AXES), ("drive", DRIVES[:3])):
-        if options.get(name, allowed[0]) not in allowed:
-            problems.append(Problem(f"fit.{name}", unknown_name("choice", options[name], allowed)))
-    for name, least, default in (("trend", 0, 0), ("starts", 1, STARTS), ("states", 1, 1)):
-        value = options.get(name, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            problems.append(Problem(f"fit.{name}", f"got {value!r}; allowed: a whole number >= {least}"))
-    for name in ("offset", "windows"):
-        if not isinstance(options.get(name, False), bool):
-            problems.append(Problem(f"fit.{name}", f"got {options[name]!r}; allowed: true or false"))
-    return problems
-
-
-def _completed(tables: dict[str, Any], states: Any, problems: list[Problem]) -> set[str]:
-    """Put values where the file has none, and say which of them are to be fitted."""
-    friction = tables.setdefault("friction", {})
-    if not isinstance(friction, dict):
-        return set()
-    friction.setdefault("law", "rate-state")
-    tables.setdefault("contact", {"law": "constant"})
-    tables.setdefault("drive", {})
-    tables.setdefault("slider", {})
-    missing: set[str] = set()
-    if any(not isinstance(tables[name], dict) for name in ("contact", "drive", "slider")):
-        return missing
-    if friction["law"] == "rate-state":
-        missing |= _completed_friction(friction, states, problems)
-    elif isinstance(states, int) and states > 1:
-        problems.append(Problem("fit.states", f"got {states!r}; the law {friction['law']!r} has no number of states"))
-    slider, drive, contact = tables["slider"], tables["drive"], tables["contact"]
-    if not {"stiffness", "axial_stiffness"} & set(slider) and not drive.get("kp"):
-        slider["stiffness"] = _STANDING["slider.stiffness"]
-        missing.add("slider.stiffness")
-    drive.setdefault("velocity", _SETTINGS["drive.velocity"])
-    if contact.get("law") == "constant" and not {"preload", "steady_normal_stress"} & set(contact):
-        contact["steady_normal_stress"] = _SETTINGS["contact.steady_normal_stress"]
-    return missing
-
-
-def _completed_friction(friction: dict[str, Any], states: Any, problems: list[Problem]) -> set[str]:
-    missing: set[str] = set()
-
-    def complete(table: dict[str, Any], key: str, name: str, value: float) -> None:
+    def _fit(self, table: Table, key: str, name: str, value: float) -> None:
         if key not in table:
             table[key] = value
-            missing.add(name)
+            self.missing.add(name)
 
-    friction.setdefault("v_ref", _SETTINGS["friction.v_ref"])
-    complete(friction, "a", "friction.a", _STANDING["friction.a"])
-    complete(friction, "mu_ref", "friction.mu_ref", _STANDING["friction.mu_ref"])
-    members = friction.get("states")
-    if members is None and isinstance(states, int) and states > 1:
-        if {"b", "d_c"} & set(friction):
-            problems.append(Problem("fit.states", "friction has b or d_c of a single state; leave them away"))
-            return missing
-        members = friction["states"] = [{} for _ in range(states)]
-    if isinstance(members, list) and all(isinstance(member, dict) for member in members):
-        for i, member in enumerate(members, start=1):
-            complete(member, "b", f"friction.states.{i}.b", _STANDING["friction.b"] / i)
-            complete(member, "d_c", f"friction.states.{i}.d_c", _STANDING["friction.d_c"] * 10.0 ** (i - 1))
-    else:
-        complete(friction, "b", "friction.b", _STANDING["friction.b"])
-        complete(friction, "d_c", "friction.d_c", _STANDING["friction.d_c"])
-    memory = friction.get("normal_memory")
-    if memory == "linker-dieterich":
-        memory = friction["normal_memory"] = {"law": "linker-dieterich"}
-    if isinstance(memory, dict) and memory.get("law") == "linker-dieterich":
-        given = isinstance(members, list) and any("alpha" in m for m in members if isinstance(m, Mapping))
-        if not given:
-            complete(memory, "alpha", "friction.normal_memory.alpha", 0.3)
-    return missing
+    def _stand(self, table: Table, name: str) -> None:
+        key = name.rpartition(".")[2]
+        if key not in table:
+            table[key] = _SETTINGS[name]
+            self.standing.add(name)
+
+    def _friction(self, friction: Table, states: Any) -> None:
+        self._stand(friction, "friction.v_ref")
+        self._fit(friction, "a", "friction.a", _STANDING["friction.a"])
+        self._fit(friction, "mu_ref", "friction.mu_ref", _STANDING["friction.mu_ref"])
+        members = friction.get("states")
+        if members is None and isinstance(states, int) and 1 < states <= MOST_STATES:
+            if {"b", "d_c"} & set(friction):
+                message = "friction has b or d_c of a single state; leave them away"
+                self.problems.append(Problem("fit.states", message))
+                return
+            members = friction["states"] = [{} for _ in range(states)]
+        if isinstance(members, list) and all(isinstance(member, dict) for member in members):
+            for i, member in enumerate(members, start=1):
+                self._fit(member, "b", f"friction.states.{i}.b", _STANDING["friction.b"] / i)
+                self._fit(member, "d_c", f"friction.states.{i}.d_c", _STANDING["friction.d_c"] * 10.0 ** (i - 1))
+        else:
+            self._fit(friction, "b", "friction.b", _STANDING["friction.b"])
+            self._fit(friction, "d_c", "friction.d_c", _STANDING["friction.d_c"])
+        memory = friction.get("normal_memory")
+        if memory == "linker-dieterich":
+            memory = friction["normal_memory"] = {"law": "linker-dieterich"}
+        if isinstance(memory, dict) and memory.get("law") == "linker-dieterich":
+            own = isinstance(members, list) and any("alpha" in m for m in members if isinstance(m, Mapping))
+            if not own:
+                self._fit(memory, "alpha", "friction.normal_memory.alpha", 0.3)
 
 
-def _left_open(missing: set[str], options: Mapping[str, Any], rig: Slider) -> list[Problem]:
+def _left_open(missing: set[str], settings: FitSettings, rig: Slider) -> list[Problem]:
     """Parameters that have no value and are not fitted either; what stands in for them must not be taken for one."""
 
     problems: list[Problem] = []
 
     def named(key: str) -> set[str]:
         found = set()
-        for name in options.get(key, ()):
+        for name in getattr(settings, key) or ():
             if name.startswith("protocol."):
                 continue
             try:
@@ -366,16 +293,12 @@ def _left_open(missing: set[str], options: Mapping[str, Any], rig: Slider) -> li
         return found
 
     absent = missing & named("fixed")
-    if "free" in options:
+    if settings.free is not None:
         absent |= missing - named("free") - {"friction.mu_ref"}
     if problems:  # a misspelt name is not a missing one
         return problems
     message = "has no value and is not fitted; give it one, or name it in [fit] free"
     return [Problem(name, message) for name in sorted(absent)]
-
-
-def _placed(problems: Iterable[Problem], lines: dict[str, int]) -> list[Problem]:
-    return [Problem(p.name, p.message, p.line or line_of(p.name, lines)) for p in problems]
 
 
 def fit_files(

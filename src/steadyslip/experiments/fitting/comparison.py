@@ -18,7 +18,6 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
-LOSSES = ("linear", "soft-l1", "huber", "cauchy")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan, with_loading
 from steadyslip.experiments.fitting.result import Fit, SearchStory
-from steadyslip.experiments.fitting.starts import STARTS, search_bounds, starting_points
+from steadyslip.experiments.fitting.settings import STARTS
+from steadyslip.experiments.fitting.starts import search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record, transient_rows
@@ -30,8 +31,6 @@ INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of 
 
 Told = Callable[[str, int, float], None]
 """What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
-
-ERRORS = ("auto", "correlated", "independent")
 
 
 def fit(
@@ -117,12 +116,8 @@ def fit(
     """
     plan = make_plan(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
-        trend_axis=trend_axis, offset=offset, loss=loss, width=width, weights=weights,
+        trend_axis=trend_axis, offset=offset, loss=loss, width=width, weights=weights, errors=errors, starts=starts,
     )  # fmt: skip
-    if errors not in ERRORS:
-        raise ParameterError([Problem("errors", unknown_name("choice", errors, ERRORS))])
-    if not (isinstance(starts, int) and starts >= 1):
-        raise ParameterError([Problem("starts", f"got {starts!r}; allowed: a whole number >= 1")])
     if plan.loss != "linear" and plan.width is None:
         first, _, _ = _searched(replace(plan, loss="linear"), starts, threads, progress)
         comparison = replace(plan, loss="linear").comparison(threads)

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import Address, parameters, resolve
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.comparison import (
-    LOSSES,
     Comparison,
     RecordPart,
     jump_unknowns,
@@ -23,6 +22,7 @@ from steadyslip.experiments.fitting.comparison import (
 )
 from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
+from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
 from steadyslip.experiments.loading.loading import Loading
@@ -34,8 +34,6 @@ from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
 
 Array = np.ndarray
-AXES = ("displacement", "time")
-DRIVES = ("commanded", "smoothed", "measured", "protocol")
 MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
 """Samples of a record beyond which a fit works with means of them, and how many."""
 NEVER_FREE = ("drive.velocity", "slider.area", "friction.v_ref")
@@ -211,7 +209,9 @@ def make_plan(
     held = _resolved("fixed", fixed, rig.parameters(), problems)
     names = [name for name in dict.fromkeys(names) if name not in held]
     apart = _resolved("separate", separate, dict.fromkeys(names), problems)
-    problems += _bad_options(options)
+    problems += faults({name: value for name, value in options.items() if name != "weights"})
+    for name in ("errors", "starts"):  # of the search, not of what is compared
+        options.pop(name, None)
     if not names and not problems:
         problems.append(
             Problem("free", "nothing is free; name parameters such as friction.a, friction.b, friction.d_c")
@@ -273,23 +273,6 @@ def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> lis
             )
             problems.append(Problem(what, message))
     return found
-
-
-def _bad_options(options: dict[str, Any]) -> list[Problem]:
-    problems = []
-    choices = {"trend_axis": AXES, "drive": DRIVES[:3], "loss": LOSSES}
-    for name, allowed in choices.items():
-        if options.get(name, allowed[0]) not in allowed:
-            problems.append(Problem(name, unknown_name("choice", options[name], allowed)))
-    trend = options.get("trend", 0)
-    if not (isinstance(trend, int) and not isinstance(trend, bool) and 0 <= trend <= 6):
-        problems.append(Problem("trend", f"got {trend!r}; allowed: a whole number from 0 (none) to 6"))
-    if not isinstance(options.get("offset", False), bool):
-        problems.append(Problem("offset", f"got {options['offset']!r}; allowed: true or false"))
-    width = options.get("width")
-    if width is not None and not (isinstance(width, (int, float)) and width > 0):
-        problems.append(Problem("width", f"got {width!r}; allowed: a number > 0, in units of what is fitted"))
-    return problems
 
 
 def _weighed(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:

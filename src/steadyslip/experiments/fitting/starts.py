@@ -16,13 +16,13 @@ from steadyslip.core.errors import InternalError
 from steadyslip.experiments.fitting.commanded import CommandedInputs, windows
 from steadyslip.experiments.fitting.comparison import RecordPart
 from steadyslip.experiments.fitting.inputs import ProtocolInputs
+from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.model.steady import steady_state
 
 Array = np.ndarray
-STARTS = 48
 NEARBY = 0.5  # share of the window of a time over which starts are spread
 STIFFEST = 100.0  # k d_c/(aσ) of a start: beyond, a record shows no more of the stiffness
 _DIRECT = (0.004, 0.01, 0.025)  # values of a where no step of the rate tells

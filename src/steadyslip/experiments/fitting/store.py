@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.experiments.fitting.identify import Combination
-from steadyslip.experiments.fitting.plan import DRIVES, Plan, make_plan
+from steadyslip.experiments.fitting.plan import Plan, make_plan
 from steadyslip.experiments.fitting.result import Fit, SearchStory
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.measured.columns import ROLES
@@ -209,7 +209,7 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
             rig_from_text(text, source), records, free,
             fixed=[] if "friction.mu_ref" in free else ["friction.mu_ref"],
             protocol=protocol_from_text(text, source) if commanded else None,
-            drive=DRIVES[0] if commanded else drive, weights=weights, **options,
+            drive="commanded" if commanded else drive, weights=weights, **options,
         )  # fmt: skip
     except SteadyslipError as error:
         raise table.fault(f"its rig or options are refused: {error}") from error

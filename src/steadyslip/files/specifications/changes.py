@@ -13,7 +13,7 @@ from steadyslip.machine.slider import Slider
 
 def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
     """Write ``name=value`` into the tables, and forget on which line that value stood; returns the problems."""
-    name, equals, raw = (part.strip() for part in text.partition("="))
+    name, equals, raw = split(text)
     if not equals or not name or not raw:
         return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = full_name(name, tables)
@@ -37,6 +37,12 @@ def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
     for key in [key for key in lines if key == full]:  # the fault is no longer on that line
         del lines[key]
     return problems
+
+
+def split(text: str) -> tuple[str, str, str]:
+    """Name, equals sign and value of a change, empty where they are missing."""
+    name, equals, raw = (part.strip() for part in text.partition("="))
+    return name, equals, raw
 
 
 def value_of(raw: str, name: str) -> Any:

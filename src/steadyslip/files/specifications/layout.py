@@ -18,10 +18,23 @@ ENTRY_POINTS = "steadyslip.laws"
 
 @dataclass(frozen=True)
 class Section:
-    """A table of the file: its name and the family of records that fills it (None: the slider itself)."""
+    """A table of a file.
+
+    Attributes
+    ----------
+    name : str
+    family : type of FrozenRecord or None
+        Of the records that fill it; None for the slider itself.
+    required : bool
+        Whether a file that is read for it must have it.
+    hint : str
+        What to write in it, for messages.
+    """
 
     name: str
     family: type[FrozenRecord] | None
+    required: bool = False
+    hint: str = ""
 
 
 PROTOCOL = Section("protocol", Protocol)

@@ -9,7 +9,8 @@ from os import PathLike
 from steadyslip.core.errors import InternalError, ParameterError, Problem
 from steadyslip.files.specifications.changes import value_of
 from steadyslip.files.specifications.layout import selector
-from steadyslip.files.specifications.read import Reader, read_text, text_of
+from steadyslip.files.specifications.read import protocol_of, text_of
+from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import Table
 from steadyslip.protocol import Piece, Protocol
 
@@ -39,7 +40,7 @@ def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Pro
 
 def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Protocol | None:
     """Read the protocol of a rig file's text; see `read_protocol`."""
-    return read_text(text, source, changes, rig_needed=False)[1]
+    return protocol_of(text, source, changes)
 
 
 def piece_from_text(text: str, area: float | None = None) -> Piece:
@@ -67,7 +68,7 @@ def piece_from_text(text: str, area: float | None = None) -> Piece:
     except ValueError as error:
         message = f"{error}" if text.strip() else f"is empty; write KIND KEY=VALUE ..., {_kinds()}"
         raise ParameterError([Problem("piece", message)], title=repr(text)) from error
-    reader = Reader({})
+    reader = TableReader()
     reader.area = area
     table: Table = {selector(Piece)[0]: kind}
     for word in words:

@@ -1,72 +1,64 @@
-"""JSON schema of the rig file, from the records' own declarations, for editors and other programs."""
+"""JSON schema of files, from the records' own declarations, for editors and other programs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from steadyslip.core.quantities import example
-from steadyslip.core.records import FrozenRecord, Option, Parameter, Part, Role, Series, is_required
-from steadyslip.files.specifications.layout import MAP, PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.core.records import (
+    FrozenRecord,
+    Named,
+    Option,
+    Parameter,
+    Part,
+    Role,
+    Series,
+    is_required,
+    key_of,
+)
+from steadyslip.core.settings import Schema
+from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-Schema = dict[str, Any]
+MOST_DOTS = 4  # of a parameter's name, such as protocol.pieces.1.to
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def json_schema() -> Schema:
-    """The schema (draft 2020-12) of a rig file as a dict; its JSON is what ``steadyslip schema`` prints."""
+def rig_schema(further: Sequence[Section] = ()) -> Schema:
+    """A rig file that may have further tables."""
     properties: Schema = {}
-    required = []
     for section in sections():
         if section.family is None:
             properties[section.name] = _table(Slider, {}, "the block, its spring and dampers")
         else:
             properties[section.name] = _family(section.family)
-            required.append(section.name)
-    properties[PROTOCOL.name] = _table(Protocol, {}, _summary(Protocol))
-    properties[MAP] = _map()
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "steadyslip rig",
-        "description": "Numbers are SI, per unit contact area (totals if slider.area is given); text carries a unit.",
-        "type": "object",
-        "properties": properties,
-        "required": required,
-        "additionalProperties": False,
-    }
+    properties[PROTOCOL.name] = protocol_schema()
+    properties |= further_schema(further)
+    required = [section.name for section in sections() if section.family is not None]
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
 
 
-def _map() -> Schema:
-    """The table of a map; which parameters and results there are depends on the rig and is checked by its reader."""
-    value: Schema = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-    spacing: Schema = {"enum": ["linear", "log"], "description": "even in the value or in its logarithm"}
-    ends: Schema = {"from": value, "to": value, "spacing": spacing}
-    count: Schema = {"type": "integer", "minimum": 1}
-    names: Schema = {"type": "array", "items": {"type": "string"}}
-    axis: Schema = {"anyOf": [{"type": "array", "items": value}, {"type": "object"}]}
-    samples: Schema = {
-        "over": {"type": "object", "description": "ranges by dotted name", "additionalProperties": {"type": "object"}},
-        "points": count,
-        "method": {"enum": ["sobol", "latin-hypercube"]},
-        "seed": {"type": "integer", "minimum": 0},
-        "fit": {"type": "string", "description": "file of a fit (.nc) from which to draw"},
-    }
-    return {
-        "type": "object",
-        "description": "a map: what to compute over which parameters; a further table for the options of each result",
-        "properties": {
-            "compute": {"anyOf": [{"type": "string"}, names], "description": "results, such as status"},
-            "over": {
-                "type": "object",
-                "description": f"values by dotted name: a list, or a table with points and {', '.join(ends)}",
-                "additionalProperties": axis,
-            },
-            "samples": {"type": "object", "properties": samples, "additionalProperties": False},
-            "chunk": count | {"description": "points computed in one go"},
-        },
-        "additionalProperties": {"type": "object"},
-    }
+def protocol_schema() -> Schema:
+    """The table of a protocol."""
+    return _table(Protocol, {}, _summary(Protocol))
+
+
+def further_schema(further: Sequence[Section]) -> Schema:
+    """Tables by name."""
+    return {one.name: _table(one.family, {}, _summary(one.family)) for one in further if one.family is not None}
+
+
+def partial(schema: Any) -> Any:
+    """The same schema for a file that may leave out whatever it does not know."""
+    if isinstance(schema, list):
+        return [partial(one) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    kept = {key: partial(one) for key, one in schema.items() if not (key == "required" and isinstance(one, list))}
+    return {"anyOf" if key == "oneOf" else key: one for key, one in kept.items()}
 
 
 def _family(family: type[FrozenRecord]) -> Schema:
@@ -85,19 +77,22 @@ def _table(law: type[FrozenRecord], properties: Schema, description: str) -> Sch
     properties = dict(properties)
     required: list[str] = []
     schema: Schema = {"type": "object", "description": description, "properties": properties}
+    rest: Schema | bool = False
     for item, role in own_fields(law):
         if isinstance(role, Part) and role.inline:
             properties[item.name] = {"enum": list(role.family.registry), "description": role.doc}
             for choice in role.family.registry.values():
                 for inner, inner_role in own_fields(choice):
                     properties[inner.name] = _value(inner_role)
-            continue
-        properties[item.name] = _value(role)
-        if is_required(item):
-            required.append(item.name)
+        elif isinstance(role, Part) and role.by_name:
+            properties |= {name: _table(one, {}, _summary(one)) for name, one in role.family.registry.items()}
+            rest = {"type": "object", "description": f"{role.doc} that an installed package offers"}
+        else:
+            properties[key_of(item)] = _value(role)
+            required += [key_of(item)] if is_required(item) else []
     if required:
         schema["required"] = required
-    schema["additionalProperties"] = False
+    schema["additionalProperties"] = rest
     return schema
 
 
@@ -105,14 +100,37 @@ def _value(role: Role) -> Schema:
     if isinstance(role, Option):
         return {"enum": list(role.choices), "description": role.doc}
     if isinstance(role, Part):
-        if role.many:
-            member = _family(role.family) if has_choice(role.family) else _table(role.family, {}, _summary(role.family))
-            return {"type": "array", "items": member, "description": role.doc}
-        return {"description": role.doc, "anyOf": [{"enum": list(role.family.registry)}, _family(role.family)]}
+        return _part(role)
+    if isinstance(role, Named):
+        return {"type": "object", "description": role.doc, "additionalProperties": _by_dotted_name(role, MOST_DOTS)}
     if isinstance(role, Series):
         member = {"anyOf": [{"type": "number"}, _text(role.unit)]}
         return {"type": "array", "items": member, "description": f"{role.doc}, {role.unit}"}
-    return _number(role)
+    return _number(role) if isinstance(role, Parameter) else role.schema()
+
+
+def _by_dotted_name(role: Named, depth: int) -> Schema:
+    """A value, or a table of values: without quotes, the dots of a name make tables."""
+    either = [_table(role.family, {}, _summary(role.family))]
+    if role.listed:
+        either.append({"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "string"}]}})
+    if depth:
+        either.append({"type": "object", "additionalProperties": _by_dotted_name(role, depth - 1)})
+    return {"anyOf": either}
+
+
+def _part(role: Part) -> Schema:
+    if role.many:
+        member = _family(role.family) if has_choice(role.family) else _table(role.family, {}, _summary(role.family))
+        return {"type": "array", "items": member, "description": role.doc}
+    if has_choice(role.family):
+        return {"description": role.doc, "anyOf": [{"enum": list(role.family.registry)}, _family(role.family)]}
+    table = _table(role.family, {}, _summary(role.family))
+    if not role.family.short:
+        return table | {"description": role.doc}
+    items = {key_of(item): _value(inner) for item, inner in own_fields(role.family)}
+    several = {"type": "array", "prefixItems": [items[key] for key in role.family.short], "items": False}
+    return {"description": role.doc, "anyOf": [items[role.family.short[0]], several, table]}
 
 
 def _number(role: Parameter) -> Schema:

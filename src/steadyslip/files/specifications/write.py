@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from textwrap import wrap
@@ -9,8 +11,9 @@ from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.quantities import outside
-from steadyslip.core.records import FrozenRecord, Option, Parameter, Part, Series
-from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.core.records import FrozenRecord, Named, Option, Parameter, Part, Series, key_of
+from steadyslip.core.settings import Setting
+from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
@@ -50,6 +53,11 @@ def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
     return "\n".join(blocks)
 
 
+def settings_to_text(section: Section, settings: FrozenRecord) -> str:
+    """A further table as TOML."""
+    return _table(f"[{section.name}]", settings, [], section.name, None)
+
+
 def _law_name(record: FrozenRecord, where: str) -> str:
     if not record.name:
         kind = type(record).__name__
@@ -61,22 +69,42 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
     lines = [header, *first]
     below: list[str] = []
     for item, role in own_fields(type(record)):
-        value = getattr(record, item.name)
+        value, key = getattr(record, item.name), key_of(item)
         if value is None or value == item.default:
             continue
         if isinstance(role, Series):
-            lines.append(f"{item.name} = {_column(role, value, area)}")
+            lines.append(f"{key} = {_column(role, value, area)}")
+        elif isinstance(role, Named):
+            below.append(_named(role, value, f"{path}.{key}"))
+        elif isinstance(role, Setting):
+            lines.append(f"{key} = {role.written(value)}")
         elif not isinstance(role, Part):
-            lines.append(f"{item.name} = {_scalar(role, value, area)}")
+            lines.append(f"{key} = {_scalar(role, value, area)}")
+        elif role.by_name:
+            below += [_table(f"[{path}.{one.name}]", one, [], f"{path}.{one.name}", area) for one in value]
         elif role.many:
-            below += [_member(role.family, member, f"{path}.{item.name}", path, area) for member in value]
+            below += [_member(role.family, member, f"{path}.{key}", path, area) for member in value]
         elif role.inline:
-            lines.append(f'{item.name} = "{_law_name(value, path)}"')
+            lines.append(f'{key} = "{_law_name(value, path)}"')
             lines += _table("", value, [], path, area).splitlines()[1:]
         else:
-            name = f"{path}.{item.name}"
-            below.append(_table(f"[{name}]", value, [f'law = "{_law_name(value, name)}"'], name, area))
+            name = f"{path}.{key}"
+            words = [f'law = "{_law_name(value, name)}"'] if has_choice(role.family) else []
+            below.append(_table(f"[{name}]", value, words, name, area))
     return "\n".join(["\n".join(lines) + "\n", *below])
+
+
+def _named(role: Named, values: Mapping[str, Any], path: str) -> str:
+    """A table of values by dotted name: an inline table each, or a list."""
+    lines = [f"[{path}]"]
+    for name, one in values.items():
+        if isinstance(one, role.family):
+            inner = (line.partition("  #")[0] for line in _table("", one, [], path, None).splitlines()[1:])
+            text = f"{{ {', '.join(inner)} }}"
+        else:
+            text = f"[{', '.join(json.dumps(v) if isinstance(v, str) else repr(float(v)) for v in one)}]"
+        lines.append(f"{json.dumps(name)} = {text}")
+    return "\n".join(lines) + "\n"
 
 
 def _member(family: type[FrozenRecord], member: FrozenRecord, name: str, path: str, area: float | None) -> str:

@@ -1,0 +1,306 @@
+"""Tables of TOML to records: one pass that notes every problem, for whatever records are declared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, fields
+from typing import Any
+
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, came, unknown_name
+from steadyslip.core.quantities import is_per_area, numbers, parse, total_unit
+from steadyslip.core.records import (
+    FrozenRecord,
+    Named,
+    Parameter,
+    Part,
+    Role,
+    Series,
+    Settings,
+    allowed,
+    checked,
+    checked_number,
+    is_required,
+    key_of,
+    role_of,
+)
+from steadyslip.core.settings import Setting
+from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
+from steadyslip.files.specifications.toml import Table
+
+
+class TableReader:
+    """Reads tables and collects their problems; with an area, quantities per unit area are for the whole of it."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+        self.area: float | None = None
+
+    def problem(self, name: str, message: str) -> None:
+        self.problems.append(Problem(name, message))
+
+    def record(self, family: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
+        """The record that a table describes, or None after noting its problems."""
+        if not has_choice(family):
+            law, rest = family, table
+        else:
+            key, default = selector(family)
+            if key not in table and default is None:
+                self.problem(prefix + key, f"missing; allowed: {', '.join(family.registry)}")
+                return None
+            chosen = self._law(family, table.get(key, default), prefix + key)
+            if chosen is None:
+                return None
+            law, rest = chosen, {name: value for name, value in table.items() if name != key}
+        return self._complete(law, rest, prefix)
+
+    def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
+        """Build a record; with bad values, still find what the others contradict."""
+        before = len(self.problems)
+        arguments = self._arguments(law, table, prefix)
+        if len(self.problems) == before:
+            return self._built(law, arguments, prefix)
+        if issubclass(law, Settings):
+            return _stand_in(law, arguments, {})
+        self.problems += [p.under(prefix.rstrip(".")) for p in _contradictions(law, arguments, set(table))]
+        return None
+
+    def _law(self, family: type[FrozenRecord], name: object, where: str) -> type[FrozenRecord] | None:
+        try:
+            return find_law(family, name)
+        except ParameterError as error:
+            self.problem(where, error.problems[0].message)
+            return None
+
+    def _built(self, law: type[FrozenRecord], arguments: Table, prefix: str) -> FrozenRecord | None:
+        try:
+            return law(**arguments)
+        except ParameterError as error:
+            self.problems += [p.under(prefix.rstrip(".")) for p in error.problems]
+            return _stand_in(law, arguments, {}) if issubclass(law, Settings) else None
+
+    def _arguments(self, law: type[FrozenRecord], table: Table, prefix: str) -> Table:
+        """Constructor arguments from a table; unknown, missing and bad keys are noted."""
+        rest = dict(table)
+        arguments: Table = {}
+        keys: list[str] = []
+        for item, role in own_fields(law):
+            key = key_of(item)
+            if isinstance(role, Part) and role.by_name:
+                members = self._by_name(role, rest, prefix)
+                keys += role.family.registry
+                if members:
+                    arguments[item.name] = members
+                continue
+            keys.append(key)
+            if isinstance(role, Part) and role.inline:
+                inner = self._inline(item, role, rest, prefix, keys)
+                if inner is not None:
+                    arguments[item.name] = inner
+            elif key in rest:
+                value = self._value(item, role, rest.pop(key), prefix + key)
+                if value is not None:
+                    arguments[item.name] = value
+            elif is_required(item):
+                self.problem(prefix + key, _missing(role))
+        for name in rest:
+            self.problem(prefix + name, unknown_name("key", name, keys))
+        return arguments
+
+    def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
+        """Tables that are named after laws of a family, taken out of the rest."""
+        found = []
+        key = selector(role.family)[0]
+        for name in [name for name, value in rest.items() if isinstance(value, dict)]:
+            try:
+                find_law(role.family, name)
+            except ParameterError:
+                continue  # an unknown key
+            table = rest.pop(name)
+            if key in table:
+                self.problem(f"{prefix}{name}.{key}", "is not an option; the table is named after the result")
+            elif (one := self.record(role.family, {key: name, **table}, f"{prefix}{name}.")) is not None:
+                found.append(one)
+        return tuple(found)
+
+    def _inline(self, item: Field[Any], role: Part, rest: Table, prefix: str, keys: list[str]) -> FrozenRecord | None:
+        """A part named by a word whose own parameters stand beside it (evolution, c_nagata)."""
+        raw = rest.pop(item.name, item.default.name if isinstance(item.default, FrozenRecord) else None)
+        law = self._law(role.family, raw, prefix + item.name)
+        if law is None:
+            return None
+        names = [inner.name for inner, _ in own_fields(law)]
+        keys += names
+        mine = {name: rest.pop(name) for name in names if name in rest}
+        return self._complete(law, mine, prefix)
+
+    def _value(self, item: Field[Any], role: Role, raw: Any, name: str) -> Any:
+        """One checked value, None after noting a problem."""
+        if isinstance(role, Part):
+            return self._part(role, raw, name)
+        if isinstance(role, Named):
+            return self._named(role, raw, name)
+        try:
+            if isinstance(role, (Parameter, Series)) and self.area is not None and is_per_area(role.unit):
+                return (
+                    number(role, raw, self.area) if isinstance(role, Parameter) else self._totals(role, raw, self.area)
+                )
+            return checked(item, raw)
+        except ParameterError as error:
+            self.problems += [problem.under(name) for problem in error.problems[:1]]
+            return None
+
+    def _part(self, role: Part, raw: Any, name: str) -> Any:
+        if role.many:
+            if not isinstance(raw, list) or not all(isinstance(member, dict) for member in raw):
+                self.problem(name, f"got {came(raw)}; allowed: a list of tables, [[{name}]]")
+                return None
+            members = [self.record(role.family, member, f"{name}.{i}.") for i, member in enumerate(raw, start=1)]
+            return None if None in members else tuple(members)
+        table = _from_short(role.family, raw)
+        if table is None:
+            self.problem(name, f"got {came(raw)}; allowed: {_wanted(role.family, name)}")
+            return None
+        return self.record(role.family, table, f"{name}.")
+
+    def _named(self, role: Named, raw: Any, name: str) -> dict[str, Any] | None:
+        if not isinstance(raw, dict):
+            self.problem(name, f"got {came(raw)}; allowed: parameters and their values")
+            return None
+        keys = [key_of(item) for item, _ in own_fields(role.family)]
+        found: dict[str, Any] = {}
+        for inner, value in flat(raw, keys).items():
+            if isinstance(value, dict):
+                one = self.record(role.family, value, f"{name}.{inner}.")
+                if one is not None:
+                    found[inner] = one
+            elif role.listed and isinstance(value, list):
+                found[inner] = value
+            else:
+                listed = "a list of values, or " if role.listed else ""
+                self.problem(
+                    f"{name}.{inner}", f"got {came(value)}; allowed: {listed}{{{' = ..., '.join(keys)} = ...}}"
+                )
+        return found
+
+    def _totals(self, role: Series, raw: Any, area: float) -> tuple[float, ...]:
+        """A column for the whole area as one per unit area; its texts may give either."""
+
+        def read(text: str, total: str) -> float:
+            try:
+                return parse(text, total) / area
+            except QuantityError as error:
+                try:
+                    return parse(text, role.unit)
+                except QuantityError:
+                    raise QuantityError(f"{error} (the rig has an area)") from error
+
+        try:
+            found = numbers(raw, total_unit(role.unit), read)
+            return tuple(v if isinstance(given, str) else v / area for given, v in zip(raw, found, strict=True))
+        except QuantityError as error:
+            raise ParameterError([Problem("", str(error))]) from error
+
+
+def number(role: Parameter, raw: Any, area: float | None) -> float:
+    """A value of a file, SI, per unit area.
+
+    Where the rig has an area, quantities per unit area are for the whole of it in a file (N, N/m, kg, ...); text may
+    give either.
+
+    Raises
+    ------
+    ParameterError
+        Without a name.
+    """
+    if area is None or not is_per_area(role.unit):
+        return checked_number(role, raw)
+    if isinstance(raw, str):
+        try:
+            return checked_number(role, parse(raw, total_unit(role.unit)) / area)
+        except QuantityError as error:
+            try:
+                return checked_number(role, parse(raw, role.unit))
+            except QuantityError:
+                raise ParameterError([Problem("", f"{error} (the rig has an area)")]) from error
+    whole = Parameter(total_unit(role.unit), role.domain, role.doc)
+    return checked_number(role, checked_number(whole, raw) / area)
+
+
+def flat(table: Table, keys: Sequence[str]) -> dict[str, Any]:
+    """Dotted names and their values, where unquoted dots have made tables of parts of names.
+
+    A table that has one of the `keys` is a value. A name that was changed in full joins the shorter one of the file.
+    """
+    found: dict[str, Any] = {}
+
+    def walk(prefix: str, inner: Table) -> None:
+        for key, value in inner.items():
+            full = f"{prefix}{key}"
+            is_value = not isinstance(value, dict) or not value
+            if is_value or any(k in keys and not isinstance(v, dict) for k, v in value.items()):
+                both = isinstance(value, dict) and isinstance(found.get(full), dict)
+                found[full] = found[full] | value if both else value
+            else:
+                walk(f"{full}.", value)
+
+    walk("", table)
+    for name in [n for n in found if "." in n]:
+        short = next((n for n in found if n != name and name.endswith(f".{n}")), None)
+        if short is not None and isinstance(found[name], dict) and isinstance(found[short], dict):
+            found[short] = found[short] | found.pop(name)
+    return found
+
+
+def _from_short(family: type[FrozenRecord], raw: Any) -> Table | None:
+    """The table that a value stands for, None if it stands for none."""
+    if isinstance(raw, Mapping):
+        return dict(raw)
+    if has_choice(family):
+        return {"law": raw} if isinstance(raw, str) else None
+    if not family.short:
+        return None
+    values = raw if isinstance(raw, list) and len(raw) == len(family.short) else [raw]
+    return dict(zip(family.short, values, strict=False))
+
+
+def _wanted(family: type[FrozenRecord], name: str) -> str:
+    if has_choice(family):
+        return f"a table [{name}] with law = one of {', '.join(family.registry)}"
+    return f"a table [{name}] with {', '.join(key_of(item) for item, _ in own_fields(family))}"
+
+
+def _missing(role: Role) -> str:
+    if isinstance(role, Parameter):
+        return f"missing ({role.doc}); allowed: {allowed(role)}"
+    if isinstance(role, Series):
+        return f"missing ({role.doc}); allowed: a list of numbers in {role.unit}, or of texts with units"
+    if isinstance(role, Setting):
+        return f"missing ({role.doc}); allowed: {role.allowed()}"
+    return f"missing ({role.doc})"
+
+
+def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping[str, Any]) -> FrozenRecord:
+    """A record that was not checked, of what is valid; `others`, or defaults, in place of the rest."""
+    found = object.__new__(law)
+    for item in fields(law):  # type: ignore[arg-type]
+        default = None if is_required(item) else item.default
+        object.__setattr__(found, item.name, valid.get(item.name, others.get(item.name, default)))
+    return found
+
+
+def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with: set[str]) -> list[Problem]:
+    """Problems between the fields of a record that cannot be built, because other fields are bad.
+
+    Numbers that were given but are bad, or missing, stand as NaN, which contradicts nothing.
+    """
+    bad = [i for i in fields(law) if i.name not in valid and (key_of(i) in came_with or is_required(i))]  # type: ignore[arg-type]
+    if not all(isinstance(role_of(item), Parameter) for item in bad):
+        return []
+    partial = _stand_in(law, valid, {item.name: math.nan for item in bad})
+    found = list(partial.inconsistencies())
+    for condition in partial.conditions():
+        problem = condition.problem()
+        if problem is not None and not any(math.isnan(number) for number in condition.numbers):
+            found.append(problem)
+    return found

@@ -30,7 +30,7 @@ def names(page: Path) -> str:
 # --- pages made from the code -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["rig-file.md", "python.md"])
+@pytest.mark.parametrize("name", ["rig-file.md", "fit-file.md", "map-file.md", "python.md"])
 def test_generated_pages_are_up_to_date(name):
     """In a process of its own: other tests register laws of theirs."""
     code = f"import runpy; print(runpy.run_path('docs/reference/make_tables.py')['PAGES'][{name!r}](), end='')"
@@ -200,4 +200,4 @@ def test_the_reference_of_the_command_line_has_every_key_of_the_json():
 
 def test_make_tables_knows_its_pages():
     pages = runpy.run_path(str(ROOT / "docs/reference/make_tables.py"))["PAGES"]
-    assert set(pages) == {"rig-file.md", "python.md"}
+    assert set(pages) == {"rig-file.md", "fit-file.md", "map-file.md", "python.md"}

@@ -155,3 +155,18 @@ def test_search_ends_with_floating_point(name, value):
         assert "floating point" in str(error)  # noqa: PT017
     else:
         assert all(math.isfinite(edge.value) for edge in edges)
+
+
+@pytest.mark.parametrize("b", [0.005, 0.009, 0.0095])
+@pytest.mark.parametrize("alpha", [0.0, 0.4])
+def test_a_pull_that_locks_up_is_said_to(alpha, b):
+    """Where μ(v) reaches 1/gain steady sliding ends; next to it only rounding calls it a slow growth."""
+    friction = rate_state(a=0.01, b=b, mu_ref=0.5, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=alpha))
+    pull = ss.SelfEnergising(preload=5e6, gain=1.98)
+    held = ss.Slider(friction=friction, contact=pull, stiffness=1e9, drive=ss.Steady(1e-6))
+    edges = [e for e in ss.boundary(held, "drive.velocity") if e.stable == "below"]
+    last = 1e-6 * math.exp((1 / 1.98 - 0.5) / (0.01 - b))
+    if last < 1.0:
+        assert [e.kind for e in edges] == ["lock-up"]
+        assert edges[0].value == pytest.approx(last, rel=1e-6)
+    assert "grows without oscillating" not in str(ss.analyze(held))

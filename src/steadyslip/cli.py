@@ -65,7 +65,7 @@ def analyze(
     changes: Changes = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
     require_stable: Annotated[
-        bool, typer.Option("--require-stable", help="exit with status 1 unless sliding is stable")
+        bool, typer.Option("--require-stable", help="exit with status 1 unless sliding is stable beyond rounding")
     ] = False,
     formula: Annotated[bool, typer.Option("--formula", help="also print the critical stiffness as a formula")] = False,
     branch: Annotated[int, typer.Option(help="which steady sliding, where there are several")] = 0,
@@ -104,7 +104,7 @@ def analyze(
             _echo_formula(result)
     if any(one.interrupted for one in result.kicks):
         raise typer.Exit(130)
-    if require_stable and not result.stable:
+    if require_stable and (not result.stable or result.on_edge):
         raise typer.Exit(1)
 
 

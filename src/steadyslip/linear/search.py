@@ -29,7 +29,8 @@ from steadyslip.model.steady import explain_absence, steady_stress
 _PER_DECADE = 40
 _DECADES = 6
 _LINEAR = 721
-_ROUNDING = 64  # units of the last place within which two conditions are one
+_ROUNDING = 64  # units of the last place within which two conditions are one, at first;
+_WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 
 
@@ -210,13 +211,15 @@ class Search:
 
         The static stiffness vanishes there too, so that rounding alone decides which of the two is met first.
         """
-        reach = _ROUNDING * max(np.spacing(abs(low)), np.spacing(abs(high)))
-        wide = np.array([low - reach, high + reach])
-        if not np.all(self.role.domain.contains(wide)):
-            return low, high
-        status = self.status(wide)
-        absent = np.any(status == ABSENT) and not np.all(status == ABSENT) and not np.any(status == UNKNOWN)
-        return (float(wide[0]), float(wide[1])) if absent else (low, high)
+        unit = max(np.spacing(abs(low)), np.spacing(abs(high)))
+        for reach in _ROUNDING * unit * 8.0 ** np.arange(_WIDER):  # friction hardly changes with the velocity, say
+            wide = np.array([low - reach, high + reach])
+            if not np.all(self.role.domain.contains(wide)):
+                break
+            status = self.status(wide)
+            if np.any(status == ABSENT) and not np.all(status == ABSENT) and not np.any(status == UNKNOWN):
+                return float(wide[0]), float(wide[1])
+        return low, high
 
     def _kind(self, low: float, high: float, below: int, above: int) -> tuple[str, float]:
         if ABSENT in (below, above):

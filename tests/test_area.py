@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
+from matplotlib.text import Text
 
 import lab_records as lab
 import steadyslip as ss
@@ -27,7 +28,7 @@ def rig():
 
 def words_of(axes):
     figure = np.ravel(axes)[0].figure
-    found = [t.get_text() for t in figure.findobj(lambda a: hasattr(a, "get_text"))]
+    found = [t.get_text() for t in figure.findobj(Text)]
     plt.close(figure)
     return " ".join(found)
 

@@ -6,9 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import lab_records as lab
 import steadyslip as ss
@@ -162,26 +160,6 @@ def test_reports_escape_what_came_from_outside():
     page = fit_report(fit)
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
-
-
-def test_figures_show_what_was_measured_and_found():
-    record = lab.record(lab.rig(alpha=0.35), lab.PRESSED)
-    panels = ss.figures.record(record, Figure().subplots(3, 1))
-    np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), record.friction)
-    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point rate (µm/s)", "normal stress (MPa)"]
-    assert len(panels[0].lines) == 1 + len(record.steps)
-    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), record)
-    panels = ss.figures.fit(fit, Figure().subplots(2, 1))
-    np.testing.assert_array_equal(panels[0].lines[1].get_ydata(), fit.model)
-    np.testing.assert_allclose(panels[1].lines[0].get_ydata(), 1e3 * fit.residuals)
-    count = len(fit.names)
-    grid = ss.figures.corner(fit, Figure(figsize=(9, 9)).subplots(count, count))
-    assert grid[-1, 0].get_xlabel() == "a (1)"
-    assert not grid[0, -1].get_visible()
-    drawn = ss.figures.prediction(ss.predict(lab.rig(alpha=0.35), fit), Figure().subplots())
-    assert drawn.get_xlabel() == "stiffness (GPa/m)"
-    with pytest.raises(ss.ParameterError, match="sequence of 3"):
-        ss.figures.record(record, Figure().subplots(2, 1))
 
 
 def test_options_are_used_or_refused(fitted):

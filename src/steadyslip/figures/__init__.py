@@ -10,10 +10,14 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from steadyslip.core.pictures import register_figures
-from steadyslip.experiments import Draws, Fit, Prediction, Record
+from steadyslip.experiments import Draws, Fit, LawComparison, Prediction, Profile, Record
+from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
-from steadyslip.figures.lab import corner, fit, prediction, record
+from steadyslip.figures.experiments.answers import comparison, prediction, profile, ranking
+from steadyslip.figures.experiments.corners import corner
+from steadyslip.figures.experiments.fits import fit, steps
+from steadyslip.figures.experiments.records import record
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
@@ -27,6 +31,7 @@ from steadyslip.verdict import Analysis
 __all__ = [
     "ANGLES",
     "basin",
+    "comparison",
     "corner",
     "critical_stiffness_against_mass",
     "cycle_branch",
@@ -36,11 +41,14 @@ __all__ = [
     "map_figure",
     "phase_plane",
     "prediction",
+    "profile",
+    "ranking",
     "record",
     "refined",
     "root_locus",
     "sensitivity",
     "stability_chart",
+    "steps",
     "threshold_map",
 ]
 
@@ -55,8 +63,11 @@ register_figures(CycleBranch, branch=cycle_branch)
 register_figures(HopfCurve, curve=hopf_curve)
 register_figures(Basin, basin=basin)
 register_figures(Record, record=record)
-register_figures(Fit, fit=fit, corner=corner)
+register_figures(Fit, fit=fit, steps=steps, corner=corner)
 register_figures(Draws, corner=corner)
+register_figures(Profile, profile=profile)
+register_figures(LawComparison, comparison=comparison)
+register_figures(Ranking, ranking=ranking)
 register_figures(Prediction, prediction=prediction)
 register_figures(MapResult, map=map_figure)
 register_figures(Refined, refined=refined)

@@ -41,7 +41,8 @@ def fit_report(fit: Fit, comparison: LawComparison | None = None) -> str:
     parts += [f'<p class="warning">{html.escape(text)}</p>' for text in warnings(fit)]
     if comparison is not None:
         parts.append(f"<h2>Laws compared</h2><pre>{html.escape(str(comparison))}</pre>")
-    parts += [_figure(fit, "fit", record=i) for i in range(len(fit.plan.records))]
+    for i in range(len(fit.plan.records)):
+        parts += [_figure(fit, "fit", record=i), _figure(fit, "steps", record=i)]
     parts.append(_figure(fit, "corner"))
     parts.append(f"<h2>Details</h2><pre>{html.escape(str(fit))}</pre>")
     for record in fit.plan.records:
@@ -64,21 +65,18 @@ def _estimates(fit: Fit) -> str:
 
 
 def _figure(fit: Fit, kind: str, **options: Any) -> str:
-    """A figure as SVG text."""
-    from matplotlib.figure import Figure
+    """A figure as SVG text; none where there is nothing to draw."""
+    from matplotlib import pyplot as plt
 
     from steadyslip import figures
 
-    drawn = Figure(figsize=(7.5, 5.0) if kind == "fit" else (8.0, 8.0), layout="constrained")
     try:
-        if kind == "fit":
-            figures.fit(fit, drawn.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0)), **options)
-        else:
-            count = sum(one.determined for one in fit.estimates)
-            figures.corner(fit, drawn.subplots(count, count, squeeze=False))
+        panels = getattr(figures, kind)(fit, **options)
     except (NotAvailable, ValueError):
         return ""
+    drawn = panels.flat[0].figure
     text = io.StringIO()
     drawn.savefig(text, format="svg", dpi=100, metadata={"Date": None})
+    plt.close(drawn)
     svg = text.getvalue()
     return svg[svg.index("<svg") :]

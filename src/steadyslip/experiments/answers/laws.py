@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem
+from steadyslip.core.pictures import draw
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.laws.friction import PRZ, Aging, RateState, Slip, State
@@ -65,6 +66,15 @@ class LawComparison:
         if self.left_out:
             lines.append(f"stopped before these were fitted: {'; '.join(self.left_out)}")
         return "\n".join(lines)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the laws by how much worse than the best they are.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
 
 
 def compare(fits: Mapping[str, Fit]) -> LawComparison:

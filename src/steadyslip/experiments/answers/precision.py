@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly
@@ -169,6 +170,15 @@ class Ranking:
             text = f"± {size}" if np.isfinite(error) else "not determined"
             lines.append(f"  {label:<{wide}}  {text}")
         return "\n".join(lines)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the experiments by the error that they leave.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
 
 
 def best_protocol(

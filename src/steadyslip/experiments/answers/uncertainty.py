@@ -222,6 +222,15 @@ class Profile(ReadOnly):
         )
         return f"{self.name}, 95 % by its profile: {ends}"
 
+    def plot(self, ax: Any = None) -> Any:
+        """Draw how fast the misfit rises, with the intervals that this gives.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
+
 
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
     """Profile of a parameter: all others fitted anew at each value, side by side.

@@ -221,7 +221,8 @@ class Fit(ReadOnly):
                 continue
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
-                    end = shown(float(one.value(bound)), one.unit, area=self.plan.rig.area)
+                    value = float(one.value(bound))
+                    end = f"{value:.7g} s" if one.unit == "s" else shown(value, one.unit, area=self.plan.rig.area)
                     found.append(f"{one.name} ended at the {word} value that was searched, {end}")
         return tuple(found)
 
@@ -325,7 +326,14 @@ class Fit(ReadOnly):
         save(self, path)
 
     def plot(self, kind: str = "fit", ax: Any = None) -> Any:
-        """Draw the fit: ``fit`` (records, model and residuals) or ``corner`` (estimates against each other).
+        """Draw the fit.
+
+        Parameters
+        ----------
+        kind : str
+            ``fit`` (what drives it, record and model, residuals and their autocorrelation), ``steps`` (each step on
+            its own) or ``corner`` (estimates against each other).
+        ax : array of matplotlib Axes, optional
 
         Returns
         -------

@@ -77,9 +77,19 @@ def lasting(values: Array) -> float:
 
 def lag_one(residuals: Array) -> float:
     """Autocorrelation from one sample to the next."""
+    return float(autocorrelation(residuals, 1)[1])
+
+
+def autocorrelation(residuals: Array, most: int) -> Array:
+    """Autocorrelation at lags 0, 1, ... `most`; zero of residuals that are all the same."""
+    found = _products(residuals, most)
+    return found / found[0] if found[0] > 0 else np.zeros(most + 1)
+
+
+def _products(residuals: Array, most: int) -> Array:
+    """Sums of the products of deviations from the mean, at lags 0, 1, ... `most`."""
     r = residuals - residuals.mean()
-    total = float(np.sum(r * r))
-    return float(np.sum(r[1:] * r[:-1])) / total if total > 0 else 0.0
+    return np.array([float(np.sum(r[h:] * r[: len(r) - h])) for h in range(most + 1)])
 
 
 def describe(residuals: Array, free: int = 0, always: bool = False) -> Noise:
@@ -97,9 +107,8 @@ def describe(residuals: Array, free: int = 0, always: bool = False) -> Noise:
     lag1 = lag_one(residuals)
     if not always and abs(lag1) < DETECTED / np.sqrt(n):
         return white(residuals, free)
-    r = residuals - residuals.mean()
     most = min(MOST_LAGS, n // 10)
-    gamma = np.array([float(np.sum(r[h:] * r[: n - h])) for h in range(most + 1)]) / max(n - free, 1)
+    gamma = _products(residuals, most) / max(n - free, 1)
     if not gamma[0] > 0:
         return white(residuals, free)
     best = (np.inf, np.empty(0), gamma[0])

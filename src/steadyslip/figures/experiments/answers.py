@@ -1,0 +1,159 @@
+"""What follows from fits: profiles, laws compared, experiments ranked, and the verdict on another rig."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from scipy.stats import chi2
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.quantities import percent, shown
+from steadyslip.experiments.answers.predict import probability_text
+from steadyslip.figures.experiments.panels import brief
+from steadyslip.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    axes_or_new,
+    display_unit,
+    labelled,
+)
+
+if TYPE_CHECKING:
+    from steadyslip.experiments import LawComparison, Prediction, Profile
+    from steadyslip.experiments.answers.precision import Ranking
+
+
+def profile(result: Profile, ax: Axes | None = None) -> Axes:
+    """How fast the misfit rises away from the best value, and the intervals of 68 and 95 % that this gives.
+
+    Parameters
+    ----------
+    result : Profile
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    factor, unit = display_unit(result.unit, float(np.median(np.abs(result.values))), result.area)
+    ax.plot(result.values / factor, result.rise, color=BLUE, marker=".", label="all other parameters fitted anew")
+    top = float(np.max(result.rise[np.isfinite(result.rise)], initial=0.0))
+    for level, style in ((0.68, "-"), (0.95, "--")):
+        limit = float(chi2.ppf(level, 1))
+        top = max(top, 1.2 * limit)
+        ends = np.array(result.interval(level)) / factor
+        ax.axhline(limit, color=GREY, linewidth=0.8)
+        for end in ends[np.isfinite(ends)]:
+            ax.axvline(end, color=VERMILION, linewidth=1, linestyle=style)
+        ax.plot([], [], color=VERMILION, linestyle=style, label=f"{100 * level:.0f} %")
+    ax.set_ylim(0.0, min(top, 12.0))
+    ax.set_xlabel(labelled(brief(result.name), unit))
+    ax.set_ylabel("rise of the misfit (1 = one error squared)")
+    ax.legend(loc="upper center", fontsize="small")
+    return ax
+
+
+def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
+    """Laws by how much worse than the best they explain the records, by both criteria.
+
+    Parameters
+    ----------
+    result : LawComparison
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    labels = list(result.fits)[::-1]
+    place = np.arange(len(labels))
+    for k, (name, colour) in enumerate((("AIC", BLUE), ("BIC", ORANGE))):
+        values = np.array([result.criteria[label][k] for label in labels])
+        ax.barh(place + 0.2 - 0.4 * k, values - values.min(), 0.38, color=colour, label=name)
+    for y, label in zip(place, labels, strict=True):
+        text = f"{len(result.fits[label].space)} parameters, weight {_weight(result.weights[label])}"
+        ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
+    ax.set_yticks(place, labels)
+    ax.set_xlabel("criterion above that of the best (1)")
+    ax.legend(loc="best", fontsize="small")
+    return ax
+
+
+def _weight(share: float) -> str:
+    """A share that is never rounded to nothing or to certainty."""
+    return "< 0.1 %" if share < 0.001 else "> 99.9 %" if share > 0.999 else percent(round(share, 3))
+
+
+def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
+    """Experiments by the error that they would leave in one parameter.
+
+    Parameters
+    ----------
+    result : Ranking
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    labels = list(result.found)[::-1]
+    first = result.found[result.best]
+    errors = np.array([result.found[label].errors[result.parameter] for label in labels])
+    known = np.isfinite(errors)
+    if not np.any(known):
+        raise NotAvailable(f"none of the experiments determines {result.parameter}")
+    si = first.units[result.parameter]
+    factor, unit = display_unit(si, float(np.min(errors[known])), first.area)
+    place = np.arange(len(labels))
+    ax.barh(place[known], errors[known] / factor, color=BLUE)
+    if np.max(errors[known]) > 20 * np.min(errors[known]):
+        ax.set_xscale("log")
+    for y, error in zip(place, errors, strict=True):
+        text = shown(float(error), si, 2, first.area) if np.isfinite(error) else "not determined"
+        ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
+    ax.set_yticks(place, labels)
+    ax.set_xlabel(labelled(f"error of {brief(result.parameter)}", unit))
+    return ax
+
+
+def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
+    """Distribution of the critical stiffness that the records allow, and the rig's own stiffness.
+
+    Parameters
+    ----------
+    result : Prediction
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    ax = axes_or_new(ax)
+    critical = result.critical_stiffness[np.isfinite(result.critical_stiffness)]
+    own = float(np.nanmedian(result.safety * result.critical_stiffness)) if len(critical) else float("nan")
+    if not len(critical):
+        raise NotAvailable("no draw has a critical stiffness; the verdict does not depend on the stiffness")
+    factor, unit = display_unit("Pa/m", max(float(np.median(critical)), own), result.rig.area)
+    ax.hist(critical / factor, bins=60, color=SKY, label="critical stiffness")
+    ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
+    middle = result.quantiles(result.critical_stiffness)[2]
+    ax.axvline(middle / factor, color=BLACK, linewidth=1, linestyle="--", label="median")
+    if missing := np.mean(~np.isfinite(result.critical_stiffness)):
+        ax.plot([], [], " ", label=f"{percent(missing)} of the draws have none")
+    ax.set_xlabel(labelled("stiffness", unit))
+    ax.set_ylabel("draws (1)")
+    probability = probability_text(result.probability_stable, len(result.stable))
+    ax.set_title(f"stable with probability {probability}", fontsize="medium",
+                 color=GREEN if result.probability_stable > 0.5 else VERMILION)  # fmt: skip
+    ax.legend(loc="best", fontsize="small")
+    return ax

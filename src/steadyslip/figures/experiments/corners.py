@@ -1,0 +1,134 @@
+"""Estimates against each other, with the regions that hold 68 and 95 % of the probability."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from scipy.ndimage import gaussian_filter
+from scipy.stats import chi2, norm
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.answers.uncertainty import Draws
+from steadyslip.figures.experiments.panels import brief, grid
+from steadyslip.figures.style import BLACK, BLUE, SKY, VERMILION, display_unit, labelled
+
+if TYPE_CHECKING:
+    from steadyslip.experiments import Estimate, Fit
+
+LEVELS = (0.68, 0.95)
+BINS = 48  # of a histogram of draws
+MOST_DRAWN = 4000  # draws that are drawn as dots
+
+
+def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
+    """Parameters against each other: regions of 68 and 95 %, exact for a fit's covariance, of draws as they fell.
+
+    Parameters
+    ----------
+    result : Fit or Draws
+    ax : array of matplotlib Axes, optional
+        As many rows and columns as there are determined parameters.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    source = result.fit if isinstance(result, Draws) else result
+    names = [e.name for e in source.estimates if e.determined]
+    if not names:
+        raise NotAvailable("no parameter is determined; there is nothing to draw")
+    size = max(3.0, 1.5 * len(names) + 0.8)
+    panels = grid(ax, len(names), len(names), (size, size))
+    scales = [_Scale(source[name]) for name in names]
+    for i, row in enumerate(names):
+        for k, column in enumerate(names):
+            panel = panels[i, k]
+            if k > i:
+                panel.set_visible(False)
+                continue
+            if isinstance(result, Draws):
+                _drawn(panel, scales[k](result[column]), scales[i](result[row]), i == k)
+            else:
+                _outlined(panel, result, (column, row), (scales[k], scales[i]))
+            if i == len(names) - 1:
+                panel.set_xlabel(scales[k].label, fontsize="small")
+            if k == 0 and i:
+                panel.set_ylabel(scales[i].label, fontsize="small")
+            panel.tick_params(labelsize="x-small", labelbottom=i == len(names) - 1, labelleft=k == 0 and i > 0)
+            panel.tick_params(axis="x", rotation=45)
+            panel.locator_params(nbins=3)
+            panel.axvline(scales[k].best, color=VERMILION, linewidth=0.8)
+            if i != k:
+                panel.axhline(scales[i].best, color=VERMILION, linewidth=0.8)
+    return panels
+
+
+class _Scale:
+    """Values of a parameter as its axis shows them; times of a clock are shown from the best one on."""
+
+    def __init__(self, one: Estimate) -> None:
+        clock = one.unit == "s"
+        self.origin = one.value if clock else 0.0
+        self.size, unit = display_unit(one.unit, one.error if clock else abs(one.value) or one.error, one.area)
+        self.best = (one.value - self.origin) / self.size
+        self.label = labelled(f"{brief(one.name)}\n- {one.value:.7g} s" if clock else brief(one.name), unit)
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        return (values - self.origin) / self.size
+
+
+def _outlined(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scale, _Scale]) -> None:
+    """The normal distribution of two coordinates, or of one, brought to the parameters themselves."""
+    one, other = (fit.index(name) for name in names)
+    places = [fit.coordinates[i] for i in (one, other)]
+    if one == other:
+        deviation = float(np.sqrt(fit.covariance[one, one]))
+        z = places[0] + deviation * np.linspace(-3.5, 3.5, 200)
+        density = norm.pdf(z, places[0], deviation)
+        values = scales[0](np.asarray(fit.space.unknowns[one].value(z)))
+        panel.fill_between(values, density / np.gradient(values, z), color=SKY, linewidth=0)
+        panel.set_yticks([])
+        panel.set_ylim(0.0, None)
+        return
+    root = np.linalg.cholesky(fit.covariance[np.ix_([one, other], [one, other])])
+    angle = np.linspace(0.0, 2 * np.pi, 181)
+    for level, style in zip(LEVELS, ("-", "--"), strict=True):
+        ring = root @ (np.sqrt(chi2.ppf(level, 2)) * np.array([np.cos(angle), np.sin(angle)]))
+        curve = [
+            scale(np.asarray(fit.space.unknowns[i].value(place + part)))
+            for i, place, part, scale in zip((one, other), places, ring, scales, strict=True)
+        ]
+        panel.plot(*curve, color=BLUE, linewidth=1, linestyle=style, label=f"{100 * level:.0f} %")
+
+
+def _drawn(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None:
+    """Draws as dots, and lines of equal density around 68 and 95 % of them."""
+    if alone:
+        panel.hist(x, bins=40, color=SKY)
+        panel.set_yticks([])
+        return
+    few = slice(0, MOST_DRAWN)
+    panel.plot(x[few], y[few], ".", color=SKY, markersize=1, alpha=0.4, rasterized=True)
+    spread = np.cov(x, y)
+    if np.linalg.det(spread) > 0:
+        root = np.linalg.cholesky(spread)  # in its coordinates draws are as wide in all directions, and smoothed so
+        u, v = np.linalg.solve(root, np.array([x, y]))
+        counts, columns, rows = np.histogram2d(u, v, bins=BINS)
+        widths = [len(u) ** (-1 / 6) / (edges[1] - edges[0]) for edges in (columns, rows)]  # Scott's rule, in bins
+        beyond = int(3 * max(widths)) + 1
+        density = gaussian_filter(np.pad(counts, beyond), widths)
+        places = np.arange(BINS + 2 * beyond) - beyond + 0.5
+        middles = np.meshgrid(*(e[0] + (e[1] - e[0]) * places for e in (columns, rows)), indexing="ij")
+        panel.contour(
+            *np.einsum("ij,jkl->ikl", root, np.array(middles)), density,
+            levels=[region(density, level) for level in LEVELS[::-1]], colors=BLACK, linewidths=1,
+            linestyles=("--", "-"),
+        )  # fmt: skip
+
+
+def region(density: np.ndarray, share: float) -> float:
+    """The density above which a share of the whole lies."""
+    falling = np.sort(density, axis=None)[::-1]
+    return float(falling[np.searchsorted(np.cumsum(falling), share * np.sum(falling))])

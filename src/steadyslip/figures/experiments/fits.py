@@ -1,0 +1,139 @@
+"""Fits to records: model beside data, residuals and how they remember each other, and every step on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.numerics.noise import autocorrelation
+from steadyslip.figures.experiments.panels import clock, file_name, grid, stacked, time_label
+from steadyslip.figures.experiments.records import rates
+from steadyslip.figures.style import BLACK, BLUE, GREY, SKY, VERMILION, display_unit, labelled
+
+if TYPE_CHECKING:
+    from steadyslip.experiments import Fit, Record
+
+MOST_LAGS = 60
+MOST_STEPS = 12
+AROUND = (0.15, 0.6)  # of the time to the neighbouring steps that a zoom shows before and after one
+
+
+def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:
+    """What drives the model, record and model, residuals, and their autocorrelation.
+
+    Parameters
+    ----------
+    result : Fit
+    ax : four matplotlib Axes, optional
+    record : int, optional
+        Which of several records to draw.
+
+    Returns
+    -------
+    ndarray of four matplotlib.axes.Axes
+    """
+    panels = stacked(ax, (1.1, 2.2, 1.1, 1.1), shared=3)
+    data = result.plan.records[record]
+    factor, unit, _ = clock(data)
+    time = (data.time - clock(data)[2]) / factor
+    panels[0].set_title(file_name(data), fontsize="medium", parse_math=False)
+    rates(data, panels[0], time)
+    _beside(panels[1], time, data.friction, result.part(result.model, record))
+    residuals = result.part(result.residuals, record)
+    panels[2].plot(time, 1e3 * residuals, ".", color=SKY, markersize=2, rasterized=True)
+    panels[2].plot(time, 1e3 * _running(residuals), color=VERMILION, linewidth=1, label="running mean")
+    panels[2].axhline(0, color=BLACK, linewidth=0.8)
+    panels[2].set_ylabel("residual (10⁻³)")
+    panels[2].legend(loc="best", fontsize="small")
+    panels[2].set_xlabel(time_label(data, unit))
+    _memory(panels[3], result, residuals, record)
+    for panel in panels:
+        panel.grid(color=GREY, linewidth=0.3)
+        panel.yaxis.label.set_size("small")
+    return panels
+
+
+def _beside(ax: Axes, time: np.ndarray, data: np.ndarray, model: np.ndarray, named: bool = True) -> None:
+    ax.plot(time, data, ".", color=SKY, markersize=2, label="record", rasterized=True)
+    ax.plot(time, model, color=BLACK, linewidth=1, label="model")
+    if named:
+        ax.set_ylabel("friction τ/σ (1)")
+        ax.legend(loc="best", fontsize="small", markerscale=3)
+
+
+def _memory(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
+    """Autocorrelation of the residuals, that of the noise that errors reckon with, and what chance alone gives."""
+    lags = np.arange(min(MOST_LAGS, len(residuals) // 4) + 1)
+    ax.bar(lags, autocorrelation(residuals, lags[-1]), width=0.6, color=SKY, label="residuals")
+    noise = result.noise[record]
+    known = noise.covariance[: len(lags)] / noise.covariance[0] if noise.covariance[0] > 0 else np.ones(1)
+    ax.plot(lags, np.pad(known, (0, len(lags) - len(known))), color=BLACK, linewidth=1, label="as in the errors")
+    chance = 1.96 / np.sqrt(len(residuals))
+    ax.axhspan(-chance, chance, color=GREY, alpha=0.5, linewidth=0, label="95 % of independent noise")
+    ax.set_xlabel("lag (samples)")
+    ax.set_ylabel("autocorrelation (1)")
+    ax.legend(loc="best", fontsize="x-small")
+
+
+def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
+    """Record and model around every step, three in a row.
+
+    Parameters
+    ----------
+    result : Fit
+    ax : array of matplotlib Axes, optional
+        As many rows of up to three as the steps need.
+    record : int, optional
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+
+    Raises
+    ------
+    NotAvailable
+        If there are no steps.
+    """
+    data = result.plan.records[record]
+    shown = data.steps[:MOST_STEPS]
+    if not shown:
+        raise NotAvailable(f"{data.source}: no steps were found in this record")
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    panels = grid(ax, rows, columns, (1.0 + 2.9 * columns, 0.6 + 2.3 * rows))
+    model = result.part(result.model, record)
+    for k, panel in enumerate(panels.flat):
+        if k >= len(shown):
+            panel.set_visible(False)
+            continue
+        inside = _around(data, k)
+        factor, unit = display_unit("s", float(np.ptp(data.time[inside])))
+        _beside(panel, (data.time[inside] - shown[k].time) / factor, data.friction[inside], model[inside], named=k == 0)
+        panel.axvline(0.0, color=BLUE, linewidth=0.8, linestyle="--")
+        panel.set_xlabel(labelled("time after step", unit))
+        panel.set_title(str(shown[k]).partition(": ")[2].replace("um", "µm"), fontsize="small")
+        panel.grid(color=GREY, linewidth=0.3)
+        panel.ticklabel_format(axis="y", useOffset=False)
+        panel.locator_params(axis="x", nbins=5)
+    return panels
+
+
+def _around(data: Record, k: int) -> np.ndarray:
+    """Samples near a step: more after it than before, none beyond its neighbours."""
+    ends = [float(data.time[0]), *(step.time for step in data.steps), float(data.time[-1])]
+    before, at, after = ends[k : k + 3]
+    reach = max(after - at, 1e-300)
+    return np.asarray((data.time >= at - AROUND[0] * min(at - before, reach)) & (data.time <= at + AROUND[1] * reach))
+
+
+def _running(values: np.ndarray) -> np.ndarray:
+    """Mean over a fiftieth of the record, shorter at its ends."""
+    half = max(len(values) // 100, 1)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    low = np.maximum(np.arange(len(values)) - half, 0)
+    high = np.minimum(np.arange(len(values)) + half + 1, len(values))
+    return np.asarray((total[high] - total[low]) / (high - low))

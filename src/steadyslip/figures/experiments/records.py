@@ -1,0 +1,74 @@
+"""Records of experiments, with what was commanded in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.figures.experiments.panels import clock, file_name, stacked, time_label
+from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, display_unit, labelled
+
+if TYPE_CHECKING:
+    from steadyslip.experiments import Record
+
+DECADE = 5.0  # ratio of rates from which on their axis is logarithmic
+
+
+def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
+    """Friction, load-point rate and normal stress in time, with the steps and the loading that were found.
+
+    Parameters
+    ----------
+    data : Record
+    ax : three matplotlib Axes, optional
+
+    Returns
+    -------
+    ndarray of three matplotlib.axes.Axes
+    """
+    panels = stacked(ax, (1.6, 1.0, 1.0))
+    factor, unit, origin = clock(data)
+    time = (data.time - origin) / factor
+    panels[0].plot(time, data.friction, color=BLUE, linewidth=0.6)
+    panels[0].set_ylabel("friction τ/σ (1)")
+    panels[0].set_title(file_name(data), fontsize="medium", parse_math=False)
+    rates(data, panels[1], time)
+    if data.normal is not None:
+        size, name = display_unit("Pa", float(np.max(np.abs(data.normal))))
+        panels[2].plot(time, data.normal / size, color=SKY, linewidth=0.8)
+        if data.loading.stress is not None:
+            panels[2].plot(time, data.loading.stress.at(data.time) / size, color=BLACK, linewidth=1)
+        panels[2].set_ylabel(labelled("normal stress", name))
+        panels[2].ticklabel_format(axis="y", useOffset=False)
+    panels[2].set_xlabel(time_label(data, unit))
+    for panel in panels:
+        panel.grid(color=GREY, linewidth=0.3)
+        for step in data.steps:
+            panel.axvline((step.time - origin) / factor, color=ORANGE, linewidth=1, linestyle="--")
+    return panels
+
+
+def rates(data: Record, ax: Axes, time: np.ndarray) -> None:
+    """Measured rates of the load point as dots, the commanded ones as a line."""
+    course, rate = data.loading.load, data.rate
+    if course is None or rate is None:
+        ax.text(0.5, 0.5, "load point not measured", ha="center", transform=ax.transAxes)
+        ax.set_ylabel("load-point rate")
+        return
+    commanded = course.at(data.time)
+    high = float(np.max(np.abs(commanded))) or float(np.max(np.abs(rate)))
+    low = float(np.min(np.abs(commanded)))
+    size, name = display_unit("m/s", high)
+    if low > 0 and high > DECADE * low:
+        ax.set_yscale("log")
+        ax.set_ylim(0.1 * low / size, 10 * high / size)
+        rate = np.where(rate > 0, rate, np.nan)
+    else:
+        ax.set_ylim(-0.5 * high / size, 2.0 * high / size)
+    ax.plot(time, rate / size, ".", color=SKY, markersize=1.5, rasterized=True, label="slopes of the record")
+    ax.plot(time, commanded / size, color=BLACK, linewidth=1, label="commanded, as found")
+    ax.set_ylabel(labelled("load-point rate", name))
+    ax.legend(loc="best", fontsize="x-small", markerscale=4)

@@ -1,0 +1,125 @@
+"""Figures of experiments: what they draw is what was measured and found, and regions hold what they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.contour import ContourSet
+from matplotlib.figure import Figure
+from matplotlib.path import Path
+
+import lab_records as lab
+import steadyslip as ss
+from steadyslip.experiments.numerics.noise import autocorrelation, lag_one
+from steadyslip.figures.experiments.corners import region
+
+
+@pytest.fixture(scope="module")
+def record():
+    return lab.record(lab.rig(alpha=0.35), lab.PRESSED)
+
+
+@pytest.fixture(scope="module")
+def fit(record):
+    return ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), record)
+
+
+def test_a_record_with_its_commanded_loading(record):
+    panels = ss.figures.record(record, Figure().subplots(3, 1))
+    np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), record.friction)
+    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point rate (µm/s)", "normal stress (MPa)"]
+    assert len(panels[0].lines) == 1 + len(record.steps)
+    np.testing.assert_allclose(panels[1].lines[1].get_ydata(), 1e6 * record.loading.load.at(record.time))
+    np.testing.assert_allclose(panels[2].lines[1].get_ydata(), 1e-6 * record.loading.stress.at(record.time))
+    assert panels[2].get_xlabel() == ("time after step (s)" if len(record.steps) == 1 else "time after first step (s)")
+    with pytest.raises(ss.ParameterError, match="sequence of 3"):
+        ss.figures.record(record, Figure().subplots(2, 1))
+
+
+def test_a_fit_with_its_residuals_and_their_memory(fit):
+    panels = ss.figures.fit(fit, Figure().subplots(4, 1))
+    np.testing.assert_array_equal(panels[1].lines[1].get_ydata(), fit.model)
+    np.testing.assert_allclose(panels[2].lines[0].get_ydata(), 1e3 * fit.residuals)
+    heights = [bar.get_height() for bar in panels[3].patches[: len(panels[3].lines[0].get_xdata())]]
+    assert heights[0] == 1.0
+    assert heights[1] == pytest.approx(lag_one(fit.residuals))
+
+
+def test_autocorrelation_is_that_of_numpy():
+    values = np.random.default_rng(1).standard_normal(300)
+    r = values - values.mean()
+    full = np.correlate(r, r, "full")[len(r) - 1 :]
+    np.testing.assert_allclose(autocorrelation(values, 20), full[:21] / full[0], atol=1e-14)
+    np.testing.assert_array_equal(autocorrelation(np.ones(9), 3), np.zeros(4))
+
+
+def test_every_step_has_a_panel(fit, record):
+    rows = -(-len(record.steps) // 3)
+    panels = ss.figures.steps(fit, Figure().subplots(rows, min(3, len(record.steps)), squeeze=False))
+    shown = [panel for panel in panels.flat if panel.get_visible()]
+    assert len(shown) == len(record.steps)
+    for panel, step in zip(shown, record.steps, strict=True):
+        low, high = panel.lines[0].get_xdata()[[0, -1]]
+        assert low < 0 < high
+        assert panel.get_title() in str(step).replace("um", "µm")
+    still = ss.record_from_arrays(np.arange(100.0), friction=np.full(100, 0.6), normal=1e7)
+    with pytest.raises(ss.NotAvailable, match="no steps were found"):
+        ss.figures.steps(type("Planned", (), {"plan": type("P", (), {"records": (still,)})})())
+
+
+def test_the_ellipses_of_a_fit_hold_68_and_95_percent(fit):
+    count = len(fit.names)
+    panels = ss.figures.corner(fit, Figure(figsize=(9, 9)).subplots(count, count))
+    assert panels[-1, 0].get_xlabel() == "a (1)"
+    assert not panels[0, -1].get_visible()
+    draws = ss.normal_draws(fit, 20_000)
+    points = np.column_stack([draws["friction.a"], draws["friction.b"]])
+    for line, share in zip(panels[1, 0].lines[:2], (0.68, 0.95), strict=True):
+        inside = Path(np.column_stack(line.get_data())).contains_points(points)
+        assert np.mean(inside) == pytest.approx(share, abs=0.012)
+
+
+def test_the_contours_of_draws_hold_68_and_95_percent(fit):
+    draws = ss.normal_draws(fit, 4000)
+    count = len(fit.names)
+    panels = ss.figures.corner(draws, Figure(figsize=(9, 9)).subplots(count, count))
+    (found,) = [item for item in panels[1, 0].collections if isinstance(item, ContourSet)]
+    points = np.column_stack([draws["friction.a"], draws["friction.b"]])
+    for path, share in zip(found.get_paths(), (0.95, 0.68), strict=True):
+        assert np.mean(path.contains_points(points)) == pytest.approx(share, abs=0.06)
+
+
+def test_a_region_holds_its_share():
+    x = np.linspace(-5, 5, 401)
+    density = np.exp(-0.5 * (x[:, None] ** 2 + x**2))
+    for share in (0.5, 0.68, 0.95):  # of the normal distribution of two: exp(-r²/2) at the radius that holds the share
+        assert region(density, share) == pytest.approx(1 - share, rel=0.01)
+
+
+def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
+    found = ss.profile(fit, "d_c", count=17)
+    ax = found.plot(Figure().subplots())
+    ends = sorted(line.get_xdata()[0] for line in ax.lines if len(set(line.get_xdata())) == 1)
+    expected = sorted(1e6 * np.array([*found.interval(0.68), *found.interval(0.95)]))
+    np.testing.assert_allclose(ends, expected)
+    assert ax.get_xlabel() == "d_c (µm)"
+
+
+def test_laws_and_experiments_as_bars(record):
+    found = ss.compare_laws(ss.lab_rig(normal_memory="linker-dieterich"), record, ("slip", "aging"))
+    ax = found.plot(Figure().subplots())
+    assert [label.get_text() for label in ax.get_yticklabels()] == list(found.fits)[::-1]
+    assert min(bar.get_width() for bar in ax.patches) == 0.0
+    rig = lab.rig(alpha=0.35)
+    ranked = ss.best_protocol(rig, fixed=["slider.stiffness"], samples=200)
+    drawn = ranked.plot(Figure().subplots())
+    known = [one.errors[ranked.parameter] for one in ranked.found.values()]
+    widths = sorted(bar.get_width() for bar in drawn.patches)
+    np.testing.assert_allclose(widths, sorted(error for error in known if np.isfinite(error)))
+    words = [text.get_text() for text in drawn.texts]
+    assert words.count("not determined") == sum(not np.isfinite(error) for error in known)
+
+
+def test_a_prediction_is_in_the_unit_of_its_axis(fit):
+    drawn = ss.figures.prediction(ss.predict(lab.rig(alpha=0.35), fit), Figure().subplots())
+    assert drawn.get_xlabel() == "stiffness (GPa/m)"

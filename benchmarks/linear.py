@@ -133,9 +133,9 @@ def general_route(count: int) -> None:
 
 def general_sets(rig: ss.Slider, vary: dict[str, Any]) -> Any:
     from steadyslip.linear.stiffness import general_set
-    from steadyslip.model.point import model_values
+    from steadyslip.model.point import operating_point
 
-    return general_set(model_values(rig, vary)).intervals
+    return general_set(operating_point(rig, vary)).intervals
 
 
 if __name__ == "__main__":

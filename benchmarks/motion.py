@@ -35,7 +35,7 @@ from steadyslip.kernels.jump import jump
 from steadyslip.kernels.kernel import Record
 from steadyslip.kernels.nodes import Program
 from steadyslip.motion.engine import LANES, Call
-from steadyslip.motion.setup import Options, prepare
+from steadyslip.motion.jobs import Options, prepare
 
 TARGET = 1e-6
 QUICK = "--quick" in sys.argv

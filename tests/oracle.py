@@ -10,8 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from steadyslip.core.expressions import array_function
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import operating_point
 
 
 class Oracle:
@@ -20,30 +19,31 @@ class Oracle:
     def __init__(self, rig, velocity=None, disturbance=None, pressure=None, plain=False):
         """`plain`: integrate and search for v itself, which may pass through zero, instead of ln v."""
         self.plain = plain
-        values = model_values(rig)
+        values = operating_point(rig)
         self.model = model = values.model
-        sigma = float(steady_stress(values))
+        sigma = float(values.sigma)
         self.drive = rig.drive.velocity
         v_lp = velocity or (lambda t: self.drive)
         self.inputs = lambda t: (v_lp(t), (disturbance or zero)(t), (pressure or zero)(t), t)
-        numbers = dict(zip(model.parameters.values(), values.arguments, strict=True)) | {model.sigma_ss: sigma}
-        self.memory = [m.symbol for m in model.variables if m.name not in ("x", "v", "integral")]
-        self.others = [*self.memory, *([model.symbols["integral"]] if "integral" in model.symbols else [])]
-        symbols = [model.symbols["x"], model.symbols["v"], model.symbols["acceleration"], *self.others]
+        contact = model.contact
+        numbers = dict(zip(model.arguments, (*values.arguments, sigma), strict=True))
+        self.memory = [m.symbol for m in model.memory]
+        self.others = [*self.memory, *(m.symbol for m in model.integrals)]
+        symbols = [contact.slip, contact.velocity, contact.acceleration, *self.others]
         symbols += [model.inputs[n] for n in ("load_velocity", "disturbance", "normal_disturbance", "time")]
 
         def inlined(expression):
             pressure = model.inputs["normal_disturbance"]
-            imposed = model.imposed.xreplace({model.inputs["time"]: model.inputs["time"]})
+            imposed = contact.imposed
             definitions = {s: d.xreplace({pressure: pressure + imposed}) for s, d in model.definitions.items()}
             for symbol, definition in reversed(definitions.items()):
                 expression = expression.xreplace({symbol: definition})
             return expression.xreplace(numbers)
 
-        self.balance = array_function(symbols, [inlined(model.balance)])
-        rates = {m.symbol: r for m, r in zip(model.variables, model.rates, strict=True)}
+        self.balance = array_function(symbols, [inlined(contact.balance)])
+        rates = model.rate_of
         self.rates = array_function(symbols, [inlined(rates[s]) for s in self.others])
-        self.stresses = array_function(symbols, [inlined(model.symbols[n]) for n in ("sigma", "tau", "spring")])
+        self.stresses = array_function(symbols, [*map(inlined, (contact.normal, contact.friction, contact.spring))])
         self.start = [float(sp.sympify(model.steady[s]).xreplace(numbers)) for s in self.memory]
         self.start += [0.0] * (len(self.others) - len(self.memory))
 

@@ -12,7 +12,7 @@ from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import is_hurwitz, roots
 from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 
 
 @pytest.mark.parametrize("mass", [0.0, 1e9, 1e12])
@@ -210,7 +210,8 @@ def test_formula_gives_the_number(contact, mass):
     right = ss.formula(r).rhs
     model = build_model(r)
     numbers = {
-        symbol.name: value for symbol, value in zip(model.parameters.values(), model_values(r).arguments, strict=True)
+        symbol.name: value
+        for symbol, value in zip(model.parameters.values(), operating_point(r).arguments, strict=True)
     }
     numbers |= {"sigma_ss": ss.steady_state(r).normal_stress, "mu_ss": 0.7}
     value = float(right.subs({s: numbers[s.name] for s in right.free_symbols}))

@@ -25,7 +25,7 @@ from steadyslip.kernels.printers import python as plain
 from steadyslip.kernels.program import Program, program
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
-from steadyslip.motion.setup import Options, prepare
+from steadyslip.motion.jobs import Options, prepare
 
 mpmath.mp.dps = 50
 

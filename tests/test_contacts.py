@@ -11,7 +11,7 @@ import steadyslip as ss
 from steadyslip.core.expressions import array_function
 from steadyslip.linear.response import contact_coefficients
 from steadyslip.linear.state_space import state_matrices
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 from steadyslip.testing import CONTACT_CHECKS, Surroundings
 from steadyslip.units import deg
 
@@ -68,11 +68,9 @@ def rig_with(contact, **slider):
 
 def coefficients(rig):
     """B0...B3, derived from the nonlinear normal stress."""
-    values = model_values(rig)
+    values = operating_point(rig)
     sigma = ss.steady_state(rig).normal_stress
-    function = array_function(
-        [*values.model.parameters.values(), values.model.sigma_ss], contact_coefficients(values.model)
-    )
+    function = array_function([*values.model.arguments], contact_coefficients(values.model))
     return [float(b) for b in function(*values.arguments, sigma)]
 
 

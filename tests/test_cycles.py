@@ -14,7 +14,7 @@ import steadyslip as ss
 from dimensionless import MU, A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
 from steadyslip.files.specifications import read_rig
-from steadyslip.motion.setup import Options, prepare
+from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.continuation import Curve, Failure
 from steadyslip.nonlinear.kicks.outcomes import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module

@@ -12,7 +12,7 @@ import steadyslip as ss
 from steadyslip.core.expressions import array_function, asinh_exp, numpy_asinh_exp
 from steadyslip.linear.response import response
 from steadyslip.model.linearisation import characteristic_coefficients
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 from steadyslip.testing import FRICTION_CHECKS, Conditions
 from steadyslip.testing.statement import statement
 
@@ -128,9 +128,9 @@ def rig_with(law, velocity=1e-6, sigma=5e6, contact=None, **slider):
 
 
 def numbers_of(rig, expressions):
-    values = model_values(rig)
+    values = operating_point(rig)
     sigma = ss.steady_state(rig).normal_stress
-    function = array_function([*values.model.parameters.values(), values.model.sigma_ss], expressions(values.model))
+    function = array_function([*values.model.arguments], expressions(values.model))
     return [float(number) for number in function(*values.arguments, sigma)]
 
 

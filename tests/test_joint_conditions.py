@@ -9,7 +9,7 @@ import pytest
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, SIGMA, rate_state, rig
 from steadyslip.linear.polynomials import quietly
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 
 CRANK = {"preload": SIGMA, "crank_angle": math.radians(30), "crank_radius": 0.1, "rod_length": 0.3}
 TWO = (ss.State(b=0.01, d_c=1e-6), ss.State(b=0.008, d_c=2e-5))
@@ -121,7 +121,7 @@ def test_the_error_state_of_numpy_is_left_as_it_was():
     outer(5)
     assert all(state == dict.fromkeys(before, "ignore") for state in states)
     assert np.geterr() == before
-    model_values(CASES["rod"][0], {"contact.rod_length": 0.2})
+    operating_point(CASES["rod"][0], {"contact.rod_length": 0.2})
     ss.critical_stiffness(rig(contact=CONTACTS[1]), {"contact.angle": np.linspace(-0.6, 0.6, 5)})
     assert np.geterr() == before
 

@@ -10,7 +10,7 @@ import steadyslip as ss
 from dimensionless import unit_rig
 from kicks_at_random import KINDS, Reference, drawn, outcome_of
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
-from steadyslip.motion.setup import Options, prepare
+from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks import outcomes as outcomes_module
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.closed_orbits import _attraction

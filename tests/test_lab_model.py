@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.kernels.experiment import ExperimentProgram
 from steadyslip.kernels.program import Program
 from steadyslip.model.reduction import reduce_model
-from steadyslip.motion.setup import Jobs
+from steadyslip.motion.jobs import Jobs
 
 CONSTANT = ss.Constant(steady_normal_stress=lab.STRESS)
 

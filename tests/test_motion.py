@@ -16,7 +16,7 @@ from steadyslip.core.records import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single
-from steadyslip.motion.setup import Options, prepare
+from steadyslip.motion.jobs import Options, prepare
 from test_motion_oracle import LAWS
 
 REFERENCE = Path(__file__).parent / "reference"

@@ -8,8 +8,8 @@ from oracle import Oracle
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single
+from steadyslip.motion.jobs import Options, prepare
 from steadyslip.motion.observe import observe
-from steadyslip.motion.setup import Options, prepare
 
 LAWS = {
     "slip": ONE_MEMORY[0],
@@ -35,7 +35,7 @@ def interpreted(a_rig, protocol, until, initial, rtol):
         final = outcome.final[0]
         zero = np.zeros(1, int)
         found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], final[None, 4:])
-    names = ["x", "v", *(m.name for m in jobs.values.model.variables if m.name not in ("x", "v"))]
+    names = ["x", "v", *(m.name for m in jobs.point.model.variables if m.name not in ("x", "v"))]
     return np.array([found[name][0] for name in names]), outcome
 
 

@@ -8,8 +8,7 @@ import steadyslip as ss
 from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, rig
 from steadyslip.linear.boundary import boundary
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import operating_point
 from steadyslip.model.taylor import taylor
 from test_motion_oracle import LAWS
 
@@ -127,8 +126,8 @@ def test_predicted_amplitude_is_that_of_simulated_motion(a_rig):
 def test_first_derivatives_are_those_of_the_linearisation(law, mass):
     """The system of all unknowns, reduced to the variables, has the Model's eigenvalues."""
     a_rig = rig(friction=LAWS[law], mass=mass)
-    values = model_values(a_rig)
-    found = taylor(values, np.atleast_1d(steady_stress(values)))
+    values = operating_point(a_rig)
+    found = taylor(values)
     n = found.system.dynamic
     g = found.gradient[0]
     reduced = g[:n, :n] - g[:n, n:] @ np.linalg.solve(g[n:, n:], g[n:, :n])

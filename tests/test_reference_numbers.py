@@ -10,7 +10,7 @@ import steadyslip as ss
 from steadyslip.linear import cubic
 from steadyslip.linear.state_space import jacobian
 from steadyslip.linear.stiffness import general_set
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 
 FOLDER = Path(__file__).parent / "reference"
 # 12 significant digits, times how much the terms of D cancel
@@ -83,7 +83,7 @@ def test_general_rows(row):
     assert np.sqrt(cubic.squared_frequency(**k)) == pytest.approx(row["beta_cr"], rel=tolerance)
 
     rig = general_rig(row)
-    sets = general_set(model_values(rig))
+    sets = general_set(operating_point(rig))
     nearest = np.nanargmin(np.abs(sets.edges - row["k_cr"]))
     assert sets.edges[nearest] == pytest.approx(row["k_cr"], rel=tolerance)
     assert sets.frequencies[nearest] == pytest.approx(row["beta_cr"], rel=tolerance)
@@ -102,7 +102,7 @@ def test_inclined_rows(row):
     f1 = row["mu_ss"] - row["alpha"]
     tolerance = DIGITS * cancellation(f, f1, r, row["mu_ss"], row["m"], 0, 0, t)
     assert ss.critical_stiffness(rig) == pytest.approx(row["k_cr"], rel=tolerance)
-    sets = general_set(model_values(rig))
+    sets = general_set(operating_point(rig))
     nearest = np.nanargmin(np.abs(sets.edges - row["k_cr"]))
     assert sets.edges[nearest] == pytest.approx(row["k_cr"], rel=tolerance)
     assert sets.frequencies[nearest] == pytest.approx(row["beta_cr"], rel=tolerance)

@@ -15,7 +15,7 @@ from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.state_space import jacobian
 from steadyslip.linear.stiffness import characteristic, closed_form_interval, general_set
 from steadyslip.model import build_model
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 
 
 @pytest.mark.parametrize("friction", ONE_MEMORY, ids=lambda law: type(getattr(law, "evolution", law)).__name__)
@@ -30,7 +30,7 @@ def test_both_routes_agree_on_random_rigs(friction, contact, inertia):
     )  # fmt: skip
     names = [n for n, a in start.parameters().items() if a.value and not a.role.gauge and a.role.unit != "rad"]
     vary = {n: start.value(n) * 10 ** rng.uniform(-0.3, 0.3, 40) for n in names if n != "contact.rod_length"}
-    values = model_values(start, vary)
+    values = operating_point(start, vary)
     with np.errstate(invalid="ignore"):
         closed = np.stack(ss.small_signal(start, vary).characteristic_polynomial(), axis=-1)
     general = characteristic(values)
@@ -170,16 +170,16 @@ def test_results_do_not_depend_on_the_units(kilogram, metre, second):
 def test_the_model_is_at_rest_in_its_own_steady_state(contact):
     """T, τ, σ and the rates, evaluated where the Model says that steady sliding is."""
     r = rig(friction=ONE_MEMORY[1], contact=contact, mass=1e9, damping=1e9, radiation_damping=1e9)
-    model, values = build_model(r), model_values(r)
+    model, values = build_model(r), operating_point(r)
     numbers = dict(zip(model.parameters.values(), values.arguments, strict=True))
-    numbers[model.sigma_ss] = ss.steady_state(r).normal_stress
+    numbers[model.contact.sigma_ss] = ss.steady_state(r).normal_stress
 
     def value(expression):
         return float(sp.sympify(expression.xreplace(model.steady)).subs(numbers))
 
     for symbol, definition in model.definitions.items():
         assert value(definition) == pytest.approx(value(symbol), rel=1e-13)
-    assert abs(value(model.balance)) < 1e-13 * value(model.symbols["tau"])
+    assert abs(value(model.contact.balance)) < 1e-13 * value(model.contact.friction)
     for rate in model.rates:
         assert abs(value(rate)) < 1e-13
 

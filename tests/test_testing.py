@@ -217,7 +217,7 @@ def test_shared_symbols_are_caught(monkeypatch):
 
     def confused(rig, present=()):
         right = build(rig, present=present)
-        return replace(right, inputs=right.inputs | {"disturbance": right.symbols["tau"]})
+        return replace(right, inputs=right.inputs | {"disturbance": right.contact.friction})
 
     monkeypatch.setattr(model, "build_model", confused)
     with pytest.raises(ContractViolation, match="tau and disturbance share the symbol tau"):

@@ -276,13 +276,13 @@ GROUPS = {
     "protocol": "Protocols of experiments",
     "core.records": "To declare a law of your own",
     "machine.slider": "The rig",
-    "model.steady": "Steady sliding",
+    "model.sliding": "Steady sliding",
     "maps": "Maps",
 }
 ORDER = (
     *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
     "schemas",
-    *("verdict", "model.steady", "linear", "model", "core.records"),
+    *("verdict", "model.sliding", "linear", "model", "core.records"),
     *("core.errors", "experiments", "motion", "nonlinear", "maps"),
 )
 MODULES = {

@@ -133,7 +133,7 @@ from .model import (
     Model as Model,
     build_model as build_model,
 )
-from .model.steady import (
+from .model.sliding import (
     SteadySliding as SteadySliding,
     steady_state as steady_state,
     steady_states as steady_states,

@@ -52,6 +52,18 @@ turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 
 count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)
 
 
+KINDS = {
+    "friction level": "friction coefficient in steady sliding at the reference rate",
+    "direct effect": "rise of friction per e-fold of velocity, at once",
+    "evolution effect": "fall of friction per e-fold of velocity, as the state follows",
+    "slip distance": "slip over which a memory fades",
+    "reference rate": "velocity at which other parameters hold",
+    "stress share": "share of the response to normal stress that is not immediate",
+    "stiffness": "of the spring, or of what acts as one",
+}
+"""What a parameter can be to the stages that look for meaning, not for names."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """What a numeric field of a record means.
@@ -70,6 +82,12 @@ class Parameter:
         Structural, and its presence adds a variable to the model, so that zero is no limit of small values.
     gauge : bool
         Changes no observable result (a reference that only shifts a state), so has no edge.
+    kind : str
+        What it is to those who scale motions or fit records without knowing the law: one of `KINDS`, or nothing.
+    size : float or None
+        Change that matters, of a parameter that may be zero or of either sign; a positive one has its own size.
+    standing : float or None
+        Stands for the parameter where it is yet to be fitted.
     """
 
     unit: str
@@ -78,6 +96,13 @@ class Parameter:
     structural: bool = False
     gauge: bool = False
     adds_state: bool = False
+    kind: str = ""
+    size: float | None = None
+    standing: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind and self.kind not in KINDS:
+            raise TypeError(unknown_name("kind of parameter", self.kind, KINDS))
 
 
 @dataclass(frozen=True)
@@ -165,9 +190,12 @@ def parameter(
     structural: bool = False,
     gauge: bool = False,
     adds_state: bool = False,
+    kind: str = "",
+    size: float | None = None,
+    standing: float | None = None,
 ) -> Any:
-    """Declare a numeric parameter; ``default=None`` makes it optional."""
-    role = Parameter(unit, domain, doc, structural, gauge, adds_state)
+    """Declare a numeric parameter; ``default=None`` makes it optional, the rest is as in `Parameter`."""
+    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing)
     return field(default=default, metadata={_ROLE: role})
 
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.records import Parameter
 from steadyslip.figures.style import display_unit, labelled
 from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import checked_array
 
 _AROUND = 20.0  # a positive parameter is shown from its value (or edge) divided by this, to it times this
 _REACH = 1e3  # an edge further away than this factor is not worth the squeeze

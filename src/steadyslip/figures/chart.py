@@ -16,8 +16,8 @@ from steadyslip.figures.axis import ChartAxis, axis
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import explain_absence
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import explain_absence
 
 _SAMPLES = 12  # points at which the reason for no steady sliding is asked
 
@@ -66,7 +66,7 @@ def stability_chart(
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a whole number >= 2")])
 
     def status(a: Any, b: Any) -> Any:
-        return status_of(model_values(rig, {first.name: first.at(a), second.name: second.at(b)}, scan=True))
+        return status_of(operating_point(rig, {first.name: first.at(a), second.name: second.at(b)}, scan=True))
 
     ax = axes_or_new(ax)
 
@@ -102,7 +102,7 @@ def _reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) 
 
 def absence_reasons(rig: Slider, points: Sequence[dict[str, float]]) -> str:
     """Why there is no steady sliding at some points, each kind of reason once."""
-    found = [explain_absence(rig.with_values(vary), model_values(rig, vary)).condition for vary in points]
+    found = [explain_absence(rig.with_values(vary), operating_point(rig, vary)).condition for vary in points]
     return ", ".join(sorted(set(found)))
 
 

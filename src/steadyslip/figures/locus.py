@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
+from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures.style import BLACK, VERMILION, axes_or_new, display_unit, labelled
 from steadyslip.linear import critical_stiffness, eigenvalues, stable_stiffness
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import checked_array, model_values
-from steadyslip.model.steady import steady_state
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import steady_state
 
 _HALF_SPAN = 1e2  # two decades to each side
 _VIEW = 3.0  # half the width of the view in sizes of the eigenvalues that decide stability
@@ -46,7 +47,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         If there is neither a critical nor an own stiffness to start from; pass `stiffness`.
     """
     steady_state(rig)
-    own = float(model_values(rig).named()["slider.stiffness"])
+    own = float(operating_point(rig).named()["slider.stiffness"])
     rig = replace(rig, stiffness=own, axial_stiffness=None)
     k = _stiffnesses(rig, own, stiffness)
     roots = eigenvalues(rig, {"slider.stiffness": k})

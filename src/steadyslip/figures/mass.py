@@ -12,8 +12,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.laws.contact import InclinedSpring
 from steadyslip.linear import critical_stiffness
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import operating_point
 
 _LARGEST = 1e6  # m* beyond any rig: a limit above is no limit
 _NEGLIGIBLE = 1e-12  # m* of a quasistatic rig
@@ -49,7 +48,7 @@ def is_locked(rig: Slider, angles: Any) -> Any:
 
 def _steady_stress(rig: Slider, angles: Any) -> Any:
     # broadcast because a rig that gives σss itself has one value for all angles short of lock-up
-    return np.broadcast_to(steady_stress(model_values(rig, {"contact.angle": angles})), np.shape(angles))
+    return np.broadcast_to(operating_point(rig, {"contact.angle": angles}).sigma, np.shape(angles))
 
 
 def slip_distance(rig: Slider) -> float:

@@ -24,7 +24,7 @@ from steadyslip.figures.style import (
     labelled,
 )
 from steadyslip.kernels.layout import SLIP_EVENT
-from steadyslip.model.steady import steady_state
+from steadyslip.model.sliding import steady_state
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted
 from steadyslip.kernels.kernel import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
-from steadyslip.model import Model
+from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.reduction import Reduction, W, reduce_model
 from steadyslip.model.variational import with_directions
 
@@ -56,11 +56,6 @@ class ExperimentProgram:
         return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
 
     @cached_property
-    def _parameters(self) -> list[sp.Symbol]:
-        model = self.reduction.model
-        return [*model.parameters.values(), model.sigma_ss]
-
-    @cached_property
     def _start(self) -> list[sp.Expr]:
         model = self.reduction.model
         steady = model.steady | {W: self.reduction.w_of_v.xreplace(model.steady)}
@@ -69,35 +64,36 @@ class ExperimentProgram:
     @cached_property
     def _values(self) -> Any:
         constants = list(self.kernel.constants.symbols)
-        return array_function(self._parameters, [*constants, *self._start])
+        return self.reduction.model.function([*constants, *self._start])
 
     @cached_property
     def _slopes(self) -> Any:
         """Derivatives of constants and starting values in every parameter, σss following the parameters."""
         model = self.reduction.model
         expressions = [*self.kernel.constants.symbols, *self._start]
-        residual = model.steady_stress - model.sigma_ss
+        sigma = model.contact.sigma_ss
+        residual = model.contact.steady_stress - sigma
         found = []
         for symbol in model.parameters.values():
-            stress = -sp.diff(residual, symbol) / sp.diff(residual, model.sigma_ss)
+            stress = -sp.diff(residual, symbol) / sp.diff(residual, sigma)
             for expression in expressions:
-                found.append(sp.diff(expression, symbol) + sp.diff(expression, model.sigma_ss) * stress)
-        return array_function(self._parameters, found)
+                found.append(sp.diff(expression, symbol) + sp.diff(expression, sigma) * stress)
+        return model.function(found)
 
-    def arrays(self, arguments: tuple[Any, ...], sigma: Any, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def arrays(self, point: OperatingPoint, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constants with their rates of change, and starting states with theirs.
 
         Parameters
         ----------
-        arguments, sigma
-            Parameters of the model and steady normal stress, of every job.
+        point : OperatingPoint
+            Of every job.
         chain : ndarray (jobs, directions, parameters)
             How fast the parameters change in each direction.
         """
         jobs, _, count = chain.shape
         with np.errstate(all="ignore"):
-            values = _stacked(self._values(*arguments, sigma), jobs)
-            slopes = _stacked(self._slopes(*arguments, sigma), jobs).reshape(jobs, count, -1)
+            values = _stacked(point.evaluate(self._values), jobs)
+            slopes = _stacked(point.evaluate(self._slopes), jobs).reshape(jobs, count, -1)
         rates = np.matmul(chain, slopes)
         table, size = self.kernel.constants, len(self.kernel.constants.symbols)
         constants = table.with_rates(values[:, :size], rates[:, :, :size], {})
@@ -112,7 +108,7 @@ def _stacked(columns: list[Any], jobs: int) -> np.ndarray:
     return table
 
 
-@lru_cache(maxsize=64)
+@question
 def experiment_program(model: Model, directions: int, method: str) -> ExperimentProgram:
     """The kernel for a model; made once per process."""
     return ExperimentProgram(reduce_model(model, None), directions, method)

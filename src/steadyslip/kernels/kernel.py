@@ -162,7 +162,7 @@ class Kernel:
 
     def _write_velocity(self) -> None:
         """Velocity as a function of w alone, and w of velocity, where w is integrated and memory is not needed."""
-        reduction, v = self.reduction, self.reduction.model.symbols["v"]
+        reduction, v = self.reduction, self.reduction.model.contact.velocity
         speed, inverse = reduction.outputs["v"], reduction.w_of_v
         variables = {*reduction.state, *reduction.continuous, *INPUTS}
         if reduction.unknown is not None:

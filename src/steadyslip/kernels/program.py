@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted
 from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.kernel import Choice, Kernel
 from steadyslip.kernels.layout import SETTINGS, Status
-from steadyslip.model import Model
+from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.reduction import Reduction, reduce_model
 
 STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
@@ -45,13 +46,11 @@ class Program:
 
     @cached_property
     def _constants(self) -> Any:
-        model = self.reduction.model
-        return self.kernel.constants.function([*model.parameters.values(), model.sigma_ss])
+        return self.kernel.constants.function([*self.reduction.model.arguments])
 
-    def constants(self, arguments: tuple[Any, ...], sigma: Any) -> np.ndarray:
-        """Constants of every rig, (rigs, number); parameters and steady normal stress broadcast."""
-        with np.errstate(all="ignore"):
-            found = self._constants(*map(np.asarray, arguments), np.asarray(sigma))  # arrays divide by zero quietly
+    def constants(self, point: OperatingPoint) -> np.ndarray:
+        """Constants of every rig, (rigs, number)."""
+        found = self._constants(*map(np.asarray, point.arguments), point.stresses)
         size = max([1, *(np.size(value) for value in found)])
         table = np.empty((size, len(found)))
         for column, value in enumerate(found):
@@ -68,7 +67,7 @@ class Program:
         return table
 
 
-@lru_cache(maxsize=64)
+@question
 def program(model: Model, choice: Choice, eliminate: int | None = 0) -> Program:
     """The kernel of a model; made once per process."""
     return Program(reduce_model(model, eliminate), choice)

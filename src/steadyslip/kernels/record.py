@@ -95,7 +95,7 @@ class Record:
                     slope = slope + amplitude * omega * primitive("cos", angle)
                 found[f"slope_{c}"] = slope
             found[f"in_{c}"] = value
-        if self.kernel.reduction.model.imposed != 0:
+        if self.kernel.reduction.model.imposed:
             found["time"] = load(Row.START) + moment
         return found
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Parameter
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import checked_array, model_values
+from steadyslip.model.point import operating_point
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, br
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, between)
     if limits is not None:
-        model_values(rig, {full: np.asarray(limits)}, present_zeros(rig), branch)  # refuses what breaks a condition
+        operating_point(rig, {full: np.asarray(limits)}, present_zeros(rig), branch)  # refuses what breaks a condition
     return Search(rig, full, present_zeros(rig), branch).boundaries(limits)
 
 

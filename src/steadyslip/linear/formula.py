@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from functools import lru_cache
 from threading import Thread
 
 import sympy as sp
 
+from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
 from steadyslip.machine.slider import Slider
@@ -47,15 +47,15 @@ def formula(rig: Slider) -> sp.Eq:
     return _formula(build_model(rig))
 
 
-@lru_cache(maxsize=32)
+@question
 def _formula(model: Model) -> sp.Eq:
     known = response(model).as_dict()
-    gain = sp.expand(known.pop("k") - model.parameters["slider.stiffness"])
-    friction = model.steady[model.symbols["tau"]] / model.sigma_ss
+    del known["k"]
+    friction = model.steady[model.contact.friction] / model.contact.sigma_ss
     mu = _in_time(lambda: sp.simplify(friction), friction)
     numerator, denominator = cubic.hopf_line(**known)
     short = _in_time(lambda: _shortest(_with_mu(numerator, mu), _with_mu(denominator, mu)), numerator / denominator)
-    return sp.Eq(sp.Symbol("k_cr") + gain, short, evaluate=False)
+    return sp.Eq(sp.Symbol("k_cr") + model.gain, short, evaluate=False)
 
 
 class _TooLong(Exception):

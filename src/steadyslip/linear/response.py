@@ -10,20 +10,18 @@ this route with the Model's Jacobian checks the law itself.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import quietly
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.point import Values, Vary, model_values
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import OperatingPoint, Vary, operating_point
 
 
 @dataclass(frozen=True)
@@ -84,16 +82,10 @@ class Response:
 
 def has_closed_form(model: Model) -> bool:
     """Whether the model is one that the cubic describes: one memory variable, no integral control."""
-    return len(memory_symbols(model)) == 1 and "integral" not in model.symbols
+    return len(model.contacts) == len(model.memory) == 1 and not model.integrals
 
 
-def memory_symbols(model: Model) -> list[sp.Symbol]:
-    """The memory variables of friction among the model's variables."""
-    own = [model.symbols["x"], model.symbols["v"], model.symbols.get("integral")]
-    return [item.symbol for item in model.variables if item.symbol not in own]
-
-
-@lru_cache(maxsize=128)
+@question
 def response(model: Model) -> Response:
     """The response of a model with one memory variable.
 
@@ -105,25 +97,24 @@ def response(model: Model) -> Response:
     if not has_closed_form(model):
         raise NotAvailable(
             "the closed form needs exactly one memory variable and no integral control; this model has "
-            f"{len(memory_symbols(model))} memory variables; stable_stiffness gives the edges as numbers"
+            f"{len(model.memory)} memory variables; stable_stiffness gives the edges as numbers"
         )
-    (memory,) = memory_symbols(model)
-    symbol = model.symbols
-    v, sigma, tau = symbol["v"], symbol["sigma"], symbol["tau"]
-    rate = next(r for item, r in zip(model.variables, model.rates, strict=True) if item.symbol is memory)
+    contact, memory = model.contact, model.memory[0].symbol
+    v, sigma, tau, balance = contact.velocity, contact.normal, contact.friction, contact.balance
+    rate = model.rate_of[memory]
 
     def at_steady(expression: sp.Expr) -> sp.Expr:
         return expression.xreplace(model.steady).doit()
 
-    # the law states strength(v, σ, memory, τ) − τ = 0; τ itself occurs in strength for Nagata only
-    own = -at_steady(sp.diff(model.balance, tau))
-    f = at_steady(sp.diff(model.balance, v)) / own
-    f1 = at_steady(sp.diff(model.balance, sigma)) / own
-    by_memory = at_steady(sp.diff(model.balance, memory)) / own
+    # the law states strength(v, σ, memory, τ) − τ = 0; τ itself occurs in strength where the state depends on it only
+    own = -at_steady(sp.diff(balance, tau))
+    f = at_steady(sp.diff(balance, v)) / own
+    f1 = at_steady(sp.diff(balance, sigma)) / own
+    by_memory = at_steady(sp.diff(balance, memory)) / own
     r = -(at_steady(sp.diff(rate, memory)) + at_steady(sp.diff(rate, tau)) * by_memory)
     v0 = model.parameters["drive.velocity"]
     tau_ss = model.steady[tau]
-    slope, mu = sp.diff(tau_ss, v0), sp.diff(tau_ss, model.sigma_ss)
+    slope, mu = sp.diff(tau_ss, v0), sp.diff(tau_ss, contact.sigma_ss)
     m, c, eta, k = _mechanics(model)
     b0, b1, b2, b3 = contact_coefficients(model)
     return Response(f + c + eta, slope + c + eta, r, f1, mu, b0, b1, b2, b3, m, k)
@@ -131,38 +122,37 @@ def response(model: Model) -> Response:
 
 def _mechanics(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
     """m, c, η and k (with the gains of a controller) from the definitions of T and τ."""
-    symbol = model.symbols
-    spring = model.definitions[symbol["spring"]]
-    friction = model.definitions[symbol["tau"]]
+    contact = model.contact
+    spring, friction = model.definitions[contact.spring], model.definitions[contact.friction]
     return (
-        -sp.diff(friction, symbol["acceleration"]),
-        -sp.diff(spring, symbol["v"]),
-        -sp.diff(friction, symbol["v"]),
-        -sp.diff(spring, symbol["x"]),
+        -sp.diff(friction, contact.acceleration),
+        -sp.diff(spring, contact.velocity),
+        -sp.diff(friction, contact.velocity),
+        -sp.diff(spring, contact.slip),
     )
 
 
-@lru_cache(maxsize=128)
+@question
 def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
     """B0, B1, B2, B3 of eq. 12 that a contact law comes down to, at steady sliding.
 
     A contact that depends on friction does so through the balance of forces τ = T − ηv − m v̇, which is
     where its B0 = −γm and part of its B1 come from (theory 3, table of mechanisms).
     """
-    symbol = model.symbols
-    law = model.definitions[symbol["sigma"]]
+    contact = model.contact
+    law = model.definitions[contact.normal]
     m, c, eta, k = _mechanics(model)
 
-    def partial(name: str) -> sp.Expr:
-        return sp.diff(law, symbol[name]).xreplace(model.steady).doit()
+    def partial(symbol: sp.Symbol) -> sp.Expr:
+        return sp.diff(law, symbol).xreplace(model.steady).doit()
 
-    by_spring, by_friction = partial("spring"), partial("tau")
+    by_spring, by_friction = partial(contact.spring), partial(contact.friction)
     through_spring = by_spring + by_friction
-    by_slip = partial("x")
+    by_slip = partial(contact.slip)
     spring_constant = model.parameters["slider.stiffness"]
     by_stiffness = sp.diff(by_slip, spring_constant)
-    b0 = partial("acceleration") - m * by_friction
-    b1 = partial("v") - c * through_spring - eta * by_friction
+    b0 = partial(contact.acceleration) - m * by_friction
+    b1 = partial(contact.velocity) - c * through_spring - eta * by_friction
     b2 = by_stiffness - through_spring
     b3 = sp.expand(by_slip - by_stiffness * k)
     return b0, b1, b2, b3
@@ -189,26 +179,25 @@ def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     NotAvailable
         If the rig has no memory variable, several, or integral control.
     """
-    values = model_values(rig, vary)
+    point = operating_point(rig, vary)
     wrapped = {}
-    for name, x in response_numbers(values).as_dict().items():
-        wrapped[name] = values.wrap(np.broadcast_to(x, values.shape)[()], name, _UNITS[name])
+    for name, x in response_numbers(point).as_dict().items():
+        wrapped[name] = point.wrap(np.broadcast_to(x, point.shape)[()], name, _UNITS[name])
     return Response(**wrapped)
 
 
-def response_numbers(values: Values) -> Response:
+def response_numbers(point: OperatingPoint) -> Response:
     """The response as bare numbers or arrays; NaN where steady sliding does not exist."""
-    names, function = _response_function(values.model)
-    sigma = steady_stress(values)
-    missing = 0 * sigma
-    return Response(**{name: x + missing for name, x in zip(names, function(*values.arguments, sigma), strict=True)})
+    names, function = _response_function(point.model)
+    missing = 0 * point.sigma
+    return Response(**{name: x + missing for name, x in zip(names, point.evaluate(function), strict=True)})
 
 
 _UNITS = {"f": "Pa s/m", "S": "Pa s/m", "r": "1/s", "f1": "1", "mu": "1", "B0": "kg/m^2", "B1": "Pa s/m"}
 _UNITS |= {"B2": "1", "B3": "Pa/m", "m": "kg/m^2", "k": "Pa/m"}
 
 
-@lru_cache(maxsize=64)
+@question
 def _response_function(model: Model) -> tuple[list[str], Any]:
     known = response(model).as_dict()
-    return list(known), array_function([*model.parameters.values(), model.sigma_ss], list(known.values()))
+    return list(known), model.function(known.values())

@@ -18,13 +18,12 @@ import numpy as np
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.quantities import shown, unit
 from steadyslip.linear.polynomials import damping_measures, roots
-from steadyslip.linear.response import memory_symbols
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
 from steadyslip.model.linearisation import linearise
-from steadyslip.model.point import Values, model_values
-from steadyslip.model.steady import explain_absence, steady_stress
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.sliding import explain_absence
 
 _PER_DECADE = 40
 _DECADES = 6
@@ -83,8 +82,8 @@ class Search:
         address = rig.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
 
-    def values(self, x: Any) -> Values:
-        return model_values(self.rig, {self.name: x}, self.present, self.branch, scan=True)
+    def values(self, x: Any) -> OperatingPoint:
+        return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
 
     # -- the range
 
@@ -123,9 +122,9 @@ class Search:
 
     def natural_size(self) -> float:
         """A size for a parameter that is zero, from σss, v0 and the slip distance v0/r."""
-        values = model_values(self.rig, None, self.present, self.branch)
-        sigma, v0 = float(steady_stress(values)), values.named()["drive.velocity"]
-        length = v0 / (_decay_rate(values, sigma) or 1.0)
+        point = operating_point(self.rig, None, self.present, self.branch)
+        sigma, v0 = float(point.sigma), point.drive
+        length = v0 / (_decay_rate(point, sigma) or 1.0)
         _, d = unit(self.role.unit)
         by_velocity = -2 * d.mass - d.time
         sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
@@ -224,8 +223,8 @@ class Search:
     def _kind(self, low: float, high: float, below: int, above: int) -> tuple[str, float]:
         if ABSENT in (below, above):
             outside = low if below == ABSENT else high
-            values = self.values(outside)
-            reason: NoSteadySliding = explain_absence(self.rig.with_values({self.name: outside}), values)
+            point = self.values(outside)
+            reason: NoSteadySliding = explain_absence(self.rig.with_values({self.name: outside}), point)
             return reason.condition, 0.0
         c = characteristic(self.values(np.array([low, high])))
         if ill_posed(c)[0] != ill_posed(c)[1]:
@@ -240,7 +239,7 @@ class Search:
 
     def _of_stiffness(self, low: float, high: float) -> tuple[Boundary, ...]:
         """The exact edges of the stable set."""
-        edges = set_of_one(model_values(self.rig, None, self.present, self.branch))
+        edges = set_of_one(operating_point(self.rig, None, self.present, self.branch))
         keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
         return tuple(
             self._stiffness_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
@@ -254,10 +253,9 @@ class Search:
         return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area)
 
 
-def _decay_rate(values: Values, sigma: float) -> float:
+def _decay_rate(point: OperatingPoint, sigma: float) -> float:
     """Fastest decay rate of the memory (1/s), zero without memory."""
-    linear = linearise(values.model)
-    numbers = dict(zip(values.model.parameters.values(), values.arguments, strict=True))
-    numbers[values.model.sigma_ss] = sigma
-    own = [linear.rates[s][s].xreplace(numbers) for s in memory_symbols(values.model)]
+    model, linear = point.model, linearise(point.model)
+    numbers = dict(zip(model.arguments, (*point.arguments, sigma), strict=True))
+    own = [linear.rows[item.symbol][item.symbol].xreplace(numbers) for item in model.memory]
     return max((abs(float(rate)) for rate in own if rate.is_number), default=0.0)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, UnknownNameError
-from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import question
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import linearise
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import explain_absence, steady_stress_roots
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import explain_absence
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
@@ -45,17 +44,17 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, 
         If the problem is ill-posed: the balance cannot be solved for its unknown; or if numbers leave the range of
         floating point.
     """
-    values = model_values(rig)
-    model = values.model
+    point = operating_point(rig)
+    model = point.model
     for name in outputs:
         if name not in model.observables:
             raise UnknownNameError("output", name, model.observables)
-    stresses = steady_stress_roots(values)
+    stresses = point.all_stresses()
     if not stresses:
-        raise explain_absence(rig, values)
+        raise explain_absence(rig, point)
     names = tuple(outputs)
     with np.errstate(all="ignore"):
-        blocks = _matrix_function(model, names)(*values.arguments, stresses[0])
+        blocks = _matrix_function(model, names)(*point.arguments, stresses[0])
         found = _solved(blocks, len(model.variables), len(names))
     if not all(np.all(np.isfinite(block)) for block in found):
         raise NotAvailable(OUT_OF_RANGE)
@@ -74,22 +73,21 @@ def _solved(blocks: Any, n: int, p: int) -> tuple[Any, Any, Any, Any]:
     return full[:n, :n], full[:n, n:], full[n:, :n], full[n:, n:]
 
 
-@lru_cache(maxsize=64)
+@question
 def _matrix_function(model: Model, outputs: tuple[str, ...]) -> Any:
     """Rows: rates, outputs, balance. Columns: variables, inputs, unknown."""
     linear = linearise(model)
+    contact = model.contact
     columns = [item.symbol for item in model.variables] + [model.inputs[name] for name in INPUTS]
-    columns.append(model.unknown)
-    rows = []
-    for item in model.variables:
-        if item.symbol is model.symbols["v"]:
-            rows.append({model.unknown: sp.Integer(1)})
-        else:
-            rows.append(linear.rates[item.symbol])
+    columns.append(contact.unknown)
+    rows = [
+        {contact.unknown: sp.Integer(1)} if item.symbol is contact.velocity else linear.rows[item.symbol]
+        for item in model.variables
+    ]
     rows += [linear.outputs[name] for name in outputs]
-    rows.append(linear.balance)
+    rows.append(linear.rows[contact.velocity])
     entries = [row.get(column, sp.Integer(0)) for row in rows for column in columns]
-    return array_function([*model.parameters.values(), model.sigma_ss], entries)
+    return model.function(entries)
 
 
 def state_space(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress", "normal_stress")) -> StateSpace:
@@ -124,5 +122,5 @@ def to_control(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress", 
         import control
     except ImportError as error:
         raise NotAvailable("the package 'control' is not installed; install it or use state_space") from error
-    names = [item.name for item in model_values(rig).model.variables]
+    names = [item.name for item in operating_point(rig).model.variables]
     return control.ss(*state_matrices(rig, outputs), states=names, inputs=list(INPUTS), outputs=list(outputs))

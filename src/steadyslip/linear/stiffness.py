@@ -7,21 +7,21 @@ characteristic polynomial p(s) + k q(s); the two routes agree to rounding (tests
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import StableSet, quietly, roots, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
-from steadyslip.model.point import Values, Vary, model_values
-from steadyslip.model.steady import steady_equation, steady_stress
+from steadyslip.model.point import OperatingPoint, Vary, operating_point
+from steadyslip.model.steady import steady_equation
 
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
 
@@ -51,8 +51,8 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     Eq. 20 of Dupont & Bapna with its errata corrected, or the general route (theory 3). One number is
     never a verdict: see `stable_stiffness`.
     """
-    values = model_values(rig, vary)
-    return values.wrap(in_chunks(values, _nearest_edge), "critical_stiffness", "Pa/m")
+    point = operating_point(rig, vary)
+    return point.wrap(in_chunks(point, _nearest_edge), "critical_stiffness", "Pa/m")
 
 
 def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
@@ -69,22 +69,20 @@ def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
         Sliding is stable above 1 where the edge is a lower limit of the stiffness, as it is for most rigs, and below 1
         where it is an upper one; `stable_stiffness` tells. NaN where there is no critical stiffness.
     """
-    values = model_values(rig, vary)
-    gain = _gain(values.model)
+    point = operating_point(rig, vary)
 
-    def kernel(part: Values) -> Any:
-        added = gain(*part.arguments)[0]
+    def kernel(part: OperatingPoint) -> Any:
+        added = _gain(part.model)(*part.arguments)[0]
         with np.errstate(all="ignore"):
             return (part.named()["slider.stiffness"] + added) / (_nearest_edge(part) + added)
 
-    return values.wrap(in_chunks(values, kernel), "safety_factor", "1")
+    return point.wrap(in_chunks(point, kernel), "safety_factor", "1")
 
 
-@lru_cache(maxsize=128)
+@question
 def _gain(model: Model) -> Callable[..., list[Any]]:
     """Stiffness that the controller adds, as a function of the model's parameters."""
-    kp = model.parameters.get("drive.kp", sp.Integer(0))
-    return array_function([*model.parameters.values()], [kp])
+    return array_function([*model.parameters.values()], [model.gain])
 
 
 def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
@@ -101,10 +99,10 @@ def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
         Open intervals (low, high) in Pa/m, in rising order; high is inf where there is no upper limit.
         Rigs with fewer than m intervals are padded with NaN; all NaN means that no stiffness is stable.
     """
-    values = model_values(rig, vary)
-    low, high = _in_chunks_of_intervals(values)
+    point = operating_point(rig, vary)
+    low, high = _in_chunks_of_intervals(point)
     intervals = np.stack([low, high], axis=-1)
-    return values.wrap(intervals, "stable_stiffness", "Pa/m", ("interval", "end"))
+    return point.wrap(intervals, "stable_stiffness", "Pa/m", ("interval", "end"))
 
 
 def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
@@ -121,12 +119,12 @@ def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
         1/s, sorted by falling real part; NaN where steady sliding does not exist, and for the root that a
         rig lacks when its mass is zero.
     """
-    values = model_values(rig, vary)
+    point = operating_point(rig, vary)
 
-    def kernel(part: Values) -> Any:
+    def kernel(part: OperatingPoint) -> Any:
         return roots(characteristic(part))
 
-    return values.wrap(in_chunks(values, kernel), "eigenvalues", "1/s", ("mode",))
+    return point.wrap(in_chunks(point, kernel), "eigenvalues", "1/s", ("mode",))
 
 
 def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
@@ -134,37 +132,35 @@ def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
 
     inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding.
     """
-    values = model_values(rig, vary)
+    point = operating_point(rig, vary)
 
-    def kernel(part: Values) -> Any:
+    def kernel(part: OperatingPoint) -> Any:
         c = characteristic(part)
         with np.errstate(invalid="ignore"):
             rate = np.max(np.where(np.isnan(found := roots(c).real), -np.inf, found), axis=-1)
         return np.where(ill_posed(c), np.inf, np.where(np.all(np.isfinite(c), axis=-1), rate, np.nan))
 
-    return values.wrap(in_chunks(values, kernel), "growth_rate", "1/s")
+    return point.wrap(in_chunks(point, kernel), "growth_rate", "1/s")
 
 
 # --- coefficients as arrays -------------------------------------------------------------------------
 
 
-def characteristic(values: Values) -> Any:
+def characteristic(point: OperatingPoint) -> Any:
     """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
-    sigma = steady_stress(values)
-    return _stacked(_coefficient_function(values.model)(*values.arguments, sigma), values.shape, sigma)
+    return _stacked(point.evaluate(_coefficient_function(point.model)), point)
 
 
-def stiffness_polynomials(values: Values) -> tuple[Any, Any]:
+def stiffness_polynomials(point: OperatingPoint) -> tuple[Any, Any]:
     """p and q of p(s) + k q(s), each (..., n+1), lowest first; k is the spring's own stiffness."""
-    sigma = steady_stress(values)
-    both = _split_function(values.model)(*values.arguments, sigma)
+    both = point.evaluate(_split_function(point.model))
     half = len(both) // 2
-    return _stacked(both[:half], values.shape, sigma), _stacked(both[half:], values.shape, sigma)
+    return _stacked(both[:half], point), _stacked(both[half:], point)
 
 
-def general_set(values: Values) -> StableSet:
+def general_set(point: OperatingPoint) -> StableSet:
     """The stable set by the Model's characteristic polynomial, for any number of states."""
-    return stable_set(*stiffness_polynomials(values))
+    return stable_set(*stiffness_polynomials(point))
 
 
 def ill_posed(c: Any) -> Any:
@@ -172,32 +168,32 @@ def ill_posed(c: Any) -> Any:
     return (c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0))
 
 
-def _stacked(parts: list[Any], shape: tuple[int, ...], sigma: Any) -> Any:
-    out = np.empty((*shape, len(parts)))
+def _stacked(parts: list[Any], point: OperatingPoint) -> Any:
+    out = np.empty((*point.shape, len(parts)))
     for i, part in enumerate(parts):
         out[..., i] = part
-    if np.any(np.isnan(sigma)):
-        out[np.broadcast_to(np.isnan(sigma), shape)] = np.nan
+    if np.any(absent := np.isnan(point.sigma)):
+        out[np.broadcast_to(absent, point.shape)] = np.nan
     return out
 
 
-@lru_cache(maxsize=128)
+@question
 def _coefficient_function(model: Model) -> Callable[..., list[Any]]:
-    return array_function([*model.parameters.values(), model.sigma_ss], characteristic_coefficients(model))
+    return model.function(characteristic_coefficients(model))
 
 
-@lru_cache(maxsize=128)
+@question
 def _split_function(model: Model) -> Callable[..., list[Any]]:
     p, q = stiffness_split(model)
-    return array_function([*model.parameters.values(), model.sigma_ss], [*p, *q])
+    return model.function([*p, *q])
 
 
 # --- the interval of the closed form ----------------------------------------------------------------
 
 
-def closed_form_interval(values: Values) -> tuple[Any, Any]:
+def closed_form_interval(point: OperatingPoint) -> tuple[Any, Any]:
     """Ends of the one stable interval of a rig with one memory variable (cubic in closed form)."""
-    exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(values.model)(values)
+    exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
     if np.ndim(gain) or gain != 0:
         high = high - gain
@@ -206,33 +202,32 @@ def closed_form_interval(values: Values) -> tuple[Any, Any]:
     return cubic.unless(exists, low), cubic.unless(exists, high)
 
 
-@lru_cache(maxsize=128)
-def _interval_function(model: Model) -> Callable[[Values], list[Any]]:
+@question
+def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Any]]:
     """Everything that `closed_form_interval` needs, compiled into one function."""
     part = response(model)
     known = part.as_dict()
-    gain = sp.expand(known.pop("k") - model.parameters["slider.stiffness"])
+    del known["k"]
     numerator, denominator = _hopf_line(known)
     _, _, a2, a3 = cubic.coefficients(**known, k=sp.Integer(0))
-    wanted = [numerator, denominator, part.mu * part.B2, part.mu * part.B3, a2, a3, gain]
+    wanted = [numerator, denominator, part.mu * part.B2, part.mu * part.B3, a2, a3, model.gain]
     equation = steady_equation(model)
     arguments = list(model.parameters.values())
     if not equation.affine:
-        general = array_function([*arguments, model.sigma_ss], wanted)
+        general = model.function(wanted)
 
-        def by_search(values: Values) -> list[Any]:
-            sigma = steady_stress(values)
-            return [np.isfinite(sigma), *general(*values.arguments, sigma)]
+        def by_search(point: OperatingPoint) -> list[Any]:
+            return [np.isfinite(point.sigma), *point.evaluate(general)]
 
         return by_search
     sigma, slope = equation.sigma, equation.slope
     if wanted[2] != 0 and sp.expand(wanted[2] + slope) == 0 and wanted[3] == 0:
         wanted[2] = sp.Integer(0)  # a0 > 0 is then the condition that steady sliding exists, tested anyway
-    direct = array_function(arguments, [sigma, slope, *(w.xreplace({model.sigma_ss: sigma}) for w in wanted)])
+    direct = array_function(arguments, [sigma, slope, *(w.xreplace({model.contact.sigma_ss: sigma}) for w in wanted)])
 
-    def in_one_go(values: Values) -> list[Any]:
+    def in_one_go(point: OperatingPoint) -> list[Any]:
         with np.errstate(divide="ignore", invalid="ignore"):
-            stress, coupling, *rest = direct(*values.arguments)
+            stress, coupling, *rest = direct(*point.arguments)
         return [cubic.positive(1 - coupling) & cubic.positive(stress), *rest]
 
     return in_one_go
@@ -246,20 +241,20 @@ def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
     short = [sp.cancel(part / a2) for part in (numerator, denominator)]
     if all(part.is_polynomial() for part in short):
         numerator, denominator = short
-    values = {symbol: known[key] for key, symbol in names.items() if isinstance(symbol, sp.Symbol)}
-    return numerator.xreplace(values), denominator.xreplace(values)
+    point = {symbol: known[key] for key, symbol in names.items() if isinstance(symbol, sp.Symbol)}
+    return numerator.xreplace(point), denominator.xreplace(point)
 
 
-def set_of_one(values: Values) -> StableSet:
+def set_of_one(point: OperatingPoint) -> StableSet:
     """The stable set of a single rig with its edges: closed form where there is one, else the general route.
 
     The closed form keeps its digits where a large mass swamps the direct effect in the polynomial.
     """
-    if not has_closed_form(values.model):
-        return general_set(values)
-    low, high = (float(end) for end in closed_form_interval(values))
-    part = response_numbers(values)
-    gain = part.k - float(values.named()["slider.stiffness"])
+    if not has_closed_form(point.model):
+        return general_set(point)
+    low, high = (float(end) for end in closed_form_interval(point))
+    part = response_numbers(point)
+    gain = part.k - float(point.named()["slider.stiffness"])
     edges, frequencies = [], []
     for end in (low, high):
         if np.isfinite(end) and end > 0:
@@ -275,19 +270,19 @@ def set_of_one(values: Values) -> StableSet:
 # --- intervals to answers, chunk by chunk -----------------------------------------------------------
 
 
-def _interval_ends(values: Values) -> tuple[Any, Any]:
+def _interval_ends(point: OperatingPoint) -> tuple[Any, Any]:
     """Lower and upper ends of the stable intervals, (..., m)."""
-    if has_closed_form(values.model):
-        low, high = closed_form_interval(values)
+    if has_closed_form(point.model):
+        low, high = closed_form_interval(point)
         return np.asarray(low)[..., None], np.asarray(high)[..., None]
-    intervals = general_set(values).intervals
+    intervals = general_set(point).intervals
     return intervals[..., 0], intervals[..., 1]
 
 
-def _nearest_edge(values: Values) -> Any:
+def _nearest_edge(point: OperatingPoint) -> Any:
     """The finite positive end of a stable interval nearest to the rig's own stiffness."""
-    own = values.named()["slider.stiffness"]
-    low, high = _interval_ends(values)
+    own = point.named()["slider.stiffness"]
+    low, high = _interval_ends(point)
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # the common case, worth its own line for arrays of rigs
@@ -302,26 +297,26 @@ def _nearest_edge(values: Values) -> Any:
 
 
 @quietly
-def in_chunks(values: Values, kernel: Callable[[Values], Any]) -> Any:
+def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], Any]) -> Any:
     """Apply a kernel to the varied rigs some thousand at a time."""
     whole: Any = None
     done = 0
-    for part in values.pieces(_CHUNK):
+    for part in point.pieces(_CHUNK):
         result = np.asarray(kernel(part))
         extra = result.shape[len(part.shape) :]
         if whole is None:
-            whole = np.empty((values.size, *extra), dtype=result.dtype)
+            whole = np.empty((point.size, *extra), dtype=result.dtype)
         whole[done : done + part.size] = np.broadcast_to(result, (*part.shape, *extra)).reshape(-1, *extra)
         done += part.size
-    return whole.reshape(values.shape + whole.shape[1:])
+    return whole.reshape(point.shape + whole.shape[1:])
 
 
 @quietly
-def _in_chunks_of_intervals(values: Values) -> tuple[Any, Any]:
+def _in_chunks_of_intervals(point: OperatingPoint) -> tuple[Any, Any]:
     """Interval ends of all rigs; chunks may differ in the number of intervals."""
     pieces = [
         (np.broadcast_to(low, (*part.shape, low.shape[-1])), np.broadcast_to(high, (*part.shape, low.shape[-1])))
-        for part in values.pieces(_CHUNK)
+        for part in point.pieces(_CHUNK)
         for low, high in [_interval_ends(part)]
     ]
     most = max(low.shape[-1] for low, _ in pieces)
@@ -331,5 +326,5 @@ def _in_chunks_of_intervals(values: Values) -> tuple[Any, Any]:
             np.concatenate([piece[side], np.full((*piece[side].shape[:-1], most - piece[side].shape[-1]), np.nan)], -1)
             for piece in pieces
         ]
-        ends.append(padded[0] if len(padded) == 1 else np.concatenate(padded).reshape(*values.shape, most))
+        ends.append(padded[0] if len(padded) == 1 else np.concatenate(padded).reshape(*point.shape, most))
     return ends[0], ends[1]

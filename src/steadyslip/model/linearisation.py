@@ -1,7 +1,7 @@
 """Small perturbations of steady sliding, symbolically from the Model.
 
-The balance of forces and the rates of the memory variables are differentiated once; the intermediate
-stresses T, τ, σ are eliminated by the chain rule, so every entry is in terms of the parameters and the
+The balances of forces, one for each contact, and the rates of the memory variables are differentiated once; the
+intermediate stresses T, τ, σ are eliminated by the chain rule, so every entry is in terms of the parameters and the
 steady normal stress. From the entries come the characteristic polynomial (any number of states), its
 split p(s) + k q(s), and state-space matrices.
 """
@@ -9,13 +9,13 @@ split p(s) + k q(s), and state-space matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import sympy as sp
 from sympy.polys.domains import ZZ
 from sympy.polys.matrices import DomainMatrix
 
-from steadyslip.model import Model
+from steadyslip.core.questions import question
+from steadyslip.model.equations import Model
 
 Row = dict[sp.Symbol, sp.Expr]
 
@@ -27,40 +27,29 @@ class Linearisation:
     Attributes
     ----------
     columns : tuple of sympy.Symbol
-        x, v, memory variables, integral: the order of `rates` and of the characteristic matrix.
-    balance : dict
-        Gradient of the model's balance with respect to columns, acceleration and inputs.
-    rates : dict
-        For each column but v: gradient of its rate.
+        x, v, memory variables, integral: the order of `rows` and of the characteristic matrix.
+    rows : dict
+        For each column the gradient, in columns, accelerations and inputs, of its rate; for the velocity of a contact
+        that of the contact's balance.
+    outputs : dict
+        Gradients of the observables.
     """
 
     model: Model
     columns: tuple[sp.Symbol, ...]
-    balance: Row
-    rates: dict[sp.Symbol, Row]
+    rows: dict[sp.Symbol, Row]
     outputs: dict[str, Row]
 
-    @property
-    def acceleration(self) -> sp.Symbol:
-        return self.model.symbols["acceleration"]
 
-    def well_posedness(self) -> sp.Expr:
-        """Derivative of the balance in its unknown: must be positive.
-
-        It is the leading coefficient of the characteristic polynomial: m + f1 B0 with inertia,
-        f + f1 B1 + ... without (theory 3).
-        """
-        return self.balance[self.model.unknown]
-
-
-@lru_cache(maxsize=128)
+@question
 def linearise(model: Model) -> Linearisation:
     """Differentiate a model at steady sliding."""
-    symbol = model.symbols
-    x, v, acceleration = symbol["x"], symbol["v"], symbol["acceleration"]
-    others = [item.symbol for item in model.variables if item.symbol not in (x, v)]
+    velocities = {contact.slip: contact.velocity for contact in model.contacts}
+    columns: dict[sp.Symbol, None] = {}
+    for item in model.variables:  # a body without inertia has its velocity beside its slip all the same
+        columns |= {item.symbol: None} | ({velocities[item.symbol]: None} if item.symbol in velocities else {})
     inputs = [s for name, s in model.inputs.items() if name != "time"]
-    basis = [x, v, acceleration, *others, *inputs]
+    basis = [*columns, *(contact.acceleration for contact in model.contacts), *inputs]
     intermediate: dict[sp.Symbol, Row] = {}
 
     def gradient(expression: sp.Expr) -> Row:
@@ -68,32 +57,22 @@ def linearise(model: Model) -> Linearisation:
         total: Row = {}
         free = expression.free_symbols
         for name in basis:
-            value = _at_steady(sp.diff(expression, name), model) if name in free else sp.Integer(0)
+            value = model.at_steady(sp.diff(expression, name)) if name in free else sp.Integer(0)
             for middle, row in intermediate.items():
                 if middle in free and row.get(name, 0) != 0:
-                    value += _at_steady(sp.diff(expression, middle), model) * row[name]
+                    value += model.at_steady(sp.diff(expression, middle)) * row[name]
             total[name] = value
         return total
 
     for name, definition in model.definitions.items():
         intermediate[name] = gradient(definition)
-    rates = {
-        item.symbol: gradient(rate)
-        for item, rate in zip(model.variables, model.rates, strict=True)
-        if item.symbol is not v
-    }
+    rows = {symbol: gradient(rate) for symbol, rate in model.rate_of.items()}
+    rows |= {contact.velocity: gradient(contact.balance) for contact in model.contacts}
     outputs = {name: gradient(expression) for name, (expression, _) in model.observables.items()}
-    return Linearisation(model, (x, v, *others), gradient(model.balance), rates, outputs)
+    return Linearisation(model, tuple(columns), rows, outputs)
 
 
-def _at_steady(expression: sp.Expr, model: Model) -> sp.Expr:
-    """Substitute steady sliding; terms that cancel there do so exactly."""
-    steady = model.steady
-    expression = expression.xreplace({s: steady[s] for s in expression.free_symbols & steady.keys()})
-    return expression.doit() if expression.has(sp.sign, sp.Derivative, sp.Abs) else expression
-
-
-@lru_cache(maxsize=128)
+@question
 def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     """Coefficients of the characteristic polynomial in s, lowest power first (theory 3: a0, a1, ...).
 
@@ -112,15 +91,14 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
 
     size = len(linear.columns)
     matrix = sp.zeros(size, size)
+    faster = {contact.velocity: contact.acceleration for contact in model.contacts}
     for i, row_symbol in enumerate(linear.columns):
-        is_balance = row_symbol is linear.columns[1]
-        row = linear.balance if is_balance else linear.rates[row_symbol]
-        sign = 1 if is_balance else -1
+        row, sign = linear.rows[row_symbol], 1 if row_symbol in faster else -1
         for j, column in enumerate(linear.columns):
             entry = sign * stand_in(row[column])
-            if column is linear.columns[1] and row[linear.acceleration] != 0:
-                entry += sign * s * stand_in(row[linear.acceleration])
-            if i == j and not is_balance:
+            if column in faster and row[faster[column]] != 0:
+                entry += sign * s * stand_in(row[faster[column]])
+            if i == j and row_symbol not in faster:
                 entry += s
             matrix[i, j] = entry
     polynomial = _determinant(matrix, s, list(names))
@@ -137,7 +115,7 @@ def _determinant(matrix: sp.Matrix, s: sp.Symbol, names: list[sp.Symbol]) -> lis
     return [sp.sympify(c) for c in coefficients]
 
 
-@lru_cache(maxsize=128)
+@question
 def stiffness_split(model: Model, name: str = "slider.stiffness") -> tuple[tuple[sp.Expr, ...], tuple[sp.Expr, ...]]:
     """The characteristic polynomial as p(s) + k q(s), coefficients lowest first.
 

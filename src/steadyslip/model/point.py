@@ -1,34 +1,40 @@
-"""Numbers for a Model's parameters: those of a rig, some of them varied as arrays."""
+"""An operating point: numbers for a Model's parameters, some of them varied as arrays, and steady sliding there.
+
+This is the one place where arrays of a rig's numbers are broadcast and checked.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
-from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError
+from steadyslip.core.arrays import Together, broadcast, check_together, checked_array, valid_together
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.expressions import array_function
-from steadyslip.core.quantities import parse
-from steadyslip.core.records import FrozenRecord, Parameter, conditions, twin
+from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.slider import Slider
-from steadyslip.model import Model, build_model
+from steadyslip.model.build import build_model
+from steadyslip.model.equations import Model
+from steadyslip.model.steady import beyond_floats, steady_roots, steady_stress
 
 Vary = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Values:
-    """A model and the values of its parameters, in the order of ``model.parameters``.
+@dataclass(frozen=True, eq=False)
+class OperatingPoint(Keeper):
+    """A model, the values of its parameters, and what follows for steady sliding.
 
     Attributes
     ----------
     model : Model
     arguments : tuple of float or ndarray
-        Mutually broadcastable.
+        In the order of ``model.parameters``; mutually broadcastable.
     shape : tuple of int
         Broadcast shape.
     wrap : callable
@@ -51,7 +57,46 @@ class Values:
     def size(self) -> int:
         return math.prod(self.shape)
 
-    def pieces(self, most: int) -> Iterator[Values]:
+    def named(self) -> dict[str, Any]:
+        """Values by dotted name."""
+        return dict(zip(self.model.parameters, self.arguments, strict=True))
+
+    @property
+    def drive(self) -> Any:
+        """Velocity of the load point in steady sliding, m/s."""
+        return self.named()["drive.velocity"]
+
+    @cached_property
+    def sigma(self) -> Any:
+        """σss (Pa) of the contact over the varied parameters, NaN where steady sliding does not exist.
+
+        Where there are several solutions, the one of `branch`.
+        """
+        return steady_stress(self.model, self.arguments, self.branch)
+
+    @property
+    def axial_share(self) -> Any:
+        """k over the axial stiffness, where that is given."""
+        return _axial_share(self.model)(self.named())
+
+    @property
+    def stresses(self) -> np.ndarray:
+        """`sigma` as a flat array, with one entry at least."""
+        return np.atleast_1d(np.asarray(self.sigma, dtype=float))
+
+    def all_stresses(self) -> list[float]:
+        """All positive σss of a single rig, rising."""
+        return steady_roots(self.model, self.arguments)
+
+    def out_of_range(self) -> Any:
+        """Where the equation for σss leaves the range of floating point, so that nothing can be said."""
+        return beyond_floats(self.model, self.arguments, self.shape)
+
+    def evaluate(self, function: Callable[..., list[Any]], *further: Any) -> list[Any]:
+        """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
+        return function(*self.arguments, self.sigma, *further)
+
+    def pieces(self, most: int) -> Iterator[OperatingPoint]:
         """The same rigs, flattened, at most `most` at a time; itself if it is no larger."""
         if self.size <= most:
             yield self
@@ -59,16 +104,23 @@ class Values:
         flat = [np.broadcast_to(a, self.shape).reshape(-1) if np.ndim(a) else a for a in self.arguments]
         for start in range(0, self.size, most):
             part = tuple(a[start : start + most] if np.ndim(a) else a for a in flat)
-            yield Values(self.model, part, (min(most, self.size - start),), self.wrap, self.branch)
+            yield OperatingPoint(self.model, part, (min(most, self.size - start),), self.wrap, self.branch)
 
-    def named(self) -> dict[str, Any]:
-        """Values by dotted name."""
-        return dict(zip(self.model.parameters, self.arguments, strict=True))
+    def part(self, rows: slice | np.ndarray) -> OperatingPoint:
+        """Some rigs of a flat point; single numbers are for all of them."""
+        cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, self.sigma)]
+        found = self.with_arguments(cut[:-1], np.broadcast_shapes(*map(np.shape, cut)))
+        found.__dict__["sigma"] = cut[-1]
+        return found
+
+    def with_arguments(self, arguments: Iterable[Any], shape: tuple[int, ...] | None = None) -> OperatingPoint:
+        """The same model with other numbers, which are not checked."""
+        return replace(self, arguments=tuple(arguments), shape=self.shape if shape is None else shape)
 
 
-def model_values(
+def operating_point(
     rig: Slider, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False
-) -> Values:
+) -> OperatingPoint:
     """The model of a rig and its parameters' values.
 
     Parameters
@@ -83,7 +135,7 @@ def model_values(
         Which steady sliding is meant where there are several, by rising normal stress.
     scan : bool, optional
         Whether values are steps of a search, which goes beyond the conditions that numbers obey together (a rod
-        shorter than its crank): these are marked in `Values.valid` instead of refused.
+        shorter than its crank): these are marked in `OperatingPoint.valid` instead of refused.
 
     Raises
     ------
@@ -91,105 +143,60 @@ def model_values(
         If names are unknown, values are outside their domain or break a condition with others, or shapes do not
         broadcast; all problems are listed.
     """
-    varied, wrap, shape = _varied(rig, vary or {})
-    valid = _checked_together(rig, varied, "", scan) if varied else True
+    together = _varied(rig, vary or {})
+    varied = together.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
-    model = build_model(rig, present=[*structural, *present])
+    return _placed(build_model(rig, present=[*structural, *present]), rig, together, branch, scan)
+
+
+def point_of(model: Model, rig: Slider, vary: Vary | None, branch: int) -> OperatingPoint:
+    """An operating point of a model at hand.
+
+    Raises
+    ------
+    ParameterError
+        As for `operating_point`, and if the rig is not of the model's structure.
+    """
+    together = _varied(rig, vary or {})
+    own = build_model(rig, [name for name in model.parameters if name in rig.parameters()])
+    if own is not model and own.equations() != model.equations():
+        raise ParameterError([Problem("rig", "is of another structure than this model; ask build_model(rig)")])
+    return _placed(model, rig, together, branch, False)
+
+
+def _placed(model: Model, rig: Slider, together: Together, branch: int, scan: bool) -> OperatingPoint:
+    varied, valid = together.values, True
+    if varied and scan:
+        valid = valid_together(rig, "", varied)
+    elif varied:
+        check_together(rig, "", varied)
     values = {name: address.value for name, address in rig.parameters().items()} | varied
-    if "slider.stiffness" not in varied:
-        values["slider.stiffness"] = _sliding_stiffness(rig, values)
-    return Values(model, tuple(values[name] for name in model.parameters), shape, wrap, branch, valid)
+    if model.axial_share is not None:
+        values["slider.stiffness"] = values["slider.axial_stiffness"] * _axial_share(model)(values)
+    elif values["slider.stiffness"] is None:
+        values["slider.stiffness"] = 0.0  # a controller alone
+    arguments = tuple(values[name] for name in model.parameters)
+    return OperatingPoint(model, arguments, together.shape, together.wrap, branch, valid)
 
 
-def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:
-    """Refuse arrays of a record's numbers that break a condition which they obey together.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, the first bad value and its position.
-    """
-    _checked_together(record, varied, prefix, scan=False)
+@question
+def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
+    """k over the axial stiffness, as a function of numbers by dotted name."""
+    share = sp.sympify(model.axial_share)
+    names = [name for name, symbol in model.parameters.items() if share.has(symbol)]
+    function = array_function([model.parameters[name] for name in names], [share])
+    return lambda values: function(*(values[name] for name in names))[0]
 
 
-def _checked_together(record: FrozenRecord, varied: Mapping[str, Any], prefix: str, scan: bool) -> Any:
-    """Where all conditions hold."""
-    found = list(conditions(twin(record, varied, prefix), prefix))
-    problems = [] if scan else [p for name, condition in found if (p := condition.problem(name)) is not None]
-    if problems:
-        raise ParameterError(problems)
-    valid: Any = True
-    for _, condition in found:
-        valid = valid & np.asarray(condition.holds)
-    return valid
-
-
-def _sliding_stiffness(rig: Slider, values: Mapping[str, Any]) -> Any:
-    """k along the sliding direction: given, or from the axial stiffness, or zero under a controller."""
-    if rig.axial_stiffness is None:
-        return 0.0 if rig.stiffness is None else rig.stiffness
-    names = tuple(name for name in values if name.startswith("contact.") and values[name] is not None)
-    axial = values["slider.axial_stiffness"]
-    return axial * axial_projection(rig)(*(values[name] for name in names))
-
-
-def axial_projection(rig: Slider) -> Callable[..., Any]:
-    """k/k_axial as a function of the contact's given parameters, in order."""
-    import sympy as sp
-
-    names = [name for name, a in rig.parameters().items() if name.startswith("contact.") and a.value is not None]
-    symbols = {name: sp.Symbol(f"c{i}", real=True) for i, name in enumerate(names)}
-    expression = twin(rig, symbols).contact.sliding_stiffness(sp.Integer(1))
-    function = _projection_function(tuple(symbols.values()), expression)
-    return lambda *arguments: function(*arguments)[0]
-
-
-@lru_cache(maxsize=32)
-def _projection_function(symbols: tuple[Any, ...], expression: Any) -> Callable[..., Any]:
-    return array_function(symbols, [expression])
-
-
-def checked_array(name: str, role: Parameter, value: Any) -> Any:
-    """A varied parameter as float array inside its domain.
-
-    Raises
-    ------
-    ParameterError
-        Naming the parameter, the first bad value and its position.
-    """
-    if isinstance(value, str):
-        try:
-            value = parse(value, role.unit)
-        except QuantityError as error:
-            raise ParameterError([Problem(name, str(error))]) from error
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ParameterError([Problem(name, f"got {value!r}; allowed: numbers in {role.unit}")]) from error
-    if not array.size:
-        raise ParameterError([Problem(name, "got an empty array; give at least one value")])
-    if not (role.domain.contains(array.min()) and role.domain.contains(array.max())):
-        good = np.atleast_1d(role.domain.contains(array))
-        where = tuple(int(i) for i in np.argwhere(~good)[0])
-        bad = float(np.atleast_1d(array)[where])
-        raise ParameterError(
-            [Problem(name, f"got {bad!r} at position {where}; allowed: {role.domain.text} in {role.unit}")]
-        )
-    return array if array.ndim else float(array)
-
-
-def _varied(rig: Slider, vary: Vary) -> tuple[dict[str, Any], Callable[..., Any], tuple[int, ...]]:
-    """Checked values by full name, the wrapper of results, and the broadcast shape."""
-    known, problems, labelled = rig.parameters(), [], {}
-    plain: dict[str, Any] = {}
+def _varied(rig: Slider, vary: Vary) -> Together:
+    """Checked values by full name."""
+    known, problems = rig.parameters(), []
+    checked: dict[str, Any] = {}
     for name, value in vary.items():
         try:
             full = rig.resolve(name)
-            raw = value.values if hasattr(value, "dims") else value
-            plain[full] = checked_array(full, known[full].role, raw)
-            if hasattr(value, "dims"):
-                labelled[full] = value
-            if known[full].role.adds_state and np.any(np.asarray(plain[full]) == 0):
+            checked[full] = checked_array(full, known[full].role, value)
+            if known[full].role.adds_state and np.any(np.asarray(checked[full]) == 0):
                 raise ParameterError(
                     [Problem(full, "got 0; without this term the rig has fewer states, ask for it apart")]
                 )
@@ -203,40 +210,4 @@ def _varied(rig: Slider, vary: Vary) -> tuple[dict[str, Any], Callable[..., Any]
             problems += error.problems
     if problems:
         raise ParameterError(problems)
-    if labelled:
-        return _labelled(plain, labelled)
-    try:
-        shape = np.broadcast_shapes(*(np.shape(v) for v in plain.values()))
-    except ValueError as error:
-        shapes = ", ".join(f"{name} {np.shape(v)}" for name, v in plain.items())
-        raise ParameterError([Problem("vary", f"shapes do not broadcast: {shapes}")]) from error
-    return plain, _bare, shape
-
-
-def _bare(array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) -> Any:
-    return array if np.ndim(array) else np.asarray(array).item()
-
-
-def _labelled(
-    plain: dict[str, Any], labelled: dict[str, Any]
-) -> tuple[dict[str, Any], Callable[..., Any], tuple[int, ...]]:
-    """Broadcast by dimension name and return DataArrays."""
-    import xarray as xr
-
-    bare = [name for name in plain if name not in labelled and np.ndim(plain[name])]
-    if bare:
-        raise ParameterError([Problem(name, "is a bare array beside DataArrays; name its dimensions") for name in bare])
-    together = dict(zip(labelled, xr.broadcast(*labelled.values()), strict=True))
-    template = next(iter(together.values()))
-    values = plain | {name: array.values.astype(float) for name, array in together.items()}
-
-    def wrap(array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) -> Any:
-        return xr.DataArray(
-            array,
-            dims=(*template.dims, *extra_dims),
-            coords=template.coords,
-            name=name,
-            attrs={"units": unit},
-        )
-
-    return values, wrap, template.shape
+    return broadcast(checked)

@@ -15,23 +15,21 @@ asinh where there is one (exact through rest and reversal), v itself otherwise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import sympy as sp
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import asinh_exp
-from steadyslip.model import Model
+from steadyslip.core.questions import Keeper, question
+from steadyslip.model.equations import Model
 
 Row = dict[sp.Symbol, sp.Expr]
-CREEP_SHARE = 1e-6
-"""Coulomb friction is a step at rest; the kernels creep below this share of the drive velocity instead."""
 STANDSTILL = -500
 """Of ln(v/v0): a block with mass slower than this keeps still to every purpose, and 1/v stays a number there."""
 
 
 @dataclass(frozen=True, eq=False)
-class Reduction:
+class Reduction(Keeper):
     """Explicit rates of a Model.
 
     Every expression is in terms of `state`, `inputs`, `slopes`, the parameters and (form *implicit*) the
@@ -119,23 +117,18 @@ class _Equations:
     """A Model's equations with the velocity written through w, and derivatives through T, τ and σ."""
 
     def __init__(self, model: Model) -> None:
-        self.model = model
-        symbols = model.symbols
-        self.x, self.v, self.acceleration = symbols["x"], symbols["v"], symbols["acceleration"]
-        self.tau, self.sigma, self.spring = symbols["tau"], symbols["sigma"], symbols["spring"]
-        self.memory = tuple(
-            item.symbol for item in model.variables if item.symbol not in (self.x, self.v) and item.name != "integral"
-        )
-        self.integral = symbols.get("integral")
+        self.model, contact = model, model.contact
+        self.x, self.v, self.acceleration = contact.slip, contact.velocity, contact.acceleration
+        self.tau, self.sigma, self.spring = contact.friction, contact.normal, contact.spring
+        self.memory = tuple(item.symbol for item in model.memory)
+        self.integrals = tuple(item.symbol for item in model.integrals)
         self.velocity, self.of_w, self.w_of_v = _velocity_variable(model, self.memory)
-        creep = CREEP_SHARE * model.parameters["drive.velocity"]
-        steady = model.steady[self.spring]
 
         def written(expression: sp.Expr) -> sp.Expr:
-            smooth = expression.replace(sp.sign, lambda argument: sp.tanh(argument / creep))
+            smooth = expression.replace(sp.sign, lambda argument: contact.direction.xreplace({self.v: argument}))
             return _in_w(smooth, self.v, self.of_w, self.velocity, model)
 
-        pressed = P + model.imposed.xreplace({model.inputs["time"]: TIME})
+        pressed = P + contact.imposed.xreplace({model.inputs["time"]: TIME})
         given = {
             model.inputs["load_velocity"]: V_LP,
             model.inputs["disturbance"]: Q,
@@ -143,24 +136,20 @@ class _Equations:
             model.inputs["time"]: TIME,
         }
         self.definitions = {s: written(e.xreplace(given)) for s, e in model.definitions.items()}
-        self.balance = written(model.balance.xreplace(given))
-        self.rates = {
-            item.symbol: written(rate.xreplace(given)) for item, rate in zip(model.variables, model.rates, strict=True)
-        }
-        self.steady_spring = steady
+        self.balance = written(contact.balance.xreplace(given))
+        self.rates = {symbol: written(rate.xreplace(given)) for symbol, rate in model.rate_of.items()}
 
     def inlined(self, expression: sp.Expr) -> sp.Expr:
-        """T, τ and σ replaced by what they are."""
-        for symbol, definition in reversed(self.definitions.items()):
-            expression = expression.xreplace({symbol: definition})
-        return expression
+        """T, τ and σ replaced by what they are, in w."""
+        return self.model.inlined(expression, self.definitions)
 
 
 def _velocity_variable(model: Model, memory: tuple[sp.Symbol, ...]) -> tuple[str, sp.Expr, sp.Expr]:
     """The kind of w, v as a function of it, and the other way round."""
-    v = model.symbols["v"]
-    everything = [model.balance, *model.rates, *model.definitions.values()]
-    for expression in (model.balance, *model.definitions.values()):
+    contact = model.contact
+    v = contact.velocity
+    everything = [contact.balance, *model.rates, *model.definitions.values()]
+    for expression in (contact.balance, *model.definitions.values()):
         if _singular_at_rest(expression, v):
             scale = model.parameters["drive.velocity"]
             return "logarithm", scale * sp.exp(W), sp.log(v / scale)
@@ -176,8 +165,8 @@ def _velocity_variable(model: Model, memory: tuple[sp.Symbol, ...]) -> tuple[str
 
 def _at_steady_stress(exponent: sp.Expr, model: Model) -> sp.Expr:
     """The exponent of the regularised law with memory as it is, stresses as in steady sliding."""
-    stresses = {model.symbols[name]: model.steady[model.symbols[name]] for name in ("tau", "sigma")}
-    return exponent.xreplace(stresses)
+    contact = model.contact
+    return exponent.xreplace({stress: model.steady[stress] for stress in (contact.friction, contact.normal)})
 
 
 def _singular_at_rest(expression: sp.Expr, v: sp.Symbol) -> bool:
@@ -222,7 +211,7 @@ def _is_product_with_sum(expression: sp.Expr) -> bool:
     return any(factor.is_Add and W in factor.args for factor in expression.args)
 
 
-@lru_cache(maxsize=64)
+@question
 def reduce_model(model: Model, eliminate: int | None = 0) -> Reduction:
     """Choose the variables of a model and write their rates.
 
@@ -257,13 +246,9 @@ def _names(eq: _Equations, state: tuple[sp.Symbol, ...]) -> tuple[str, ...]:
     return tuple("w" if symbol is W else by_symbol[symbol] for symbol in state)
 
 
-def _tail(eq: _Equations) -> tuple[sp.Symbol, ...]:
-    return () if eq.integral is None else (eq.integral,)
-
-
 def _inertial(model: Model, eq: _Equations) -> Reduction:
     """Velocity is a variable; the balance gives the acceleration."""
-    state = (eq.x, W, *eq.memory, *_tail(eq))
+    state = (eq.x, W, *eq.memory, *eq.integrals)
     residual = eq.inlined(eq.balance)
     acceleration = _solved(residual, eq.acceleration)
     unknown = None if acceleration is not None else eq.acceleration
@@ -279,8 +264,7 @@ def _inertial(model: Model, eq: _Equations) -> Reduction:
         if slope != 0:
             push -= slope * rate
     rates = {eq.x: written(eq.rates[eq.x]), W: push / sp.diff(eq.of_w, W), **memory_rates}
-    if eq.integral is not None:
-        rates[eq.integral] = eq.rates[eq.integral]
+    rates |= {symbol: eq.rates[symbol] for symbol in eq.integrals}
     if eq.velocity == "logarithm":
         rates = {symbol: _kept_moving(rate) for symbol, rate in rates.items()}
     outputs = _outputs(eq, written, written(eq.acceleration))
@@ -314,7 +298,7 @@ def _outputs(eq: _Equations, written: object, acceleration: sp.Expr) -> dict[str
 
 def _massless(model: Model, eq: _Equations) -> Reduction:
     """Slip and memory are integrated; the balance gives the velocity variable."""
-    state = (eq.x, *eq.memory, *_tail(eq))
+    state = (eq.x, *eq.memory, *eq.integrals)
     residual = eq.inlined(eq.balance)
     solution = _solved(residual, W)
     unknown = None if solution is not None else W
@@ -346,11 +330,11 @@ def _change(residual: sp.Expr, rates: Row) -> sp.Expr:
 def _eliminated(model: Model, eq: _Equations, victim: sp.Symbol, slope: sp.Expr) -> Reduction:
     """ln v is integrated in place of the memory variable `victim`."""
     others = tuple(s for s in eq.memory if s is not victim)
-    state = (eq.x, W, *others, *_tail(eq))
+    state = (eq.x, W, *others, *eq.integrals)
     rest = eq.balance.xreplace({victim: sp.Integer(0)})
     given = sp.expand_mul(sp.Add(*(-term / slope for term in sp.Add.make_args(rest))))  # so that ln σ cancels
     residual = eq.inlined(eq.balance)
-    raw = {symbol: eq.inlined(eq.rates[symbol]) for symbol in (eq.x, *eq.memory, *_tail(eq))}
+    raw = {symbol: eq.inlined(eq.rates[symbol]) for symbol in (eq.x, *eq.memory, *eq.integrals)}
     w_rate = -_change(residual, raw) / sp.diff(residual, W)
 
     def written(expression: sp.Expr) -> sp.Expr:
@@ -360,7 +344,7 @@ def _eliminated(model: Model, eq: _Equations, victim: sp.Symbol, slope: sp.Expr)
     rates[W] = written(w_rate)
     acceleration = sp.diff(eq.of_w, W) * rates[W]
     outputs = _outputs(eq, written, acceleration)
-    continuous = (eq.x, *eq.memory, *_tail(eq))
+    continuous = (eq.x, *eq.memory, *eq.integrals)
     restored = tuple(written(symbol) for symbol in continuous)
     return Reduction(
         model, "eliminated", eq.velocity, state, _names(eq, state), continuous,

@@ -7,108 +7,18 @@ steady sliding: g1 >= 1 is lock-up (friction grows faster than the spring can pu
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.core.expressions import array_function
-from steadyslip.core.quantities import shown, stress_name
-from steadyslip.machine.slider import Slider
-from steadyslip.model import Model
-from steadyslip.model.point import Values, model_values
+from steadyslip.core.questions import question
+from steadyslip.model.equations import Model
 
-
-@dataclass(frozen=True)
-class SteadySliding:
-    """One state of steady sliding.
-
-    Attributes
-    ----------
-    velocity : float
-        m/s, that of the drive.
-    normal_stress, shear_stress, spring_stress : float
-        Pa; the spring also carries the damping to the ground.
-    friction : float
-        Shear over normal stress.
-    states : dict of str to float
-        What the friction law calls its states (Θ, θ in s, z in m, ...).
-    """
-
-    velocity: float
-    normal_stress: float
-    shear_stress: float
-    spring_stress: float
-    friction: float
-    states: dict[str, float]
-    units: dict[str, str] = field(repr=False)
-    area: float | None = field(default=None, repr=False)
-
-    def __str__(self) -> str:
-        rows = [
-            f"steady sliding at {shown(self.velocity, 'm/s')}: {stress_name('normal stress', self.area)} "
-            f"{shown(self.normal_stress, 'Pa', area=self.area)}, {stress_name('shear stress', self.area)} "
-            f"{shown(self.shear_stress, 'Pa', area=self.area)}, friction {self.friction:.4g}"
-        ]
-        rows += [f"  {name} = {shown(value, self.units[name], area=self.area)}" for name, value in self.states.items()]
-        return "\n".join(rows)
-
-
-def steady_state(rig: Slider) -> SteadySliding:
-    """The steady sliding of a rig.
-
-    Returns
-    -------
-    SteadySliding
-        If there are several, the one with the lowest normal stress; see `steady_states`.
-
-    Raises
-    ------
-    NoSteadySliding
-        Saying which condition fails (lock-up, lift-off) and by how much.
-    """
-    return steady_states(rig)[0]
-
-
-def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
-    """All states of steady sliding, by rising normal stress.
-
-    Raises
-    ------
-    NoSteadySliding
-        If there is none.
-    """
-    values = model_values(rig)
-    stresses = steady_stress_roots(values)
-    if not stresses:
-        raise explain_absence(rig, values)
-    names, function = _observable_function(values.model)
-    results = []
-    for sigma in stresses:
-        numbers = {
-            name: float(number) + 0.0  # no minus zero
-            for name, number in zip(names, function(*values.arguments, sigma), strict=True)
-        }
-        velocity = float(values.named()["drive.velocity"])
-        shear = numbers.pop("shear_stress")
-        spring = numbers.pop("spring_stress")
-        friction = numbers.pop("friction")
-        units = {name: values.model.observables[name][1] for name in numbers}
-        results.append(SteadySliding(velocity, float(sigma), shear, spring, friction, numbers, units, rig.area))
-    return tuple(results)
-
-
-@lru_cache(maxsize=128)
-def _observable_function(model: Model) -> tuple[list[str], Callable[..., Any]]:
-    """Steady values of all observables but x, v and the normal stress."""
-    names = [name for name in model.observables if name not in ("x", "v", "normal_stress")]
-    expressions = [model.observables[name][0].xreplace(model.steady) for name in names]
-    return names, array_function([*model.parameters.values(), model.sigma_ss], expressions)
+Arguments = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -127,63 +37,63 @@ class SteadyEquation:
     slope: sp.Expr | None = None
 
 
-@lru_cache(maxsize=128)
+@question
 def steady_equation(model: Model) -> SteadyEquation:
     """How a model determines its steady normal stress."""
-    sigma = model.sigma_ss
-    slope = sp.diff(model.steady_coupling, sigma)
+    contact = model.contact
+    sigma = contact.sigma_ss
+    slope = sp.diff(contact.steady_coupling, sigma)
+    given = contact.steady_load is None
     # where σss is given, the contact hands back that parameter and sigma_ss does not occur
-    load = model.steady_stress if model.steady_load is None else model.steady_load
+    load = contact.steady_stress if contact.steady_load is None else contact.steady_load
     arguments = list(model.parameters.values())
-    given = model.steady_load is None
     affine = sigma not in slope.free_symbols and sigma not in load.free_symbols
-    residual = array_function([*arguments, sigma], [model.steady_stress - sigma])
+    residual = model.function([contact.steady_stress - sigma])
     if not affine:
         return SteadyEquation(False, given, residual)
-    offset = model.steady_coupling.xreplace({sigma: sp.Integer(0)})
+    offset = contact.steady_coupling.xreplace({sigma: sp.Integer(0)})
     parts = array_function(arguments, [load, offset, slope])
     solved = load if given else (load + offset) / (1 - slope)
     return SteadyEquation(True, given, residual, parts, solved, slope)
 
 
-def steady_stress(values: Values) -> Any:
+def steady_stress(model: Model, arguments: Arguments, branch: int) -> Any:
     """σss (Pa) as an array over the varied parameters, NaN where steady sliding does not exist.
 
-    Where there are several solutions, the one of ``values.branch``.
+    Where there are several solutions, the one of number `branch`.
     """
-    equation = steady_equation(values.model)
+    equation = steady_equation(model)
     if equation.parts is None:
-        return _by_search(values)
-    load, offset, slope = equation.parts(*values.arguments)
+        return _by_search(equation, arguments, branch)
+    load, offset, slope = equation.parts(*arguments)
     sigma = load if equation.given else (load + offset) / (1 - slope)
     return np.where((slope < 1) & (np.asarray(sigma) > 0), sigma, np.nan)[()]
 
 
-def out_of_range(values: Values) -> Any:
+def beyond_floats(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
     """Where the equation for σss leaves the range of floating point, so that nothing can be said."""
-    equation = steady_equation(values.model)
+    equation = steady_equation(model)
     if equation.parts is None:
-        return np.zeros(values.shape, dtype=bool)
-    return ~np.isfinite(sum(np.broadcast_to(part, values.shape) for part in equation.parts(*values.arguments)))
+        return np.zeros(shape, dtype=bool)
+    return ~np.isfinite(sum(np.broadcast_to(part, shape) for part in equation.parts(*arguments)))
 
 
-def steady_stress_roots(values: Values) -> list[float]:
+def steady_roots(model: Model, arguments: Arguments) -> list[float]:
     """All positive σss of a single rig, rising."""
-    equation = steady_equation(values.model)
+    equation = steady_equation(model)
     if equation.affine:
-        sigma = float(steady_stress(values))
+        sigma = float(steady_stress(model, arguments, 0))
         return [sigma] if sigma > 0 else []
-    return _search(lambda sigma: equation.residual(*values.arguments, sigma)[0])
+    return _search(lambda sigma: equation.residual(*arguments, sigma)[0])
 
 
-def _by_search(values: Values) -> Any:
-    equation = steady_equation(values.model)
-    arrays = np.broadcast_arrays(*values.arguments)
+def _by_search(equation: SteadyEquation, arguments: Arguments, branch: int) -> Any:
+    arrays = np.broadcast_arrays(*arguments)
     result = np.full(arrays[0].shape, np.nan)
     for index in np.ndindex(result.shape):
-        arguments = [a[index] for a in arrays]
-        found = _search(lambda sigma, a=arguments: equation.residual(*a, sigma)[0])  # type: ignore[misc]
-        result[index] = found[values.branch] if len(found) > values.branch else np.nan
+        single = [a[index] for a in arrays]
+        found = _search(lambda sigma, a=single: equation.residual(*a, sigma)[0])  # type: ignore[misc]
+        result[index] = found[branch] if len(found) > branch else np.nan
     return result[()]
 
 
@@ -202,49 +112,3 @@ def _search(residual: Callable[[Any], Any]) -> list[float]:
         if abs(float(residual(root))) <= 1e-6 * root:  # a pole changes sign too
             roots.append(float(root))
     return sorted(roots)
-
-
-def explain_absence(rig: Slider, values: Values) -> NoSteadySliding:
-    """The exception that says why a rig has no steady sliding.
-
-    Raises
-    ------
-    NotAvailable
-        If the numbers leave the range of floating point.
-    """
-    if np.any(out_of_range(values)):
-        raise NotAvailable(OUT_OF_RANGE)
-    equation = steady_equation(values.model)
-    if equation.parts is None:
-        return NoSteadySliding(
-            "no steady sliding: no positive normal stress satisfies the contact law at the steady shear stress",
-            "no solution",
-        )
-    load, offset, slope = (float(part) for part in equation.parts(*values.arguments))
-    mu = _friction_coefficient(values)
-    if not slope < 1:
-        margin = 1 - slope
-        hint = rig.contact.lock_up(mu)
-        return NoSteadySliding(
-            "no steady sliding: lock-up. The pull raises friction by more than itself: "
-            f"1 − μss dσ/dτ = {margin:.4g}, must be > 0" + (f"; {hint}" if hint else ""),
-            "lock-up",
-            margin,
-        )
-    remaining = load + offset
-    return NoSteadySliding(
-        "no steady sliding: lift-off. The motion takes away more normal stress than the contact has: "
-        f"{shown(load, 'Pa', area=rig.area)} less {shown(-offset, 'Pa', area=rig.area)} leaves "
-        f"{shown(remaining, 'Pa', area=rig.area)}, must be > 0",
-        "lift-off",
-        remaining,
-    )
-
-
-def _friction_coefficient(values: Values) -> float:
-    """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact where τ is proportional to σ)."""
-    model = values.model
-    expression = model.steady[model.symbols["tau"]] / model.sigma_ss
-    function = array_function([*model.parameters.values(), model.sigma_ss], [expression])
-    value = float(function(*values.arguments, 1e6)[0])
-    return value if math.isfinite(value) else float("nan")

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import array_function
-from steadyslip.model import Model
-from steadyslip.model.point import Values
+from steadyslip.core.questions import question
+from steadyslip.model.equations import Model
+from steadyslip.model.point import OperatingPoint
 
 Array = np.ndarray
 Index = tuple[int, ...]
@@ -45,18 +45,17 @@ class System:
     entries: tuple[tuple[Index, ...], ...]
     function: Callable[..., list[Any]]
 
-    @property
-    def velocity(self) -> int:
-        """Index of the block's velocity."""
-        return self.unknowns.index(self.model.symbols["v"])
+    def place(self, symbol: sp.Symbol) -> int:
+        """Index of one of the unknowns."""
+        return self.unknowns.index(symbol)
 
 
-@lru_cache(maxsize=64)
+@question
 def system(model: Model) -> System:
     """Differentiate a model three times at steady sliding."""
     variables = [item.symbol for item in model.variables]
-    unknowns = [*variables, model.unknown, *model.definitions]
-    equations = [*model.rates, model.balance]
+    unknowns = [*variables, *(contact.unknown for contact in model.contacts), *model.definitions]
+    equations = [*model.rates, *(contact.balance for contact in model.contacts)]
     equations += [definition - symbol for symbol, definition in model.definitions.items()]
     inputs = {model.inputs[name]: model.steady[model.inputs[name]] for name in model.inputs if name != "time"}
     entries: tuple[list[Index], ...] = ([], [], [])
@@ -72,18 +71,12 @@ def system(model: Model) -> System:
                 if derivative == 0:
                     continue
                 derivatives[index] = derivative
-                value = _at_steady(derivative, model)
+                value = model.at_steady(derivative)
                 if value != 0:
                     entries[order - 1].append((row, *index))
                     expressions[order - 1].append(value)
-    function = array_function([*model.parameters.values(), model.sigma_ss], [e for part in expressions for e in part])
+    function = model.function(e for part in expressions for e in part)
     return System(model, tuple(unknowns), len(variables), tuple(map(tuple, entries)), function)
-
-
-def _at_steady(expression: sp.Expr, model: Model) -> sp.Expr:
-    """Steady values put in; unevaluated derivatives of |v| and sign v are worked out there."""
-    found = expression.xreplace(model.steady)
-    return found.doit() if found.has(sp.sign, sp.Derivative, sp.Abs, sp.DiracDelta) else found
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +118,10 @@ def _arrangements(i: int, j: int, k: int) -> tuple[Index, ...]:
     return tuple({(i, j, k), (i, k, j), (j, i, k), (j, k, i), (k, i, j), (k, j, i)})
 
 
-def taylor(values: Values, sigma: Any) -> Taylor:
-    """Derivatives of every rig of `values` (flat arrays) at its steady normal stress."""
-    found = system(values.model)
-    with np.errstate(all="ignore"):
-        numbers = found.function(*map(np.asarray, values.arguments), np.asarray(sigma, dtype=float))
+def taylor(point: OperatingPoint) -> Taylor:
+    """Derivatives of every rig of an operating point (flat arrays) in its steady sliding."""
+    found = system(point.model)
+    numbers = found.function(*map(np.asarray, point.arguments), point.stresses)
     size = max([1, *(np.size(x) for x in numbers)])
     columns = [np.broadcast_to(np.asarray(x, dtype=float), (size,)) for x in numbers]
     n = len(found.unknowns)

@@ -8,16 +8,16 @@ same kernels, methods and step control serve cycles, their Floquet multipliers a
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import sympy as sp
 
+from steadyslip.core.questions import question
 from steadyslip.model.reduction import Reduction
 
 Column = tuple[sp.Symbol, ...]
 
 
-@lru_cache(maxsize=64)
+@question
 def with_sensitivities(reduction: Reduction) -> Reduction:
     """The reduction whose state is y, then S column by column, then D in one direction."""
     n = len(reduction.state)
@@ -25,7 +25,7 @@ def with_sensitivities(reduction: Reduction) -> Reduction:
     return _extended(reduction, columns, (_column("D", n),))
 
 
-@lru_cache(maxsize=64)
+@question
 def with_directions(reduction: Reduction, count: int) -> Reduction:
     """The reduction whose state is y, then D in each of several directions."""
     return _extended(reduction, (), tuple(_column(f"D_{k}", len(reduction.state)) for k in range(count)))

@@ -13,7 +13,7 @@ import numpy as np
 from steadyslip.kernels import driver
 from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Row, Setting
 from steadyslip.kernels.program import STATUSES, TALLY, Program
-from steadyslip.motion.setup import Jobs
+from steadyslip.motion.jobs import Jobs
 
 LANES = 24  # three vectors of eight doubles, see compiled.kernel
 CHUNK = 2048  # jobs per call: keeps the arrays small and Ctrl-C prompt

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Together, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.progress import progress_bar
-from steadyslip.core.records import resolve
+from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.kernels.program import STATUSES, TALLY
 from steadyslip.machine.slider import Slider
@@ -26,8 +27,8 @@ from steadyslip.motion.engine import (
     run_chunk,
     run_many,
 )
+from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.motion.observe import observable_units, observe, out_of_range, segment_of
-from steadyslip.motion.setup import Jobs, Options, prepare
 from steadyslip.motion.single import checked_times
 from steadyslip.motion.status import WORDS
 from steadyslip.protocol import Protocol
@@ -165,7 +166,8 @@ def simulate_many(
         If anything given is wrong; everything is listed.
     """
     options = Options(method, rtol, most_steps, arrest)
-    flat, start, shape, dims, coords = broadcast_arrays(rig, Protocol.of(protocol), vary, initial or {})
+    flat, start, together = broadcast_arrays(rig, Protocol.of(protocol), vary, initial or {})
+    shape = together.shape
     size = int(np.prod(shape, dtype=int))
     store: _Store | None = None
     groups = list(regimes(rig, flat, size))
@@ -182,17 +184,14 @@ def simulate_many(
                 break
     if store is None:
         raise InternalError("store is not None")
-    return store.result(shape, dims, coords)
+    return store.result(shape, together.dims or (), together.coords)
 
 
 def broadcast_arrays(
     rig: Slider, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, Any], tuple[int, ...], tuple[str, ...], Any]:
-    """Flat arrays of equal length by full name, the starting values apart, and the common shape."""
-    known = dict.fromkeys(rig.parameters())
-    from steadyslip.core.records import parameters
-
-    known |= dict.fromkeys(parameters(plan, "protocol."))
+) -> tuple[dict[str, Any], dict[str, Any], Together]:
+    """Flat arrays of equal length by full name, the starting values apart, and how they go together."""
+    known = dict.fromkeys([*rig.parameters(), *parameters(plan, "protocol.")])
     problems, named = [], {}
     for name, value in vary.items():
         try:
@@ -200,32 +199,15 @@ def broadcast_arrays(
         except UnknownNameError as error:
             problems.append(Problem(name, str(error)))
     named |= {f"initial.{name}": value for name, value in initial.items()}
-    dims: tuple[str, ...] = ()
-    coords = None
-    labelled = {name: value for name, value in named.items() if hasattr(value, "dims")}
-    if labelled:
-        import xarray as xr
-
-        bare = [n for n, v in named.items() if n not in labelled and np.ndim(v)]
-        problems += [Problem(n, "is a bare array beside DataArrays; name its dimensions") for n in bare]
-        together = dict(zip(labelled, xr.broadcast(*labelled.values()), strict=True))
-        first = next(iter(together.values()))
-        dims, coords = tuple(str(d) for d in first.dims), first.coords
-        named |= {name: array.values for name, array in together.items()}
     try:
-        shape = np.broadcast_shapes(*(np.shape(v) for v in named.values()))
-    except ValueError:
-        shape = ()
-        shapes = ", ".join(f"{name} {np.shape(v)}" for name, v in named.items())
-        problems.append(Problem("vary", f"shapes do not broadcast: {shapes}"))
-    problems += [Problem(n, "got an empty array; give at least one value") for n, v in named.items() if not np.size(v)]
+        together = broadcast(named)
+    except ParameterError as error:
+        problems += error.problems
     if problems:
         raise ParameterError(problems)
-    flat = {
-        name: np.broadcast_to(value, shape).reshape(-1) if np.ndim(value) else value for name, value in named.items()
-    }
+    flat = together.flat()
     start = {name.removeprefix("initial."): flat.pop(name) for name in list(flat) if name.startswith("initial.")}
-    return flat, start, shape, dims, coords
+    return flat, start, together
 
 
 def _picked(array: Any, index: np.ndarray | None) -> Any:
@@ -259,7 +241,7 @@ class _Store:
     def __init__(
         self, jobs: Jobs, size: int, times: np.ndarray, observables: Sequence[str] | None, events: bool
     ) -> None:
-        self.units = observable_units(jobs.values.model)
+        self.units = observable_units(jobs.point.model)
         wanted = list(self.units) if observables is None else list(observables)
         problems = [
             Problem("observables", unknown_name("observable", name, self.units))
@@ -281,7 +263,7 @@ class _Store:
 
     def put(self, where: Any, jobs: Jobs, machine: Any, first: int, outcome: Outcome) -> None:
         """Everything that a chunk of runs has to say."""
-        _, sigma = jobs.part(first, first + len(outcome.status))
+        sigma = jobs.point.part(slice(first, first + len(outcome.status))).sigma
         absent = np.broadcast_to(~(sigma > 0), outcome.status.shape)
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
         self.code[where] = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import question
 from steadyslip.kernels.program import Program
 from steadyslip.model import Model
-from steadyslip.motion.setup import Jobs
+from steadyslip.motion.jobs import Jobs
 from steadyslip.protocol import Segments
 
 Array = np.ndarray
@@ -74,15 +73,13 @@ def out_of_range(found: dict[str, Array]) -> Array:
     return bad
 
 
-@lru_cache(maxsize=64)
+@question
 def _function(model: Model) -> tuple[list[str], Callable[..., list[Any]]]:
-    symbols = model.symbols
-    memory = [m.symbol for m in model.variables if m.name not in ("x", "v", "integral")]
-    arguments = [symbols[n] for n in ("x", "v", "sigma", "tau", "spring")] + memory
+    contact = model.contact
+    arguments = [contact.slip, contact.velocity, contact.normal, contact.friction, contact.spring]
+    arguments += [item.symbol for item in model.memory]
     names = [n for n in model.observables if n not in ("x", "v", "shear_stress", "normal_stress", "spring_stress")]
-    function = array_function(
-        [*model.parameters.values(), model.sigma_ss, *arguments], [model.observables[n][0] for n in names]
-    )
+    function = model.function((model.observables[n][0] for n in names), *arguments)
     return names, function
 
 
@@ -110,17 +107,15 @@ def observe(
     found = dict(zip(("v", "acceleration", "normal_stress", "shear_stress", "spring_stress"), values.T, strict=False))
     found["x"] = states[:, 0]
     continuous = {str(s): values[:, 5 + i] for i, s in enumerate(reduction.continuous)}
-    memory = [m for m in model.variables if m.name not in ("x", "v")]
-    found |= {m.name: continuous[str(m.symbol)] for m in memory}
+    found |= {item.name: continuous[str(item.symbol)] for item in (*model.memory, *model.integrals)}
     found["load_velocity"], found["disturbance"] = inputs[:, 0], inputs[:, 1]
     found["load_displacement"] = load_displacement(jobs.segments, first + lane, segment, time)
     found["slip"] = found["x"] + found["load_displacement"]
     names, function = _function(model)
-    arguments, sigma = jobs.part(first, last)
-    picked = [a[lane] if np.ndim(a) and len(a) > 1 else a for a in (*arguments, sigma)]
+    point = jobs.point.part(slice(first, last)).part(lane)
     stresses = [found["x"], found["v"], found["normal_stress"], found["shear_stress"], found["spring_stress"]]
-    own = [found[m.name] for m in memory if m.name != "integral"]
+    own = [found[item.name] for item in model.memory]
     with np.errstate(all="ignore"):
-        for name, value in zip(names, function(*picked, *stresses, *own), strict=True):
+        for name, value in zip(names, point.evaluate(function, *stresses, *own), strict=True):
             found[name] = np.broadcast_to(value, time.shape).astype(float)
     return found

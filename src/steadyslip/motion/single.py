@@ -11,12 +11,12 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.kernels.program import Program
 from steadyslip.machine.slider import Slider
-from steadyslip.model.steady import steady_state
+from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import Event, events_of
+from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.motion.observe import observable_units, observe, out_of_range, segment_of
 from steadyslip.motion.result import History
-from steadyslip.motion.setup import Jobs, Options, prepare
 from steadyslip.motion.status import WORDS, remedy
 from steadyslip.protocol import Protocol
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.arrays import check_together, checked_array
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.quantities import shown
-from steadyslip.core.records import FrozenRecord, parameter, parts, positive
+from steadyslip.core.records import FrozenRecord, parameter, parameters, parts, positive, twin
 from steadyslip.protocol.curves import Curve, Jump, Wave
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
@@ -83,6 +84,36 @@ class Protocol(FrozenRecord):
             return cls(pieces=tuple(given))
         message = f"got {given!r}; allowed: None, a piece such as VelocityStep(at=10, to=2e-6), a list or a Protocol"
         raise ParameterError([Problem("protocol", message)])
+
+    def varied(self, changes: Mapping[str, Any]) -> Protocol:
+        """The protocol with arrays in place of some of its numbers, for many lanes at once.
+
+        Parameters
+        ----------
+        changes : mapping of str to array_like
+            By dotted name such as ``protocol.pieces.1.to``, in SI units.
+
+        Raises
+        ------
+        ParameterError
+            If names are unknown or values are not allowed, by themselves or together.
+        """
+        if not changes:
+            return self
+        known = parameters(self, "protocol.")
+        problems, found = [], {}
+        for name, value in changes.items():
+            if name not in known:
+                problems.append(Problem(name, unknown_name("parameter", name, known)))
+                continue
+            try:
+                found[name] = checked_array(name, known[name].role, value)
+            except ParameterError as error:
+                problems += error.problems
+        if problems:
+            raise ParameterError(problems)
+        check_together(self, "protocol.", found)
+        return twin(self, found, "protocol.")
 
     def __add__(self, other: Piece | Protocol) -> Protocol:
         return _joined(self, other)

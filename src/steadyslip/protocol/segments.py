@@ -51,6 +51,16 @@ class Segments:
             return "harmonic"
         return "linear" if np.any(self.slope) else "constant"
 
+    def rows(self, start: int, stop: int) -> Array:
+        """Those of some lanes as the kernels read them: start, end, jump, values, slopes, waves."""
+        lanes = slice(start, stop) if len(self.start) > 1 else slice(None)
+        parts = [part[lanes, :, None] for part in (self.start, self.end, self.jump)]
+        parts += [self.value[lanes], self.slope[lanes]]
+        for wave in (self.amplitude, self.angular_frequency, self.phase):
+            block = wave[lanes]
+            parts.append(block.reshape(*block.shape[:2], -1))
+        return np.ascontiguousarray(np.concatenate(parts, axis=2))
+
 
 @dataclass
 class _Terms:

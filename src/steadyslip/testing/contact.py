@@ -13,8 +13,8 @@ from steadyslip.laws.contact import ContactLaw, Motion
 from steadyslip.laws.friction import FrictionLaw, RateState
 from steadyslip.machine.drive import Steady
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import steady_states
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import steady_states
 from steadyslip.testing.precise import (
     DIGITS,
     TOLERANCE,
@@ -154,16 +154,13 @@ def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS)
 
 def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
     """B0...B3 (eq. 12) agree with central differences of the normal stress, at two stiffnesses."""
-    from steadyslip.core.expressions import array_function
     from steadyslip.linear.response import contact_coefficients
 
     said = _Statement(contact)
     for place in (surroundings, replace(surroundings, stiffness=2 * surroundings.stiffness)):
         sigma = place.steady_stress(contact)
-        values = model_values(place.rig(contact))
-        function = array_function(
-            [*values.model.parameters.values(), values.model.sigma_ss], contact_coefficients(values.model)
-        )
+        values = operating_point(place.rig(contact))
+        function = values.model.function(contact_coefficients(values.model))
         b0, b1, b2, b3 = (float(b) for b in function(*values.arguments, sigma))
         k_part = abs(place.stiffness * b2) + abs(b3)
         expected = {

@@ -73,8 +73,9 @@ def check_symbols(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
         *((name, symbol) for name, symbol in model.parameters.items()),
         *((item.name, item.symbol) for item in model.variables),
         *((name, symbol) for name, symbol in model.inputs.items()),
-        *((name, symbol) for name, symbol in model.symbols.items() if name not in ("x", "v")),
-        ("steady normal stress", model.sigma_ss),
+        ("acceleration", model.contact.acceleration),
+        *((str(symbol), symbol) for symbol in model.definitions),
+        ("steady normal stress", model.contact.sigma_ss),
     ]
     for i, (name, symbol) in enumerate(used):
         for other, same in used[:i]:

@@ -22,7 +22,7 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     from steadyslip.linear.response import response
     from steadyslip.machine.drive import Steady
     from steadyslip.model.linearisation import characteristic_coefficients
-    from steadyslip.model.point import model_values
+    from steadyslip.model.point import operating_point
 
     if len(law.memory()) != 1:
         return
@@ -41,11 +41,11 @@ def check_two_routes(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
         radiation_damping=0.7 * size,
         drive=Steady(v),
     )
-    values = model_values(rig)
+    values = operating_point(rig)
     model = values.model
     closed = cubic.coefficients(**response(model).as_dict())
     general = characteristic_coefficients(model)
-    function = precise_function(law, [*model.parameters.values(), model.sigma_ss], [*closed, *general])
+    function = precise_function(law, [*model.arguments], [*closed, *general])
     with mpmath.workdps(DIGITS):
         numbers = function(*values.arguments, sigma)
         first, second = numbers[:4], numbers[4:]

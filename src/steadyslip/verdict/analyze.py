@@ -21,8 +21,8 @@ from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import on_edge
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import Values, axial_projection, model_values
-from steadyslip.model.steady import SteadySliding, steady_states
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.sliding import SteadySliding, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
             )
         if not 0 <= branch < len(states):
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
-        values = model_values(rig, None, present_zeros(rig), branch)
+        values = operating_point(rig, None, present_zeros(rig), branch)
         numbers = _linear_numbers(rig, values)
         on_the_edge = bool(on_edge(values))
         distances = margins(rig, branch=branch)
@@ -221,7 +221,7 @@ def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold,
     return thresholds_shown(rig, kinds, branch=branch).found
 
 
-def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:
+def _linear_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
     """Everything that follows from the characteristic polynomial."""
     c = characteristic(values)
     if not np.all(np.isfinite(c)):
@@ -249,7 +249,7 @@ def _linear_numbers(rig: Slider, values: Values) -> dict[str, Any]:
     return numbers | _stiffness_numbers(rig, values)
 
 
-def _stiffness_numbers(rig: Slider, values: Values) -> dict[str, Any]:
+def _stiffness_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
     """The stable set in k and its edge nearest to the rig's own stiffness."""
     found = set_of_one(values)
     own = float(values.named()["slider.stiffness"])
@@ -263,12 +263,13 @@ def _stiffness_numbers(rig: Slider, values: Values) -> dict[str, Any]:
         numbers["critical_angular_frequency"] = beta if math.isfinite(beta) else None
         numbers["critical_side"] = "above" if np.any(intervals[:, 0] == critical) else "below"
         if rig.axial_stiffness is not None:
-            contact = [v for name, v in rig.parameters().items() if name.startswith("contact.") and v.value is not None]
-            numbers["critical_axial_stiffness"] = critical / float(axial_projection(rig)(*(v.value for v in contact)))
+            numbers["critical_axial_stiffness"] = critical / float(values.axial_share)
     return numbers
 
 
-def _warnings(rig: Slider, values: Values, states: tuple[SteadySliding, ...], on_the_edge: bool) -> tuple[str, ...]:
+def _warnings(
+    rig: Slider, values: OperatingPoint, states: tuple[SteadySliding, ...], on_the_edge: bool
+) -> tuple[str, ...]:
     """What a reader must know beside the verdict."""
     found = []
     if on_the_edge:

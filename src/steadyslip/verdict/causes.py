@@ -14,7 +14,7 @@ from steadyslip.linear.cubic import coefficients, hopf_line
 from steadyslip.linear.polynomials import quietly
 from steadyslip.linear.response import Response, has_closed_form, response_numbers
 from steadyslip.linear.stiffness import stiffness_polynomials
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 
 if TYPE_CHECKING:
     from steadyslip.verdict.analyze import Analysis
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 def _response(analysis: Analysis) -> Response | None:
     """Numbers of the closed form at the branch judged; None where there are several memory variables or none."""
-    values = model_values(analysis.rig, branch=analysis.branch)
-    return response_numbers(values) if has_closed_form(values.model) else None
+    point = operating_point(analysis.rig, branch=analysis.branch)
+    return response_numbers(point) if has_closed_form(point.model) else None
 
 
 @quietly
@@ -89,7 +89,7 @@ def _why_oscillating(known: Response, denominator: float) -> str:
 
 
 def _why_none_in_general(analysis: Analysis) -> str:
-    p, q = stiffness_polynomials(model_values(analysis.rig, branch=analysis.branch))
+    p, q = stiffness_polynomials(operating_point(analysis.rig, branch=analysis.branch))
     if p[..., 0] <= 0 and q[..., 0] <= 0:
         return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
     if not analysis.rig.friction.memory() and p.shape[-1] == 3 and q[..., 1] == 0 and p[..., 1] <= 0:

@@ -11,7 +11,7 @@ from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
 from steadyslip.laws.friction import RateState
 from steadyslip.linear.status import ON_THE_EDGE
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def reason(analysis: Analysis) -> str:
             return "sliding is stable at every stiffness" + why_all(analysis)
         return "no stiffness makes sliding stable" + why_none(analysis)
     if own is None:
-        own = float(model_values(analysis.rig).named()["slider.stiffness"])
+        own = float(operating_point(analysis.rig).named()["slider.stiffness"])
     gain = float(analysis.rig.drive.proportional())
     which = "stiffness and gain kp together, " if gain and own else "gain kp, " if gain else "stiffness "
     ratio = (own + gain) / (critical + gain)

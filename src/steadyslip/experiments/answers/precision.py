@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.identify import Combination, combinations
 from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.experiments.measured.read import record_from_arrays
 from steadyslip.machine.slider import Slider
-from steadyslip.model.steady import steady_state
+from steadyslip.model.sliding import steady_state
 from steadyslip.protocol import (
     NormalStressHarmonic,
     NormalStressPulse,

@@ -19,7 +19,7 @@ from steadyslip.laws.friction.normal_memory import NoMemory
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED
 
@@ -226,7 +226,7 @@ def transferred(
 
 def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tuple[str, ...]) -> Prediction:
     with np.errstate(all="ignore"):
-        states = np.broadcast_to(np.asarray(status(model_values(target, vary))), (len(draws),))
+        states = np.broadcast_to(np.asarray(status(operating_point(target, vary))), (len(draws),))
         critical, safety, growth = (
             np.broadcast_to(np.asarray(number(target, vary), dtype=float), (len(draws),))
             for number in (critical_stiffness, safety_factor, growth_rate)

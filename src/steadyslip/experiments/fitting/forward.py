@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from steadyslip.kernels.experiment import LANES, experiment_program
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import Values, model_values
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.scales import natural_scales
 from steadyslip.motion.engine import run_many
-from steadyslip.motion.setup import automatic_method, natural_scales
+from steadyslip.motion.jobs import automatic_method
 
 Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
@@ -96,22 +96,22 @@ class Forward:
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.threads = rig, tuple(names), rtol, shifts, threads
         own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
-        self._base = model_values(rig, own)
+        self._base = operating_point(rig, own)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
         self.directions = len(names) + shifts if sensitive else 0
         self.size = next((n for n in (0, *SIZES) if n >= self.directions), SIZES[-1])
         self.program = experiment_program(self.model, self.size, automatic_method(reduction))
 
-    def values(self, parameters: Array) -> Values:
+    def values(self, parameters: Array) -> OperatingPoint:
         """The model's parameters for rows of the free ones, (jobs, names)."""
         varied = {name: parameters[:, i] for i, name in enumerate(self.names)}
         if self.rig.axial_stiffness is not None:  # k follows from other parameters
-            return model_values(self.rig, varied)
+            return operating_point(self.rig, varied)
         named = self._base.named() | varied
-        return replace(self._base, arguments=tuple(named.values()), shape=(len(parameters),))
+        return self._base.with_arguments(named.values(), (len(parameters),))
 
-    def _chain(self, parameters: Array, values: Values) -> Array:
+    def _chain(self, parameters: Array, values: OperatingPoint) -> Array:
         """How the model's parameters change with the free ones."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
         chain = np.zeros((len(parameters), self.directions, len(order)))
@@ -154,22 +154,19 @@ class Forward:
             steady sliding to start from.
         """
         values = self.values(parameters)
-        sigma = np.broadcast_to(np.asarray(steady_stress(values), dtype=float), (len(parameters),))
         chain = self._chain(parameters, values)
         if not self.directions:
-            return self._run(table, values, sigma, chain)
+            return self._run(table, values, chain)
         chain[:, : len(self.names)] *= units[:, :, None]
         parts = [slice(k, k + self.size) for k in range(0, self.directions, self.size)]
-        found = [
-            self._run(table.along(part, self.size), values, sigma, _padded(chain[:, part], self.size)) for part in parts
-        ]
+        found = [self._run(table.along(part, self.size), values, _padded(chain[:, part], self.size)) for part in parts]
         return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
 
-    def _run(self, table: InputTable, values: Values, sigma: Array, chain: Array) -> Array:
+    def _run(self, table: InputTable, values: OperatingPoint, chain: Array) -> Array:
         """One pass, with as many directions as the kernel has."""
-        jobs = len(sigma)
-        constants, start = self.program.arrays(values.arguments, sigma, chain)
-        settings = self._settings(table, values, sigma, jobs)
+        jobs, sigma = len(chain), values.stresses
+        constants, start = self.program.arrays(values, chain)
+        settings = self._settings(table, values, jobs)
         good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
         seen = np.full((jobs, 1 + chain.shape[1], table.count), np.nan)
         steps = self.steps = np.zeros((jobs, 2))
@@ -193,10 +190,10 @@ class Forward:
             seen[good] = found
         return seen
 
-    def _settings(self, table: InputTable, values: Values, sigma: Array, jobs: int) -> Array:
+    def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
         """rtol, guess of the unknown and its scale, limit of steps, absolute tolerances."""
         reduction = self.program.reduction
-        scales, unknown = natural_scales(reduction, values.arguments, sigma)
+        scales, unknown = natural_scales(reduction, values)
         size = len(reduction.names)
         settings = np.empty((jobs, 4 + size * (1 + self.size)))
         settings[:, 0] = self.rtol

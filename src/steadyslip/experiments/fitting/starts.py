@@ -20,7 +20,7 @@ from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
-from steadyslip.model.steady import steady_state
+from steadyslip.model.sliding import steady_state
 
 Array = np.ndarray
 NEARBY = 0.5  # share of the window of a time over which starts are spread

@@ -9,8 +9,8 @@ import numpy as np
 
 from steadyslip.core.quantities import shown, total
 from steadyslip.experiments.numerics.splitting import displacement_noise
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import steady_state
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import steady_state
 
 if TYPE_CHECKING:
     from steadyslip.experiments.fitting.result import Fit
@@ -167,7 +167,7 @@ def _noisy_drive(fit: Fit, part: Any) -> str | None:
         return None
     noise = displacement_noise(record.time, record.displacement)
     rig = fit.rig(0)
-    stiffness = float(model_values(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
+    stiffness = float(operating_point(rig).named()["slider.stiffness"]) + float(rig.drive.proportional())
     if record.normal is None:
         return None
     moved = noise * stiffness / float(record.normal[0])

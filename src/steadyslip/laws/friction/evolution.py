@@ -27,6 +27,10 @@ class Evolution(FrozenRecord, family="evolution law"):
         """Rate of bΘ (1/s) from bΘ itself."""
         return b * self.rate(v, b_theta / b, d_c, v_ref)
 
+    def divides(self) -> bool:
+        """Whether `scaled_rate` divides by b."""
+        return type(self).scaled_rate is Evolution.scaled_rate
+
     def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         """The usual state θ in seconds that belongs to Θ: Θ = ln(v* θ/d_c) unless stated otherwise."""
         return d_c / v_ref * sp.exp(state)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import sympy as sp
 
-from steadyslip.core.records import FrozenRecord
+from steadyslip.core.records import Condition, FrozenRecord
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
 
@@ -50,6 +51,18 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     def steady_strength(self, v: Expression, sigma: Expression) -> Expression:
         """Friction stress in steady sliding, τss(v, σ)."""
         return self.strength(v, sigma, self.steady_memory(v, sigma), sp.nan)
+
+    def direction(self, v: Expression, velocity: Expression) -> Expression:
+        """What motion takes for sign(v), wherever the law says sign: a step at rest cannot be integrated.
+
+        Unless overridden a smooth step: the block creeps at below a millionth of the drive's `velocity` where it would
+        stick. A law whose strength has no step at rest has no use for this.
+        """
+        return sp.tanh(v / (1e-6 * velocity))
+
+    def motion_conditions(self) -> Iterator[Condition]:
+        """Relations between numbers that motion needs beyond small perturbations; as `conditions`, named likewise."""
+        yield from ()
 
     def observables(
         self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression

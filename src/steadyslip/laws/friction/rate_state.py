@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import Problem
@@ -87,6 +88,16 @@ class RateState(FrictionLaw, name="rate-state"):
             total = sum(state.b for state in self.states)
             message = "Σb = 0 leaves no way to share α; give each state its own alpha"
             yield Condition("states", total != 0, message, (total,))
+
+    def motion_conditions(self) -> Iterator[Condition]:
+        if not self._is_scaled() or not self.evolution.divides():
+            return
+        message = (
+            f"got {{}}, with memory of normal stress; the rate of {self.evolution.name} divides by b: use a small b"
+        )
+        for number, (b, _, _) in enumerate(self._all_states(), start=1):
+            name = f"states.{number}.b" if self.states else "b"
+            yield Condition(name, np.asarray(b) != 0, message, (b,))
 
     # The parts of the law; each is valid for numbers and for symbols.
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.records import Parameter, checked_number
 from steadyslip.core.results import ReadOnly
-from steadyslip.model.point import checked_array
 
 Array = np.ndarray
 SPACINGS = ("linear", "log")

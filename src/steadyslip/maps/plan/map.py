@@ -19,7 +19,7 @@ from steadyslip.files.specifications.layout import find_law
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
 from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 from steadyslip.protocol import Protocol
 
 SECONDS = 0.5  # that a chunk should take: long beside the cost of handing it out, short enough to lose
@@ -158,7 +158,7 @@ class Map:
         axes = [a for a in self.axes if a.name in known and not known[a.name].role.adds_state]
         corners = np.meshgrid(*(a.values[[0, -1]] for a in axes), indexing="ij", sparse=True)
         try:
-            model_values(self.rig, {a.name: ends for a, ends in zip(axes, corners, strict=True)})
+            operating_point(self.rig, {a.name: ends for a, ends in zip(axes, corners, strict=True)})
         except ParameterError as error:
             return error.problems
         return ()
@@ -193,7 +193,7 @@ class Map:
         if any(one.moves for one in self.compute) and role.adds_state:
             return ()  # simulated regime by regime
         try:
-            model_values(self.rig, {name: np.asarray(values, dtype=float)}, scan=True)
+            operating_point(self.rig, {name: np.asarray(values, dtype=float)}, scan=True)
         except ParameterError as error:
             return error.problems
         except SteadyslipError as error:

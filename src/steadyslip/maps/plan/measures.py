@@ -24,7 +24,7 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.status import status
 from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
+from steadyslip.model.point import operating_point
 from steadyslip.motion import simulate_many
 from steadyslip.motion.many import EVENT_UNITS
 from steadyslip.motion.status import WORDS
@@ -99,7 +99,7 @@ class Measure(FrozenRecord, family="measure"):
         Must not depend on a clock: the size of chunks follows from it, and the same map gets the same chunks.
         """
         present = [name for name in probes if name in rig.parameters()]
-        return 1.2e-7 if has_closed_form(model_values(rig, None, present).model) else 4e-6
+        return 1.2e-7 if has_closed_form(operating_point(rig, None, present).model) else 4e-6
 
     def definition(self) -> dict[str, Any]:
         """Name and options, to tell whether two measures are the same."""
@@ -144,7 +144,7 @@ class StableStiffness(Measure, name="stable_stiffness"):
     """All stable stiffnesses as intervals; see `steadyslip.stable_stiffness`."""
 
     def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
-        values = model_values(rig, None, [n for n in varied if n in rig.parameters()])
+        values = operating_point(rig, None, [n for n in varied if n in rig.parameters()])
         one = has_closed_form(values.model)
         most = 1 if one else most_intervals(stiffness_polynomials(values)[0].shape[-1] - 1)
         extra = (("interval", most), ("end", 2))
@@ -171,7 +171,7 @@ class StabilityStatus(Measure, name="status"):
         return (Output("status", "1", "stability of steady sliding", STATUS),)
 
     def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        values = model_values(rig, vary)
+        values = operating_point(rig, vary)
         found = [np.broadcast_to(status(part), part.shape).reshape(-1) for part in values.pieces(32768)]
         return {"status": np.concatenate(found).reshape(values.shape)}
 

@@ -13,10 +13,10 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
-from steadyslip.model.steady import steady_states
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import steady_states
 from steadyslip.motion import History, simulate
-from steadyslip.motion.setup import prepare
+from steadyslip.motion.jobs import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED, OUTCOMES, Budget, Runs, outcomes_of
@@ -107,7 +107,7 @@ def basin(
     """
     steady_states(rig)  # raises, and says why
     drive = rig.drive.velocity
-    options = options_for(model_values(rig, branch=branch).model.inertial, rtol)
+    options = options_for(operating_point(rig, branch=branch).model.inertial, rtol)
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
     rest = rest_of(own, np.full(1, drive), np.zeros(1))
     length = float(rest.scales[0, own.reduction.names.index("x")])
@@ -159,6 +159,6 @@ def orbit(rig: Slider, cycle: Cycle, periods: float = 1.0) -> History:
         How many; unstable cycles leave themselves after a few.
     """
     names = dict(cycle.start)
-    if rig.friction.memory() and not model_values(rig).model.inertial:
+    if rig.friction.memory() and not operating_point(rig).model.inertial:
         names.pop("v")  # follows from the memory
     return simulate(rig, until=periods * cycle.period, initial=names, rtol=1e-10)

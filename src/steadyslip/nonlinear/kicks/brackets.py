@@ -103,7 +103,8 @@ def threshold_brackets(
     branch: int = 0,
 ) -> tuple[Brackets, Any, Any]:
     """`threshold_map` with brackets and reasons, as bare arrays; dimensions and coordinates of DataArrays beside."""
-    flat, _, shape, dims, coords = broadcast_arrays(rig, Protocol(), vary, {})
+    flat, _, together = broadcast_arrays(rig, Protocol(), vary, {})
+    shape = together.shape
     size = int(np.prod(shape, dtype=int))
     columns = [np.full(size, np.nan) for _ in range(3)] + [np.full(size, INTERRUPTED)]
     rounds = COARSE + int(np.ceil(np.log2(0.35 / precision)))
@@ -117,7 +118,7 @@ def threshold_brackets(
             search.run(precision)
             for column, own in zip(columns, search.result(), strict=True):
                 column[where] = own
-    return Brackets(*(column.reshape(shape) for column in columns)), dims, coords
+    return Brackets(*(column.reshape(shape) for column in columns)), together.dims or (), together.coords
 
 
 class _Search:

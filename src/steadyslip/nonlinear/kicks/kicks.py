@@ -14,8 +14,9 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import model_values
-from steadyslip.motion.setup import Jobs, Options, initial_values, prepare
+from steadyslip.model.point import operating_point
+from steadyslip.model.start import initial_values
+from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import Budget, Runs, continuous_at, outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
@@ -104,13 +105,13 @@ class Kicked:
             raise ParameterError(problems)
         self.kick, self.sign, self.budget = KICKS[kick], float(direction), Budget()
         self.from_other = kick == "velocity" and reference == "after"
-        values = model_values(rig, vary, branch=branch)
+        values = operating_point(rig, vary, branch=branch)
         if kick == "impulse" and "slider.mass" not in values.named():
             raise NotAvailable(
                 "an impulse needs a mass: without it the block takes any velocity at once; use a displacement or "
                 "normal-stress kick, or give the slider a mass"
             )
-        if values.model.imposed != 0:
+        if values.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no steady sliding to return to")
         self.size = max(values.size, 1)
         self.jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model.inertial, rtol), branch)
@@ -207,10 +208,8 @@ class Kicked:
 
     def _jobs(self, which: Array) -> Jobs:
         """The rigs `which` in steady sliding."""
-        values = self.jobs.values
-        cut = replace(values, arguments=tuple(picked(a, which) for a in values.arguments))
         return replace(
-            self.jobs, values=cut, sigma=self.sigma[which], initial=picked(self.jobs.initial, which),
+            self.jobs, point=self.jobs.point.part(which), initial=picked(self.jobs.initial, which),
             velocity=picked(self.jobs.velocity, which), size=len(which),
         )  # fmt: skip
 
@@ -218,12 +217,11 @@ class Kicked:
         """The same rigs in steady sliding at another velocity of the load point."""
         nothing = np.zeros(len(velocity))
         before = rest_of(jobs, velocity, nothing)
-        arguments, sigma = jobs.values.arguments, jobs.sigma
-        initial, speed = continuous_at(jobs.reduction, arguments, sigma, before.state, velocity, nothing)
+        initial, speed = continuous_at(jobs.reduction, jobs.point, before.state, velocity, nothing)
         return replace(jobs, initial=initial, velocity=speed)
 
     def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
         """The same rigs with another velocity of the block."""
         given = {"v": self.drive[which] + change}
-        initial, speed = initial_values(jobs.reduction, jobs.values, jobs.sigma, given)
+        initial, speed = initial_values(jobs.reduction, jobs.point, given)
         return replace(jobs, initial=initial, velocity=speed)

@@ -173,8 +173,8 @@ def rates_at(rest: Rest, states: Array) -> Array:
 
 def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
     """Rates (m, d, n) and velocity of the block (m, d) at states (m, d, n); NaN where forces cannot balance."""
-    given = (*(rest.column(np.asarray(a)) for a in rest.arguments), rest.sigma[:, None], rest.velocity[:, None])
-    given = (*given, rest.pressure[:, None])
+    numbers = (*rest.point.arguments, rest.sigma, rest.velocity, rest.pressure)
+    given = [rest.column(np.asarray(a)) for a in numbers]
     function, split = field_of(rest.reduction), np.moveaxis(states, 2, 0)
     shape = states.shape[:2]
     with np.errstate(all="ignore"):

@@ -10,16 +10,17 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from steadyslip.kernels.program import STATUSES, TALLY, Program
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
+from steadyslip.model.start import restored_of
 from steadyslip.motion.engine import LANES, run_chunk, run_many
-from steadyslip.motion.setup import Jobs
+from steadyslip.motion.jobs import Jobs
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.rest import Rest, picked, restored_of
+from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.protocol import Segments
 
 Array = np.ndarray
@@ -81,9 +82,7 @@ class Runs:
         which = np.full(count, one)
         rest, near = self.rest.part(which), self.near.part(which)
         nothing = np.zeros(count)
-        values = self.jobs.values
-        values = replace(values, arguments=tuple(picked(a, which) for a in values.arguments))
-        jobs = replace(self.jobs, values=values, sigma=rest.sigma, size=count)
+        jobs = replace(self.jobs, point=self.jobs.point.part(which), size=count)
         return Runs(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
 
     def times(self) -> tuple[Array, Array]:
@@ -131,14 +130,13 @@ def advanced_runs(
     jobs, rest = runs.jobs, runs.rest
     velocity, pressure = rest.velocity[which], rest.pressure[which]
     jump = runs.jump[which] if start is None else np.zeros(len(which))
-    arguments = tuple(picked(a, which) for a in jobs.values.arguments)
-    sigma = rest.sigma[which]
+    point = jobs.point.part(which)
     if start is None:
         initial, speed = picked(jobs.initial, which), picked(jobs.velocity, which)
     else:
-        initial, speed = continuous_at(jobs.reduction, arguments, sigma, start, velocity, pressure)
+        initial, speed = continuous_at(jobs.reduction, point, start, velocity, pressure)
     part = replace(
-        jobs, values=replace(jobs.values, arguments=arguments), sigma=sigma, initial=initial, velocity=speed,
+        jobs, point=point, initial=initial, velocity=speed,
         segments=constant_inputs(span, velocity, jump, pressure), size=len(which),
     )  # fmt: skip
     machine: Program = jobs.program(LANES, dense=True)
@@ -159,16 +157,15 @@ def advanced_runs(
 
 
 def continuous_at(
-    reduction: Reduction, arguments: tuple[Any, ...], sigma: Array, state: Array, velocity: Array, pressure: Array
+    reduction: Reduction, point: OperatingPoint, state: Array, velocity: Array, pressure: Array
 ) -> tuple[Array, Array]:
     """What a kernel starts from: the continuous variables, and a velocity near which to look for its own."""
     with np.errstate(all="ignore"):
-        found = restored_of(reduction)(*arguments, sigma, *state.T, velocity, 0.0, pressure, 0.0)
+        found = point.evaluate(restored_of(reduction), *state.T, velocity, 0.0, pressure, 0.0)
         initial = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), (len(state),)) for c in found])
         speed = np.array(velocity)
         if reduction.form == "eliminated":
-            drive = dict(zip(reduction.model.parameters, arguments, strict=True))["drive.velocity"]
-            speed = np.asarray(drive) * np.exp(state[:, reduction.names.index("w")])
+            speed = np.asarray(point.drive) * np.exp(state[:, reduction.names.index("w")])
     return np.ascontiguousarray(initial), speed
 
 

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import array_function
-from steadyslip.model import Model
+from steadyslip.core.questions import question
+from steadyslip.model import OperatingPoint
 from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W
-from steadyslip.motion.setup import Jobs, natural_scales
+from steadyslip.model.scales import natural_scales
+from steadyslip.motion.jobs import Jobs
 
 Array = np.ndarray
 S = sp.Symbol("s", positive=True)
@@ -37,42 +37,43 @@ class _Balance:
     state: Callable[..., list[Any]]
 
 
-@lru_cache(maxsize=64)
+@question
 def _balance(reduction: Reduction) -> _Balance:
     """The equation for the normal stress in steady sliding at v_lp and p, its slope, and the state there."""
     model = reduction.model
-    symbols, zero = model.symbols, sp.Integer(0)
+    contact, zero = model.contact, sp.Integer(0)
     velocity = model.parameters["drive.velocity"]
-    moved = {velocity: V_LP, model.sigma_ss: S}
-    memory = [m.symbol for m in model.variables if m.name not in ("x", "v", "integral")]
-    place: dict[sp.Symbol, sp.Expr] = {m: sp.sympify(model.steady[m]).xreplace(moved) for m in memory}
-    place |= {symbols["v"]: V_LP, symbols["acceleration"]: zero}
-    place[symbols["tau"]] = sp.sympify(model.steady[symbols["tau"]]).xreplace(moved)
+    moved = {velocity: V_LP, contact.sigma_ss: S}
+    place: dict[sp.Symbol, sp.Expr] = {
+        symbol: sp.sympify(model.steady[symbol]).xreplace(moved)
+        for symbol in (*(item.symbol for item in model.memory), contact.friction)
+    }
+    place |= {contact.velocity: V_LP, contact.acceleration: zero}
     inputs = {model.inputs["load_velocity"]: V_LP, model.inputs["disturbance"]: zero, model.inputs["time"]: zero}
     inputs[model.inputs["normal_disturbance"]] = P
     place |= inputs
 
-    def solved(stress: str, unknown: sp.Symbol, target: sp.Expr) -> sp.Expr:
+    def solved(stress: sp.Symbol, unknown: sp.Symbol, target: sp.Expr) -> sp.Expr:
         """What the definition of a stress, linear in `unknown`, needs to be `target`."""
-        definition = model.definitions[symbols[stress]].xreplace({s: e for s, e in place.items() if s is not unknown})
+        definition = model.definitions[stress].xreplace({s: e for s, e in place.items() if s is not unknown})
         return (target - definition.xreplace({unknown: zero})) / sp.diff(definition, unknown)
 
-    place[symbols["spring"]] = solved("tau", symbols["spring"], place[symbols["tau"]])
-    follows = symbols.get("integral", symbols["x"])
-    if follows is not symbols["x"]:
-        place[symbols["x"]] = zero
-    place[follows] = solved("spring", follows, place[symbols["spring"]])
-    residual = model.definitions[symbols["sigma"]].xreplace(place) - S
+    place[contact.spring] = solved(contact.friction, contact.spring, place[contact.friction])
+    follows = model.integrals[0].symbol if model.integrals else contact.slip
+    if follows is not contact.slip:
+        place[contact.slip] = zero
+    place[follows] = solved(contact.spring, follows, place[contact.spring])
+    residual = model.definitions[contact.normal].xreplace(place) - S
     slope = sp.diff(residual, S)
     w = reduction.w_of_v.xreplace(place)
     state = [w if symbol is W else place[symbol] for symbol in reduction.state]
     if reduction.unknown is not None:
         state.append(w if reduction.unknown is W else zero)
-    arguments = [*model.parameters.values(), model.sigma_ss, V_LP, P, S]
-    return _Balance(not slope.has(S), array_function(arguments, [residual, slope]), array_function(arguments, state))
+    further = (V_LP, P, S)
+    return _Balance(not slope.has(S), model.function([residual, slope], *further), model.function(state, *further))
 
 
-@lru_cache(maxsize=64)
+@question
 def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
     """Rates and the block's velocity, then the residual of the balance and its slope where there is an unknown left.
 
@@ -82,26 +83,17 @@ def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
     return _at_constant_inputs(reduction, [*reduction.rates, reduction.outputs["v"], *left])
 
 
-@lru_cache(maxsize=64)
+@question
 def _jacobian_of(reduction: Reduction) -> Callable[..., list[Any]]:
     return _at_constant_inputs(reduction, [entry for row in reduction.jacobian() for entry in row])
 
 
 def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> Callable[..., list[Any]]:
-    model = reduction.model
-    unknown = [] if reduction.unknown is None else [reduction.unknown]
-    arguments = [*model.parameters.values(), model.sigma_ss, V_LP, P, *reduction.state, *unknown]
+    unknown = () if reduction.unknown is None else (reduction.unknown,)
     still = {Q: sp.Integer(0), TIME: sp.Integer(0)}
     still |= {s: sp.Integer(0) for s in sp.symbols("v_lp_dot q_dot p_dot", real=True)}
-    return array_function(arguments, [sp.sympify(e).xreplace(still) for e in expressions])
-
-
-@lru_cache(maxsize=64)
-def restored_of(reduction: Reduction) -> Callable[..., list[Any]]:
-    """What a jump leaves unchanged, from the state: for starting a kernel anywhere."""
-    model = reduction.model
-    arguments = [*model.parameters.values(), model.sigma_ss, *reduction.state, V_LP, Q, P, TIME]
-    return array_function(arguments, list(reduction.restored))
+    at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
+    return reduction.model.function(at_rest, V_LP, P, *reduction.state, *unknown)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +103,8 @@ class Rest:
     Attributes
     ----------
     reduction : Reduction
-    arguments : tuple
-        Parameters, numbers or (m,).
-    sigma : ndarray (m,)
-        The rigs' own steady normal stress, which the equations refer to.
+    point : OperatingPoint
+        The rigs; numbers or (m,).
     velocity, pressure : ndarray (m,)
         Of the load point, m/s; added normal stress, Pa.
     state : ndarray (m, n)
@@ -130,8 +120,7 @@ class Rest:
     """
 
     reduction: Reduction
-    arguments: tuple[Any, ...]
-    sigma: Array
+    point: OperatingPoint
     velocity: Array
     pressure: Array
     state: Array
@@ -139,6 +128,11 @@ class Rest:
     scales: Array
     matrix: Array
     roots: Array
+
+    @property
+    def sigma(self) -> Array:
+        """The rigs' own steady normal stress, which the equations refer to, (m,)."""
+        return np.broadcast_to(self.point.stresses, self.velocity.shape)
 
     @property
     def exists(self) -> Array:
@@ -166,10 +160,9 @@ class Rest:
 
     def part(self, which: Array) -> Rest:
         """Some of the rigs."""
-        cut = tuple(picked(a, which) for a in self.arguments)
         own = (getattr(self, name)[which] for name in (
-            "sigma", "velocity", "pressure", "state", "unknown", "scales", "matrix", "roots"))  # fmt: skip
-        return Rest(self.reduction, cut, *own)
+            "velocity", "pressure", "state", "unknown", "scales", "matrix", "roots"))  # fmt: skip
+        return Rest(self.reduction, self.point.part(which), *own)
 
     def column(self, number: Any) -> Any:
         """A parameter as it broadcasts against (m, ...) arrays with one more axis."""
@@ -186,48 +179,44 @@ def rest_of(jobs: Jobs, velocity: Array, pressure: Array) -> Rest:
 
     Where there are several it is the one that the rig's own leads to as the inputs change.
     """
-    reduction, arguments, count = jobs.reduction, jobs.values.arguments, len(velocity)
-    sigma = np.broadcast_to(jobs.sigma, (count,))
-    given = (*arguments, sigma, velocity, pressure)
+    reduction, point, count = jobs.reduction, jobs.point, len(velocity)
     with np.errstate(all="ignore"):
-        stress = _stress(reduction, arguments, sigma, velocity, pressure, reduction.model)
+        stress = _stress(reduction, point, velocity, pressure)
         stress = np.where(stress > 0, stress, np.nan)
-        found = _columns(_balance(reduction).state(*given, stress), count)
+        found = _columns(point.evaluate(_balance(reduction).state, velocity, pressure, stress), count)
         n = len(reduction.state)
         state, unknown = found[:, :n], found[:, -1]
         state = np.where(np.all(np.isfinite(found), axis=1)[:, None], state, np.nan)
-        own, _ = natural_scales(reduction, arguments, sigma)
+        own, _ = natural_scales(reduction, point)
         if reduction.velocity == "linear":
             own["w"] = velocity
         scales = _columns([own[name] for name in reduction.names], count)
         left = () if reduction.unknown is None else (unknown,)
-        entries = _jacobian_of(reduction)(*given, *state.T, *left)
+        entries = point.evaluate(_jacobian_of(reduction), velocity, pressure, *state.T, *left)
         matrix = _columns(entries, count).reshape(count, n, n) * scales[:, None, :] / scales[:, :, None]
     good = np.all(np.isfinite(matrix), axis=(1, 2))
     roots = np.full((count, n), np.nan + 0j)
     if good.any():
         roots[good] = np.linalg.eigvals(matrix[good])
-    return Rest(reduction, arguments, sigma, velocity, pressure, state, unknown, scales, matrix, roots)
+    return Rest(reduction, point, velocity, pressure, state, unknown, scales, matrix, roots)
 
 
 def _columns(numbers: Any, count: int) -> Array:
     return np.column_stack([np.broadcast_to(np.asarray(x, dtype=float), (count,)) for x in numbers])
 
 
-def _stress(
-    reduction: Reduction, arguments: tuple[Any, ...], sigma: Array, velocity: Array, pressure: Array, model: Model
-) -> Array:
+def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressure: Array) -> Array:
     """Normal stress in steady sliding at the inputs: in closed form, or followed there from the rig's own."""
-    balance = _balance(reduction)
+    balance, sigma = _balance(reduction), np.broadcast_to(point.stresses, velocity.shape)
     if balance.affine:
-        at_zero, slope = balance.stress(*arguments, sigma, velocity, pressure, np.zeros(len(sigma)))
+        at_zero, slope = point.evaluate(balance.stress, velocity, pressure, np.zeros(len(sigma)))
         return np.broadcast_to(-np.asarray(at_zero) / slope, sigma.shape)
-    drive = np.asarray(dict(zip(model.parameters, arguments, strict=True))["drive.velocity"], dtype=float)
+    drive = np.asarray(point.drive, dtype=float)
     stress = np.array(sigma)
     for share in np.linspace(0, 1, STEPS + 1)[1:]:
         inputs = drive * (velocity / drive) ** share, share * pressure
         for _ in range(ROUNDS):
-            residual, slope = balance.stress(*arguments, sigma, *inputs, stress)
+            residual, slope = point.evaluate(balance.stress, *inputs, stress)
             change = -residual / slope
             stress = stress * np.exp(np.clip(change / stress, -1, 1))  # stays positive
             if not np.any(np.abs(change) > 1e-14 * stress):

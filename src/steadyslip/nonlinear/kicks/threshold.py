@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
-from steadyslip.model.steady import steady_states
+from steadyslip.model.sliding import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED, Budget
 from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep

@@ -24,8 +24,7 @@ from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import characteristic, in_chunks, stiffness_polynomials
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import Values, model_values
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.taylor import Taylor, taylor
 
 Array = np.ndarray
@@ -179,8 +178,8 @@ def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
         If the numbers of the rig are so far apart that rounding hides it.
     """
     name = edge.parameter
-    values = _flat(rig, name, [edge.value], branch)
-    found = coefficients(values, np.array([edge.angular_frequency]))
+    point = _flat(rig, name, [edge.value], branch)
+    found = coefficients(point, np.array([edge.angular_frequency]))
     if not np.isfinite(found["c1"][0]):
         raise NotAvailable(f"the kind of onset at {name} = {edge.value:.4g} is lost in rounding")
     return Onset(
@@ -198,9 +197,9 @@ def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
     )
 
 
-def _flat(rig: Slider, name: str, at: Any, branch: int) -> Values:
+def _flat(rig: Slider, name: str, at: Any, branch: int) -> OperatingPoint:
     present = (name,) if rig.parameters()[name].role.structural else ()
-    return model_values(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
+    return operating_point(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
 
 
 def _growth_slope(rig: Slider, name: str, edge: Boundary, branch: int) -> float:
@@ -246,27 +245,27 @@ def onset_map(rig: Slider, vary: Mapping[str, Any] | None = None) -> dict[str, A
     ParameterError
         If a name or value is not allowed.
     """
-    values = model_values(rig, vary)
+    point = operating_point(rig, vary)
     along = parameter_along(rig, "slider.stiffness")
-    place = list(values.model.parameters).index("drive.kp" if along == "drive.kp" else "slider.stiffness")
-    found = in_chunks(values, lambda part: _onsets(part, place))
+    place = list(point.model.parameters).index("drive.kp" if along == "drive.kp" else "slider.stiffness")
+    found = in_chunks(point, lambda part: _onsets(part, place))
     kind, edge, coefficient = np.moveaxis(np.asarray(found), -1, 0)
     return {
-        "kind": values.wrap(kind.astype(np.int8), "onset", "1"),
-        "edge": values.wrap(edge, "onset_edge", "Pa/m"),
-        "coefficient": values.wrap(coefficient, "onset_coefficient", "1/s"),
+        "kind": point.wrap(kind.astype(np.int8), "onset", "1"),
+        "edge": point.wrap(edge, "onset_edge", "Pa/m"),
+        "coefficient": point.wrap(coefficient, "onset_coefficient", "1/s"),
     }
 
 
-def _onsets(values: Values, place: int) -> Array:
+def _onsets(point: OperatingPoint, place: int) -> Array:
     """Kind, edge and c1 of each rig, (..., 3), along the stiffness or gain that is argument number `place`."""
-    arguments = list(values.arguments)
-    own = np.broadcast_to(arguments[place], values.shape).reshape(-1)
-    if list(values.model.parameters)[place] == "drive.kp":  # a gain acts as a spring would
+    arguments = list(point.arguments)
+    own = np.broadcast_to(arguments[place], point.shape).reshape(-1)
+    if list(point.model.parameters)[place] == "drive.kp":  # a gain acts as a spring would
         arguments[place] = 0.0
-    bare = replace(values, arguments=tuple(arguments))
-    found = stable_set(*(np.broadcast_to(c, (*values.shape, c.shape[-1])) for c in stiffness_polynomials(bare)))
-    count = values.size
+    bare = replace(point, arguments=tuple(arguments))
+    found = stable_set(*(np.broadcast_to(c, (*point.shape, c.shape[-1])) for c in stiffness_polynomials(bare)))
+    count = point.size
     edges, frequencies, changes = (a.reshape(count, -1) for a in (found.edges, found.frequencies, found.changes))
     usable = changes.astype(bool) & (frequencies > 0) & np.isfinite(frequencies)
     distance = np.where(usable, np.abs(edges - own[:, None]), np.inf)
@@ -275,9 +274,9 @@ def _onsets(values: Values, place: int) -> Array:
     result = np.full((count, 3), np.nan)
     result[:, 0] = NO_EDGE
     if len(rows):
-        flat = [np.broadcast_to(a, values.shape).reshape(-1)[rows] if np.ndim(a) else a for a in arguments]
+        flat = [np.broadcast_to(a, point.shape).reshape(-1)[rows] if np.ndim(a) else a for a in arguments]
         flat[place] = edges[rows, nearest[rows]]
-        at_edge = replace(values, arguments=tuple(flat), shape=(len(rows),))
+        at_edge = replace(point, arguments=tuple(flat), shape=(len(rows),))
         numbers = coefficients(at_edge, frequencies[rows, nearest[rows]])
         words = np.array(["", "supercritical", "subcritical", "degenerate"])
         known = np.isfinite(numbers["c1"])
@@ -285,15 +284,15 @@ def _onsets(values: Values, place: int) -> Array:
         result[rows, 0] = np.where(known, kind, NO_EDGE)
         result[rows, 1] = np.where(known, flat[place], np.nan)
         result[rows, 2] = numbers["c1"]
-    return result.reshape(*values.shape, 3)
+    return result.reshape(*point.shape, 3)
 
 
-def coefficients(values: Values, omega: Array) -> dict[str, Array]:
+def coefficients(point: OperatingPoint, omega: Array) -> dict[str, Array]:
     """First Lyapunov coefficients of rigs on an oscillatory edge.
 
     Parameters
     ----------
-    values : Values
+    point : OperatingPoint
         Flat arrays, (m,).
     omega : ndarray (m,)
         Angular frequency there, rad/s.
@@ -303,11 +302,10 @@ def coefficients(values: Values, omega: Array) -> dict[str, Array]:
     dict
         ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa), each (m,).
     """
-    sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
-    expansion = taylor(values, sigma)
+    expansion = taylor(point)
     size = max(len(omega), len(expansion.gradient))
     omega = np.broadcast_to(omega, (size,))
-    drive = np.broadcast_to(np.asarray(values.named()["drive.velocity"], dtype=float), (size,))
+    drive = np.broadcast_to(np.asarray(point.drive, dtype=float), (size,))
     return _projected(expansion, omega, drive)
 
 
@@ -332,7 +330,9 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
     left, _, right = np.linalg.svd(critical)
     q = columns * right[:, -1].conj()
     p = rows * left[:, :, -1]
-    v = expansion.system.velocity
+    place = expansion.system.place
+    contact = expansion.system.model.contact
+    v, spring = place(contact.velocity), place(contact.spring)
     q = q * (0.5 * drive / q[:, v])[:, None]
     p = p / np.sum(p.conj() * (q @ mass), axis=1)[:, None].conj()
     steady = -solve(gradient.astype(complex), expansion.quadratic(q, q.conj()))
@@ -346,7 +346,6 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
         )
     ]
     c1 = np.real(sum(terms))
-    spring = expansion.system.unknowns.index(expansion.system.model.symbols["spring"])
     with np.errstate(all="ignore"):
         share = np.abs(c1) / sum(np.abs(term) for term in terms)
     return {"c1": c1, "share": share, "stress_ratio": 2 * np.abs(q[:, spring])}

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range
@@ -21,7 +22,7 @@ from steadyslip.linear.polynomials import roots
 from steadyslip.linear.search import Search
 from steadyslip.linear.stiffness import characteristic
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import Values, checked_array, model_values
+from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.nonlinear.continuation import Curve, Failure, Point, turned_round
 from steadyslip.nonlinear.onset.hopf import coefficients, kinds, parameter_along
 
@@ -210,13 +211,13 @@ class _Plane:
         )
         return first, second, self.reference * np.exp(u[..., 2])
 
-    def values(self, u: Array) -> Values:
+    def values(self, u: Array) -> OperatingPoint:
         first, second, _ = self.parameters(u)
         for column, role in zip((first, second), self.roles, strict=True):
             if not np.all(role.domain.contains(column)):
                 raise Failure("outside the domain")
         both = dict(zip(self.names, (first, second), strict=True))
-        found = model_values(self.rig, both, self.present, self.branch, scan=True)
+        found = operating_point(self.rig, both, self.present, self.branch, scan=True)
         if not np.all(found.valid):
             raise Failure("outside the domain")
         return found

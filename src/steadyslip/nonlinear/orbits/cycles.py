@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import InternalError, ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import checked_array
 from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch

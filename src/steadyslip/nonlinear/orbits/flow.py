@@ -8,24 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import question
 from steadyslip.kernels.kernel import Choice
 from steadyslip.kernels.program import SETTINGS, Program, program
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import Values, model_values
-from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
-from steadyslip.model.steady import steady_stress
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.reduction import V_LP, Reduction
+from steadyslip.model.start import initial_values, restored_of
 from steadyslip.model.variational import with_sensitivities
 from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
+from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.motion.observe import observe
-from steadyslip.motion.setup import Jobs, Options, automatic_method, initial_values, prepare
 from steadyslip.motion.status import WORDS, remedy
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.protocol import Segments
@@ -45,15 +43,7 @@ class FlowFailure(Failure):
         self.status = status
 
 
-@lru_cache(maxsize=64)
-def _restored(reduction: Reduction) -> Any:
-    """Continuous variables from the state, for starting a kernel anywhere."""
-    model = reduction.model
-    arguments = [*model.parameters.values(), model.sigma_ss, *reduction.state, V_LP, Q, P, TIME]
-    return array_function(arguments, list(reduction.restored))
-
-
-@lru_cache(maxsize=64)
+@question
 def _with_sensitivities(reduction: Reduction, method: str) -> Program:
     return Program(with_sensitivities(reduction), Choice(method, dense=False))
 
@@ -66,9 +56,8 @@ class Setting:
     ----------
     value, unit : float
         The parameter, and the size of change that derivatives in it refer to.
-    values : Values
-        Of the model, arrays of one number.
-    sigma : ndarray (1,)
+    point : OperatingPoint
+        Arrays of one number.
     inputs : ndarray (3,)
         Load-point velocity (m/s), disturbance and added normal stress (Pa).
     plain, varied : tuple of ndarray
@@ -77,8 +66,7 @@ class Setting:
 
     value: float
     unit: float
-    values: Values
-    sigma: Array
+    point: OperatingPoint
     inputs: Array
     plain: tuple[Array, Array]
     varied: tuple[Array, Array]
@@ -121,7 +109,7 @@ class Runs:
     def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None) -> None:
         if not jobs.posed[which if len(jobs.posed) > 1 else 0]:
             raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
-        if jobs.values.model.imposed != 0:
+        if jobs.point.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
         self.reduction, self.size = jobs.reduction, len(jobs.reduction.state)
         method = automatic_method(self.reduction)
@@ -132,11 +120,10 @@ class Runs:
         self.finest = self.noise / self.options.rtol
         self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
         self.sensitive = _with_sensitivities(self.reduction, method)
-        arguments, sigma = jobs.part(which, which + 1)
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
-        own = replace(jobs.values, arguments=tuple(np.atleast_1d(a) for a in arguments), shape=(1,))
+        own = jobs.point.part(slice(which, which + 1))
         inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
-        self.own = self._set(own, np.atleast_1d(sigma), inputs)
+        self.own = self._set(own, inputs)
         self.scales = self.own.plain[1][0, -self.size :] / self.options.rtol
         self.time = float(self.scales[0] / self.own.drive)
 
@@ -147,24 +134,24 @@ class Runs:
         return self.own
 
     def _set(
-        self, values: Values, sigma: Array, inputs: Array, value: float = 0.0, unit: float = 1.0,
+        self, point: OperatingPoint, inputs: Array, value: float = 0.0, unit: float = 1.0,
         rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
     ) -> Setting:  # fmt: skip
         """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
-        constants = self.machine.constants(values.arguments, sigma)
-        settings = self._settings_at(values, sigma, value)
+        constants = self.machine.constants(point)
+        settings = self._settings_at(point, value)
         scales = settings[0, -self.size :]
         ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
         varied = np.concatenate([settings[0], ratio, scales])[None]
-        found = self.sensitive.constants(values.arguments, sigma)
+        found = self.sensitive.constants(point)
         varying = self.sensitive.kernel.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
-        return Setting(value, unit, values, sigma, inputs, (constants, settings), (varying, varied))
+        return Setting(value, unit, point, inputs, (constants, settings), (varying, varied))
 
-    def _settings_at(self, values: Values, sigma: Array, value: float) -> Array:
+    def _settings_at(self, point: OperatingPoint, value: float) -> Array:
         """What kernels are told beside constants: sizes mostly, which hold in the neighbourhood of a parameter."""
         at, settings = self._near
         if not len(settings) or abs(value - at) > NEIGHBOURHOOD * abs(at):
-            jobs = replace(self.base, values=values, sigma=sigma)
+            jobs = replace(self.base, point=point)
             settings = jobs.tables(self.machine, self.which, self.which + 1, True, True)[2]
             self._near = value, settings
         return settings
@@ -202,10 +189,7 @@ class Runs:
         return finer
 
     def _continuous(self, setting: Setting, states: Array) -> Array:
-        with np.errstate(all="ignore"):
-            found = _restored(self.reduction)(
-                *map(np.asarray, setting.values.arguments), setting.sigma, *states.T, *setting.inputs, 0.0
-            )
+        found = setting.point.evaluate(restored_of(self.reduction), *states.T, *setting.inputs, 0.0)
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
     def _advanced(
@@ -261,7 +245,7 @@ class Runs:
             rows[None, :, 0], rows[None, :, 1], rows[None, :, 2], rows[None, :, 3:6], rows[None, :, 6:9],
             waves, waves, waves,
         )  # fmt: skip
-        jobs = replace(self.base, values=setting.values, sigma=setting.sigma, segments=segments)
+        jobs = replace(self.base, point=setting.point, segments=segments)
         zero = np.zeros(len(times), dtype=int)
         return observe(jobs, self.machine, 0, zero, zero, times, states)
 
@@ -305,35 +289,34 @@ class Flow(Runs):
     def _made(self, value: float) -> Setting:
         if not self.domain.contains(value):
             raise Failure(f"{self.name} leaves its domain")
-        values = self._varied(np.array([value]))
-        sigma = np.atleast_1d(np.asarray(steady_stress(values), dtype=float))
-        if not sigma[0] > 0:
+        point = self._varied(np.array([value]))
+        if not point.stresses[0] > 0:
             raise Failure("lock-up or lift-off: steady sliding ceases to exist")
         unit = abs(value) or 1.0
-        drive = np.ravel(values.named()["drive.velocity"])[0]
-        return self._set(values, sigma, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
+        drive = np.ravel(point.drive)[0]
+        return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))
 
     def _rates(self, value: float, unit: float) -> tuple[Array, Mapping[sp.Symbol, Array]]:
         """How fast constants and inputs change with the parameter, per unit: central differences."""
         beside = self._varied(value + DIFFERENCE * unit * np.array([1.0, -1.0]))
-        found = self.sensitive.constants(beside.arguments, steady_stress(beside))
+        found = self.sensitive.constants(beside)
         if len(found) == 1:
             found = np.repeat(found, 2, axis=0)
         rates = (found[0] - found[1]) / (2 * DIFFERENCE)
         drive = np.broadcast_to(beside.named()["drive.velocity"], (2,))
         return rates[None, None], {V_LP: (drive[:1] - drive[1:])[None] / (2 * DIFFERENCE)}
 
-    def _varied(self, around: Array) -> Values:
+    def _varied(self, around: Array) -> OperatingPoint:
         """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
         if self.rig.axial_stiffness is None:
-            named = self.base.values.named() | {self.name: around}
-            return replace(self.base.values, arguments=tuple(named.values()))
-        return model_values(self.rig, {self.name: around}, self.present, self.branch, scan=True)
+            named = self.base.point.named() | {self.name: around}
+            return self.base.point.with_arguments(named.values(), np.shape(around))
+        return operating_point(self.rig, {self.name: around}, self.present, self.branch, scan=True)
 
     def steady(self, value: float) -> Array:
         """State in steady sliding."""
         setting = self.setting(value)
-        continuous, _ = initial_values(self.reduction, setting.values, setting.sigma, {})
+        continuous, _ = initial_values(self.reduction, setting.point, {})
         where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
         guess = setting.plain[1][0, SETTINGS.index("guess")]
         return np.array([where.get(symbol, guess) for symbol in self.reduction.state])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.program import LOG_KINDS
-from steadyslip.motion.setup import Jobs
+from steadyslip.motion.jobs import Jobs
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.branch import Cycle
 from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, Setting

@@ -1,0 +1,136 @@
+"""Arrays in place of a record's numbers: the one place where they are checked and broadcast."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, Problem, QuantityError
+from steadyslip.core.quantities import parse
+from steadyslip.core.records import FrozenRecord, Parameter, conditions, twin
+
+
+def checked_array(name: str, role: Parameter, value: Any) -> Any:
+    """A varied parameter as float array inside its domain; a DataArray keeps its dimensions.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter, the first bad value and its position.
+    """
+    if hasattr(value, "dims"):
+        return value.copy(data=np.asarray(checked_array(name, role, value.values)))
+    if isinstance(value, str):
+        try:
+            value = parse(value, role.unit)
+        except QuantityError as error:
+            raise ParameterError([Problem(name, str(error))]) from error
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ParameterError([Problem(name, f"got {value!r}; allowed: numbers in {role.unit}")]) from error
+    if not array.size:
+        raise ParameterError([Problem(name, "got an empty array; give at least one value")])
+    if not (role.domain.contains(array.min()) and role.domain.contains(array.max())):
+        good = np.atleast_1d(role.domain.contains(array))
+        where = tuple(int(i) for i in np.argwhere(~good)[0])
+        bad = float(np.atleast_1d(array)[where])
+        raise ParameterError(
+            [Problem(name, f"got {bad!r} at position {where}; allowed: {role.domain.text} in {role.unit}")]
+        )
+    return array if array.ndim else float(array)
+
+
+def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:
+    """Refuse arrays of a record's numbers that break a condition which they obey together.
+
+    Raises
+    ------
+    ParameterError
+        Naming the parameter, the first bad value and its position.
+    """
+    found = conditions(twin(record, varied, prefix), prefix)
+    problems = [p for name, condition in found if (p := condition.problem(name)) is not None]
+    if problems:
+        raise ParameterError(problems)
+
+
+def valid_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> Any:
+    """Where all those conditions hold."""
+    valid: Any = True
+    for _, condition in conditions(twin(record, varied, prefix), prefix):
+        valid = valid & np.asarray(condition.holds)
+    return valid
+
+
+@dataclass(frozen=True)
+class Together:
+    """Arrays of one broadcast shape.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray or float
+        As they came; of DataArrays the numbers, with the dimensions of all.
+    shape : tuple of int
+    dims, coords
+        Of DataArrays, if there are any; else None.
+    """
+
+    values: dict[str, Any]
+    shape: tuple[int, ...]
+    dims: tuple[str, ...] | None = None
+    coords: Any = None
+
+    def flat(self) -> dict[str, Any]:
+        """Arrays of one dimension and equal length; single values as they are."""
+        return {n: np.broadcast_to(v, self.shape).reshape(-1) if np.ndim(v) else v for n, v in self.values.items()}
+
+    @property
+    def wrap(self) -> Callable[..., Any]:
+        """Turns a result with leading axes `shape` into what came: ``wrap(array, name, unit, extra_dims)``."""
+        return _bare if self.dims is None else self._labelled
+
+    def _labelled(self, array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) -> Any:
+        import xarray as xr
+
+        return xr.DataArray(
+            array, dims=(*(self.dims or ()), *extra_dims), coords=self.coords, name=name, attrs={"units": unit}
+        )
+
+
+def _bare(array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) -> Any:
+    return array if np.ndim(array) else np.asarray(array).item()
+
+
+def broadcast(named: Mapping[str, Any]) -> Together:
+    """Arrays as NumPy broadcasts them, DataArrays by the names of their dimensions.
+
+    Raises
+    ------
+    ParameterError
+        If their shapes do not go together, one is empty, or a bare array stands beside DataArrays.
+    """
+    problems = [Problem(n, "got an empty array; give at least one value") for n, v in named.items() if not np.size(v)]
+    labelled = {name: value for name, value in named.items() if hasattr(value, "dims")}
+    values: dict[str, Any] = dict(named)
+    dims, coords = None, None
+    if labelled:
+        import xarray as xr
+
+        bare = [name for name, value in named.items() if name not in labelled and np.ndim(value)]
+        problems += [Problem(name, "is a bare array beside DataArrays; name its dimensions") for name in bare]
+        together = xr.broadcast(*labelled.values())
+        dims, coords = tuple(map(str, together[0].dims)), together[0].coords
+        values |= {name: array.values for name, array in zip(labelled, together, strict=True)}
+    shape: tuple[int, ...] = ()
+    try:
+        shape = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in values.items())
+        problems.append(Problem("vary", f"shapes do not broadcast: {shapes}"))
+    if problems:
+        raise ParameterError(problems)
+    return Together(values, shape, dims, coords)

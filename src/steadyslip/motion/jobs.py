@@ -1,0 +1,199 @@
+"""Runs to be made: an operating point, a protocol and starting values as the arrays that kernels take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.records import twin
+from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.methods import METHODS as TABLEAUS
+from steadyslip.kernels.program import Program, program
+from steadyslip.machine.slider import Slider
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.reduction import Reduction, reduce_model
+from steadyslip.model.scales import eliminable, natural_scales, posed
+from steadyslip.model.start import guess, initial_values
+from steadyslip.protocol import Protocol, Segments, pack
+
+METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
+TIGHT = 0.0  # rtol up to which the explicit pair of order 8 is chosen
+BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
+CONTACT_SHARE = 1e-9  # of the steady normal stress: below, contact is lost
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to integrate and what to watch.
+
+    Attributes
+    ----------
+    method : str
+        ``auto``, ``explicit``, ``rosenbrock`` or a method's own name.
+    rtol : float
+        Error allowed per step, relative to each variable's size or scale; the scale is 1 for ln v.
+    most_steps : int
+        Limit of steps.
+    arrest : float
+        Share of the drive velocity below which the block counts as arrested.
+    """
+
+    method: str = "auto"
+    rtol: float = 1e-7
+    most_steps: int = 10_000_000
+    arrest: float = 1e-3
+
+    def __post_init__(self) -> None:
+        problems = []
+        if self.method not in METHODS:
+            problems.append(Problem("method", unknown_name("method", self.method, METHODS)))
+        checks = {"rtol": 1e-14 <= self.rtol <= 0.1, "arrest": 0 <= self.arrest < 1, "most_steps": self.most_steps >= 1}
+        allowed = {"rtol": "a number from 1e-14 to 0.1", "arrest": "a number from 0 to below 1",
+                   "most_steps": "a whole number >= 1"}  # fmt: skip
+        for name, good in checks.items():
+            if not good:
+                problems.append(Problem(name, f"got {getattr(self, name)!r}; allowed: {allowed[name]}"))
+        if problems:
+            raise ParameterError(problems)
+
+
+@dataclass(frozen=True, eq=False)
+class Jobs:
+    """Everything about a set of trajectories except the kernel that runs them.
+
+    Attributes
+    ----------
+    point : OperatingPoint
+        Of all rigs, flat.
+    segments : Segments
+    initial : ndarray (jobs, continuous variables)
+    velocity : ndarray (jobs,)
+        At the start, m/s.
+    reduction : Reduction
+    eliminate : int or None
+        The memory variable that follows from the balance.
+    options : Options
+    size : int
+    """
+
+    point: OperatingPoint
+    segments: Segments
+    initial: np.ndarray
+    velocity: np.ndarray
+    reduction: Reduction
+    eliminate: int | None
+    options: Options
+    size: int
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Steady normal stress, NaN where there is no steady sliding."""
+        return self.point.stresses
+
+    @property
+    def posed(self) -> np.ndarray:
+        """Whether the equations determine the motion near steady sliding; see `steadyslip.model.scales.posed`."""
+        return posed(self.point)
+
+    def choice(self, lanes: int, dense: bool) -> Choice:
+        """The kernel that these jobs need."""
+        method = METHODS[self.options.method] or automatic_method(self.reduction, self.options.rtol)
+        harmonics = self.segments.amplitude.shape[-1]
+        return Choice(method, self.segments.level(), harmonics, lanes, dense)
+
+    def program(self, lanes: int, dense: bool) -> Program:
+        return program(self.reduction.model, self.choice(lanes, dense), self.eliminate)
+
+    def tables(self, machine: Program, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
+        """Constants, initial, settings and segment rows of some jobs."""
+        point, options = self.point.part(slice(start, stop)), self.options
+        constants = machine.constants(point)
+        scales, unknown = natural_scales(self.reduction, point)
+        initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
+        velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
+        sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in self.reduction.names)))
+        settings = machine.settings(
+            {
+                "rtol": options.rtol,
+                "most_steps": options.most_steps,
+                "v_high": point.drive * BLOW_UP,
+                "v_low": point.drive * options.arrest,
+                "sigma_low": CONTACT_SHARE * point.stresses,
+                "watch": float(watch),
+                "record": float(record),
+                "guess": guess(self.reduction, point, initial, velocity),
+                "z_scale": unknown,
+                "first_step": scales["x"] / point.drive,
+                "v_drive": point.drive,
+            },
+            options.rtol * sizes,
+        )
+        return constants, initial, settings, self.segments.rows(start, stop)
+
+
+def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
+    """Explicit for massless models in ln v or asinh, which are not stiff; Rosenbrock for the others.
+
+    Mass makes the stick phase stiff (rate a/m*), bristles the whole motion. Of the explicit pairs that of order 8 needs
+    less time for a given error where tolerances are tight: `benchmarks/methods.py`.
+    """
+    if reduction.model.inertial or reduction.velocity == "linear":
+        return "rodas4"
+    return "dop853" if rtol <= TIGHT else "tsit5"
+
+
+def prepare(
+    rig: Slider,
+    protocol: Any,
+    until: Any,
+    vary: Mapping[str, Any],
+    initial: Mapping[str, Any],
+    options: Options,
+    branch: int = 0,
+) -> Jobs:
+    """Check everything and bring it into arrays.
+
+    Parameters
+    ----------
+    vary : mapping
+        Parameters of the rig and, as ``protocol.pieces.1.to`` or ``protocol.until``, of the protocol: flat arrays
+        of equal length or numbers.
+    initial : mapping
+        Starting values of model variables, as `vary`.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    NotAvailable
+        If the rig cannot move as asked.
+    """
+    own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
+    plan = Protocol.of(protocol).varied({name: value for name, value in vary.items() if name not in own})
+    point = operating_point(rig, own, branch=branch)
+    _refuse_singular(rig, point)
+    final = plan.until if until is None else until
+    if final is None:
+        raise ParameterError([Problem("until", "missing; give the end of the run in s, such as until=200")])
+    segments = pack(plan, point.drive, final)
+    if np.any(segments.jump) and (rig.damping or rig.drive.derivative()):
+        raise ParameterError(
+            [Problem("protocol", "a displacement step through a dashpot (slider.damping, a derivative gain) is an "
+                     "infinite force; use a short velocity step instead")]
+        )  # fmt: skip
+    eliminate = eliminable(point)
+    reduction = reduce_model(point.model, eliminate)
+    start, velocity = initial_values(reduction, point, initial)
+    size = max(len(point.stresses), len(segments.start), len(start), *(np.size(a) for a in point.arguments), 1)
+    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
+
+
+def _refuse_singular(rig: Slider, point: OperatingPoint) -> None:
+    """What the friction law says cannot be followed beyond small motions."""
+    for condition in twin(rig, point.named()).friction.motion_conditions():
+        if (problem := condition.problem()) is not None:
+            raise NotAvailable(f"friction.{problem}")

@@ -1,13 +1,17 @@
-"""Random kicks of random rigs against long integrations by SciPy, and thresholds against motion on both sides.
+"""Random kicks of random rigs against long integrations by SciPy and long simulations; thresholds and basins likewise.
 
-    python benchmarks/kicks.py [--kicks 300] [--thresholds 40] [--seed 1] [--only aging-mass,...]
+    python benchmarks/kicks.py [--kicks 300] [--thresholds 60] [--basins 6] [--seed 1] [--only "aging mass level,..."]
 
-Prints each disagreement and a table: right, wrong, undecided, unclear to the reference itself; CPU seconds.
+Every law (two states, Nagata, LuGre), with and without mass or radiation damping, level and tilted contacts, every
+kind of kick, stable and unstable rigs. Prints each disagreement and tables: right (found is what both say, or what one
+says where the other cannot tell), wrong, undecided, unclear (neither can tell); CPU seconds. A threshold is right where
+the outcome changes at .99 and 1.01 of it, and simulation says so too where it can tell.
 """
 
 import argparse
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,55 +19,109 @@ import numpy as np
 import steadyslip as ss
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from kicks_at_random import KINDS, Reference, drawn, outcome_of
+from kicks_at_random import KINDS, Reference, drawn, judged, outcome_of, simulated
+
+EVERY = 25  # lines of the table
+
+
+def word_of(found: str, truths: tuple[str, ...]) -> str:
+    """Right, wrong, undecided or unclear."""
+    told = {truth for truth in truths if truth != "?"}
+    if found == "undecided":
+        return found
+    if not told:
+        return "unclear"
+    return "right" if told == {found} else "wrong"
+
+
+def kicks(count: int, random: np.random.Generator, only: tuple[str, ...]) -> None:
+    counts: Counter[str] = Counter()
+    both = 0
+    spent = np.zeros(3)
+    for i in range(count):
+        case = drawn(random, only)
+        found, truths, times = "", [], [time.process_time()]
+        for route in (outcome_of, lambda case: Reference(case).outcome(), simulated):
+            truths.append(route(case))
+            times.append(time.process_time())
+        spent += np.diff(times)
+        found, *truths = truths
+        word = word_of(found, tuple(truths))
+        counts[word] += 1
+        both += word == "right" and "?" not in truths
+        if word != "right":
+            print(f"{word}: {found} (SciPy: {truths[0]}, simulated: {truths[1]}): {case}", flush=True)
+        if i + 1 == count or (i + 1) % EVERY == 0:
+            costs = "CPU {:.0f} s, SciPy {:.0f} s, simulations {:.0f} s".format(*spent)
+            print(f"kicks {i + 1}: {dict(counts)}, right by both {both}; {costs}", flush=True)
+
+
+def thresholds(count: int, random: np.random.Generator, only: tuple[str, ...]) -> None:
+    """Until so many have been found; those of unstable rigs, and where no kick fails, are counted beside."""
+    counts: Counter[str] = Counter()
+    spent = []
+    while sum(counts.values()) - counts["none fails"] - counts["unstable"] < count:
+        case = drawn(random, only)
+        begun = time.process_time()
+        limit = ss.threshold(case.rig, case.kick, direction=case.direction, reference=case.reference, precision=1e-5)
+        spent.append(time.process_time() - begun)
+        if limit.size in (0, np.inf):
+            counts["unstable" if limit.size == 0 else "none fails"] += 1
+            continue
+        word, pair, truths = "undecided", [], []
+        if limit.size > 0:
+            pair = [outcome_of(case, limit.size * factor) for factor in (0.99, 1.01)]
+            truths = [simulated(case, limit.size * factor) for factor in (0.99, 1.01)]
+            beyond = limit.edge or pair[1] != "undecided"
+            word = "right" if pair[0] == "returns" != pair[1] and beyond else "wrong"
+            word = "undecided" if word == "wrong" and "undecided" in pair else word
+            if truths[0] not in ("returns", "?") or truths[1] == "returns":
+                word = "wrong" if word == "right" else word
+        counts[word] += 1
+        if word != "right":
+            print(f"{word}: {pair} (simulated: {truths}), {limit}: {case}", flush=True)
+        if sum(counts.values()) % EVERY == 0:
+            print(f"thresholds: {dict(counts)}", flush=True)
+    print(f"thresholds: {dict(counts)}; CPU median {np.median(spent):.1f} s, largest {max(spent):.1f} s", flush=True)
+
+
+def basins(count: int, random: np.random.Generator, only: tuple[str, ...]) -> None:
+    """Thirty starting points of each rig."""
+    counts: Counter[str] = Counter()
+    for _ in range(count):
+        case = drawn(random, only)
+        rig, reference = case.rig, Reference(case)
+        drive = rig.drive.velocity
+        x, v = reference.length * np.linspace(-20, 8, 6), drive * np.geomspace(0.1, 30, 5)
+        found = ss.basin(rig, x, v, progress=False)
+        end = 200 * 2 * np.pi / abs(case.kicked().rest.leading[0]) + 3 * abs(x[0]) / drive
+        for i, j in np.ndindex(found.outcome.shape):
+            run = ss.simulate(rig, until=end, initial={"x": x[j], "v": v[i]}, times=np.linspace(0, end, 8001),
+                              rtol=1e-9, events=False, most_steps=3_000_000)  # fmt: skip
+            truth = run.status if run.status in ("blow-up", "contact lost") else "?"
+            if run.status == "done":
+                truth = judged(reference.from_load(run["v"] / drive))
+            word = word_of(str(found.outcome[i, j]), (truth,))
+            counts[word] += 1
+            if word != "right":
+                print(
+                    f"{word}: {found.outcome[i, j]} (simulated: {truth}) from x={x[j]!r}, v={v[i]!r}: {case}",
+                    flush=True,
+                )
+    print(f"basins: {dict(counts)}", flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kicks", type=int, default=300)
-    parser.add_argument("--thresholds", type=int, default=40)
+    parser.add_argument("--thresholds", type=int, default=60)
+    parser.add_argument("--basins", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default=",".join(KINDS))
     options = parser.parse_args()
-    random, only = np.random.default_rng(options.seed), tuple(options.only.split(","))
-    counts = dict.fromkeys(("right", "wrong", "undecided", "unclear"), 0)
-    own = other = 0.0
-    for _ in range(options.kicks):
-        case = drawn(random, only)
-        start = time.process_time()
-        found = outcome_of(case)
-        middle = time.process_time()
-        truth = Reference(case).outcome()
-        own, other = own + middle - start, other + time.process_time() - middle
-        word = (
-            "undecided"
-            if found == "undecided"
-            else "unclear"
-            if truth == "?"
-            else "right"
-            if found == truth
-            else "wrong"
-        )
-        counts[word] += 1
-        if word != "right":
-            print(f"{word}: {found} (reference: {truth}): {case}", flush=True)
-    print(f"kicks: {counts}; CPU {own:.1f} s, SciPy {other:.1f} s", flush=True)
-    counts = dict.fromkeys(("change", "none", "wrong", "undecided"), 0)
-    start = time.process_time()
-    for _ in range(options.thresholds):
-        case = drawn(random, only)
-        limit = ss.threshold(case.rig, case.kick, direction=case.direction)
-        if limit.size in (0, np.inf):
-            counts["none"] += 1
-            continue
-        pair = [outcome_of(case, limit.size * factor) for factor in (0.99, 1.01)] if limit.size > 0 else ["undecided"]
-        good = pair[0] == "returns" and pair[-1] not in ("returns", "undecided")
-        word = "change" if good else "undecided" if "undecided" in pair else "wrong"
-        word = "change" if limit.edge and pair[0] == "returns" and pair[-1] != "returns" else word
-        counts[word] += 1
-        if word != "change":
-            print(f"{word}: {pair}, {limit}: {case}", flush=True)
-    print(f"thresholds: {counts}; CPU {time.process_time() - start:.1f} s")
+    only = tuple(options.only.split(","))
+    for part, count in ((kicks, options.kicks), (thresholds, options.thresholds), (basins, options.basins)):
+        part(count, np.random.default_rng(options.seed), only)
 
 
 if __name__ == "__main__":

@@ -359,13 +359,18 @@ def test_doubt_has_a_colour():
 # -- a fixed part of benchmarks/kicks.py
 
 
-def test_random_kicks_equal_scipy():
-    """Massless and tilted here; the other kinds by hand."""
+FEW = ("slip massless tilted", "slip mass level", "lugre mass level", "nagata massless level")
+
+
+@pytest.mark.parametrize("kind", FEW)
+def test_random_kicks_equal_scipy(kind):
+    """Of a few kinds here, that kernels are compiled for anyway; the others by hand."""
+    assert kind in KINDS
     random = np.random.default_rng(11)
     told = 0
-    for _ in range(12):
-        case = drawn(random, KINDS[:1])
-        found, truth = outcome_of(case), Reference(case).outcome()
+    for _ in range(4):
+        case = drawn(random, (kind,))
+        found, truth = outcome_of(case), Reference(case).outcome(limit=2.0)
         assert found in (truth, "undecided") or truth == "?", str(case)
         told += found == truth
-    assert told >= 10
+    assert told >= 2

@@ -561,7 +561,8 @@ def test_command_line_writes_branch_and_thresholds(tmp_path):
     """Files by their ending, JSON that is JSON, and errors in words."""
     import json
 
-    from test_command_line import EXAMPLE, run
+    from command import run
+    from test_command_line import EXAMPLE
 
     stick_slip = EXAMPLE.with_name("stick-slip.toml")
     files = [str(tmp_path / name) for name in ("b.nc", "b.csv", "b.svg")]

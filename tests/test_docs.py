@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import steadyslip as ss
+from command import run
 from steadyslip.linear import paper
 
 ROOT = Path(__file__).parents[1]
@@ -152,7 +153,7 @@ def test_commands_print_what_the_page_shows(page, tmp_path):
         elif name == "echo $?":
             assert text == f"{status}\n"
         else:
-            status, printed = run(name, tmp_path)
+            status, printed = shown(name, tmp_path)
             assert "Traceback" not in printed
             same = doctest.OutputChecker().check_output(rounded(text), rounded(printed), COMPARE)
             assert same, f"$ {name}\n{printed}"
@@ -163,19 +164,13 @@ def rounded(text: str) -> str:
     return re.sub(r"\d+\.\d+(e[-+]\d+)?", lambda m: f"{float(m[0]):.10g}" if len(m[0]) > 10 else m[0], text)
 
 
-def run(command: str, folder: Path) -> tuple[int, str]:
-    """Status and output of `steadyslip ...` or `python3 run.py ...`, in a process of its own."""
+def shown(command: str, folder: Path) -> tuple[int, str]:
+    """Status and output of `steadyslip ...` or `python3 run.py ...`."""
     arguments = shlex.split(command)
     if arguments[:2] == ["python3", "run.py"]:
         arguments = ["steadyslip", *arguments[2:]]
     assert arguments[0] == "steadyslip", command
-    done = subprocess.run(
-        [sys.executable, "-m", *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        encoding="utf-8",
-    )
+    done = run(*arguments[1:], folder=folder, together=True)
     return done.returncode, done.stdout
 
 

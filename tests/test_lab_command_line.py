@@ -10,9 +10,9 @@ import pytest
 
 import lab_records as lab
 import steadyslip as ss
+from command import run
 from steadyslip.experiments.spec import spec_from_text
 from steadyslip.report import fit_report
-from test_command_line import run
 
 BASALT = "examples/data/basalt_b819_velocity_step.txt"
 

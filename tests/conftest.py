@@ -1,9 +1,78 @@
-"""Random examples: fresh ones on a developer's machine, the same ones every time in continuous integration."""
+"""Random examples, which tests are slow, and how long each takes.
+
+Fresh random examples on a developer's machine, the same ones every time in continuous integration. What
+``-m "not slow"`` leaves out is listed in slow.txt: each test, and how many of its parameters come before.
+``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.
+"""
 
 import os
+from itertools import accumulate
+from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("ci", derandomize=True, deadline=None)
 if os.environ.get("CI"):
     settings.load_profile("ci")
+
+SLOW = Path(__file__).with_name("slow.txt")
+QUICK = 0.5  # CPU seconds that a test, with all of its parameters, may take before the rest of them is slow
+
+
+def pytest_addoption(parser):
+    parser.addoption("--measure", action="store_true", help="write which tests are slow to tests/slow.txt; with -n 0")
+
+
+def pytest_collection_modifyitems(items):
+    listed = (line.rsplit(" ", 1) for line in SLOW.read_text(encoding="utf-8").splitlines())
+    left = {test: int(quick) for test, quick in listed}
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        if test in left:
+            if not left[test]:
+                item.add_marker(pytest.mark.slow)
+            left[test] -= left[test] > 0
+
+
+def pytest_configure(config):
+    if config.getoption("--measure"):
+        config.pluginmanager.register(_Measured(), "measured")
+
+
+class _Measured:
+    """CPU seconds of every test."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_protocol(self, item):
+        before = _cpu()
+        done = yield
+        self.seconds[item.nodeid] = _cpu() - before
+        return done
+
+    def pytest_sessionfinish(self):
+        SLOW.write_text("\n".join([*slow_ones(self.seconds), ""]), encoding="utf-8")
+
+    def pytest_terminal_summary(self, terminalreporter):
+        terminalreporter.section(f"{sum(self.seconds.values()):.0f} CPU seconds, the largest")
+        for name in sorted(self.seconds, key=self.seconds.__getitem__, reverse=True)[:40]:
+            terminalreporter.line(f"{self.seconds[name]:8.2f} {name}")
+
+
+def slow_ones(seconds: dict[str, float]) -> list[str]:
+    """Tests that take longer than `QUICK`, and how many parameters they have until then."""
+    groups: dict[str, list[float]] = {}
+    for name, own in seconds.items():
+        groups.setdefault(name.partition("[")[0], []).append(own)
+    quick = {test: sum(used <= QUICK for used in accumulate(own)) for test, own in groups.items()}
+    return sorted(f"{test} {count}" for test, count in quick.items() if count < len(groups[test]))
+
+
+def _cpu() -> float:
+    import resource  # not on Windows
+
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)

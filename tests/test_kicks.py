@@ -103,27 +103,27 @@ def of_law(friction, mass=0.0, factor=1.03):
 
 
 STABLE = {
-    "massless": tilted(0.5, 2.0),
-    "mass of 1e-8": rig(friction=STEEP, stiffness=1e11, mass=1e-8 * UNIT_MASS),
-    "ringing": unit_rig("aging", 0.5, 0.8, mass=1e-2),
-    "prz": unit_rig("prz", 0.5, 2.0, mass=1e-6, damping=1e-3),
-    "regularised prz": of_law(ONE_MEMORY[2], 1e-2),
-    "nagata": of_law(ONE_MEMORY[3], 1e-2),
-    "regularised nagata": of_law(ONE_MEMORY[4]),
-    "regularised nagata, mass of 1e-8": of_law(ONE_MEMORY[4], 1e-8, factor=3.0),
-    "two states": of_law(TWO_STATES),
-    "two states, mass": of_law(TWO_STATES, 1e-2),
-    "lugre, massless": bristles(3e-4, 0.0, contact=ss.InclinedSpring(preload=1e6, angle=0.3)),
-    "lugre, light": bristles(3e-3, 1.0, damping=0.0),
-    "lugre, heavy": bristles(3e-3, 3e3),
-    "lugre, damped bristles": bristles(3e-3, 3e3, damping=300.0),
+    "massless": lambda: tilted(0.5, 2.0),
+    "mass of 1e-8": lambda: rig(friction=STEEP, stiffness=1e11, mass=1e-8 * UNIT_MASS),
+    "ringing": lambda: unit_rig("aging", 0.5, 0.8, mass=1e-2),
+    "prz": lambda: unit_rig("prz", 0.5, 2.0, mass=1e-6, damping=1e-3),
+    "regularised prz": lambda: of_law(ONE_MEMORY[2], 1e-2),
+    "nagata": lambda: of_law(ONE_MEMORY[3], 1e-2),
+    "regularised nagata": lambda: of_law(ONE_MEMORY[4]),
+    "regularised nagata, mass of 1e-8": lambda: of_law(ONE_MEMORY[4], 1e-8, factor=3.0),
+    "two states": lambda: of_law(TWO_STATES),
+    "two states, mass": lambda: of_law(TWO_STATES, 1e-2),
+    "lugre, massless": lambda: bristles(3e-4, 0.0, contact=ss.InclinedSpring(preload=1e6, angle=0.3)),
+    "lugre, light": lambda: bristles(3e-3, 1.0, damping=0.0),
+    "lugre, heavy": lambda: bristles(3e-3, 3e3),
+    "lugre, damped bristles": lambda: bristles(3e-3, 3e3, damping=300.0),
 }
 
 
-@pytest.mark.parametrize("a_rig", STABLE.values(), ids=STABLE)
-def test_distance_falls_everywhere_in_the_neighbourhood(a_rig):
+@pytest.mark.parametrize("stable", STABLE.values(), ids=STABLE)
+def test_distance_falls_everywhere_in_the_neighbourhood(stable):
     """In states that were not among those tested, next to the slow modes above all, where most could be missed."""
-    rest = rest_at(a_rig)
+    rest = rest_at(stable())
     near = Neighbourhood(rest)
     radius = float(near.computed()[0])
     assert radius > 1e-4
@@ -140,10 +140,10 @@ def test_distance_falls_everywhere_in_the_neighbourhood(a_rig):
 QUICK = ("massless", "mass of 1e-8", "ringing", "prz", "lugre, massless", "lugre, light", "lugre, heavy")
 
 
-@pytest.mark.parametrize("a_rig", [STABLE[name] for name in QUICK], ids=QUICK)
-def test_motion_from_the_edge_of_the_neighbourhood_only_goes_inwards(a_rig):
+@pytest.mark.parametrize("stable", [STABLE[name] for name in QUICK], ids=QUICK)
+def test_motion_from_the_edge_of_the_neighbourhood_only_goes_inwards(stable):
     """By SciPy on the uncompiled rates, from directions that were not among those tested."""
-    rest = rest_at(a_rig)
+    rest = rest_at(stable())
     near = Neighbourhood(rest)
     radius = float(near.computed()[0])
     assert radius > 1e-4

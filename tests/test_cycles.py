@@ -24,7 +24,7 @@ from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import _cuts
 from steadyslip.nonlinear.orbits.shooting import Shooting, multipliers
 from steadyslip.nonlinear.orbits.tracer import ENDS, Tracer, _winds
-from steadyslip.nonlinear.orbits.verify import verified
+from steadyslip.nonlinear.orbits.verify import cycle_near
 from test_motion_oracle import LAWS
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -284,13 +284,13 @@ def test_motion_is_on_a_cycle_only_if_there_is_one(mass, damped):
     """The cycle next to a motion is that of the branch; a motion that settles, or grows, is on none."""
     rigs = [unit_rig("slip", 0.5, kappa, damping=0 if mass else 1e-3, mass=mass) for kappa in (0.4, 1.4)]
     jobs, state = started(rigs[0], x=0.3)
-    found = verified(jobs, 0, state, patience=20)
+    found = cycle_near(Runs(jobs), state, patience=20)
     (cycle,) = (damped if not mass else ss.cycles(rigs[0], doublings=0)).at(0.4 * A)
     assert found.period == pytest.approx(cycle.period, rel=1e-8)
     assert found.multipliers == pytest.approx(cycle.multipliers, rel=1e-5, abs=1e-8)
-    assert verified(jobs, 0, found._orbit.states[0]).period == pytest.approx(found.period, rel=1e-9)
+    assert cycle_near(Runs(jobs), found._orbit.states[0]).period == pytest.approx(found.period, rel=1e-9)
     jobs, state = started(rigs[1], x=0.3)
-    assert verified(jobs, 0, state, patience=20) is None
+    assert cycle_near(Runs(jobs), state, patience=20) is None
 
 
 def test_windings_that_close_in_on_a_value_are_an_end(damped):
@@ -520,6 +520,29 @@ def test_no_small_cycle_at_the_edge_is_no_traceback(damped, monkeypatch):
     assert "no small cycle" in str(nothing)
     assert nothing.plot().lines
     assert nothing.to_dict()["cycles"] == []
+
+
+def test_a_reason_is_kept_where_the_edge_fails(damped, monkeypatch):
+    """No small cycle, and the sheet that simulation leads to breaks off before the edge: both are said."""
+    onset, real = damped.onset, Tracer.known
+
+    def fails(*_arguments):
+        raise Failure("no convergence")
+
+    def known(self, shooting, point):
+        found = real(self, shooting, point)
+        if found.cycle.value > 0.9 * onset.value:
+            raise Failure("a hole")
+        return found
+
+    monkeypatch.setattr(Tracer, "small", fails)
+    monkeypatch.setattr(Tracer, "known", known)
+    branch = ss.cycles(damped.rig, between=(0.4 * onset.value, 1.1 * onset.value))
+    assert branch.gaps[0] == 0
+    assert "no small cycle was found" in branch.broken[0]
+    assert "no small cycle was found" in str(branch)
+    assert branch.to_dict()["gaps"][0] == {"before": 0, "end": branch.broken[0]}
+    assert branch.plot().lines
 
 
 def test_files_and_figure(damped, tmp_path):

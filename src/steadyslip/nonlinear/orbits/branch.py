@@ -117,7 +117,7 @@ class CycleBranch:
         The branch of twice the period that begins at the first period doubling.
     gaps : tuple of int
         Numbers of the cycles before which the branch is not continuous: a sheet broke off, and simulation found
-        another beyond it.
+        another beyond it; 0 where nothing was found at the edge itself.
     broken : tuple of str
         For each gap, why the sheet before it was not followed any further.
     steady : int
@@ -241,7 +241,7 @@ class CycleBranch:
                 f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
             )
         for i, why in zip(self.gaps, self.broken, strict=True):
-            before = shown(self.cycles[i - 1].value, self.unit, area=area)
+            before = shown(self.cycles[i - 1].value if i else self.onset.value, self.unit, area=area)
             after = shown(self.cycles[i].value, self.unit, area=area)
             lines += [f"  gap: at {before} {why};", f"    another sheet, found by simulation, from {after} on"]
         lines.append(f"  ends: {self.end}")

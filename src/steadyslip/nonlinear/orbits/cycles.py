@@ -92,7 +92,7 @@ def cycles(
     tracer = Tracer(flow, onset, _limits(rig, onset, between), most_points, progress)
     sheets = [_from_the_edge(tracer, amplitude or max(1e-6, 1e9 * flow.noise))]
     _search_on(tracer, sheets)
-    return _branch(tracer, [sheet for sheet in sheets if sheet.known] or sheets[:1], rtol, doublings)
+    return _branch(tracer, sheets, rtol, doublings)
 
 
 def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: int) -> CycleBranch:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.program import LOG_KINDS
-from steadyslip.motion.jobs import Jobs
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.branch import Cycle
 from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, Setting
@@ -33,47 +32,24 @@ FIRST_SPAN = 60.0  # natural times
 MOST_STEPS = 40_000
 
 
-def verified(jobs: Jobs, which: int, state: Array, patience: int = 1, rtol: float | None = None) -> Cycle | None:
-    """The cycle that a run of prepared jobs has come to, under their inputs.
+def cycle_near(runs: Runs, state: Array, value: float = 0.0, patience: int = 1) -> Cycle | None:
+    """The cycle that a motion is on, or comes to.
 
     Parameters
     ----------
-    jobs : Jobs
-        With one segment of constant inputs for each run.
-    which : int
-        Index of the run.
+    runs : Runs
     state : ndarray (n,)
         The kernel's state variables (``outcome.final[row, 4:]``), anywhere near the suspected cycle.
-    patience : int, optional
+    value : float
+        Of the free parameter, where `runs` has one.
+    patience : int
         How many stretches of some returns each to go on for, as long as no cycle is close enough.
-    rtol : float, optional
-        Error allowed per step; 1e-10, with Rosenbrock methods 1e-9, unless given.
 
     Returns
     -------
     Cycle or None
         The primitive cycle next to the motion, with multipliers; ``cycle.stable`` says whether it attracts.
         None if there is none: the motion grows, settles, wanders, or is still too far from any.
-
-    Raises
-    ------
-    NotAvailable
-        If the rig's motion is ill-posed, or its normal stress prescribed in time.
-    """
-    return cycle_near(Runs(jobs, which, rtol), state, patience=patience)
-
-
-def cycle_near(runs: Runs, state: Array, value: float = 0.0, patience: int = 1) -> Cycle | None:
-    """The cycle that a motion is on, or comes to; see `verified`.
-
-    Parameters
-    ----------
-    runs : Runs
-    state : ndarray (n,)
-    value : float
-        Of the free parameter, where `runs` has one.
-    patience : int
-        How many stretches of motion to look at.
     """
     with suppress(FlowFailure):
         for seen in _stretches(runs, runs.setting(value), state, patience):

@@ -38,7 +38,7 @@ def test_from_a_record_to_estimates(fitted):
     assert data["search"]["converged"] is True
     assert data["correlated"] is True
     page = (folder / "fit.html").read_text()
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3  # the fit, its one step, the estimates against each other
     assert "http-equiv" not in page
     assert "d_c = 9.4" in page
     assert (folder / "fit.png").stat().st_size > 10_000

@@ -250,6 +250,15 @@ def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian()
     for name in fit.names:
         assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.3)
         assert np.mean(draws[name]) == pytest.approx(fit.values[name], abs=0.5 * fit.errors[name])
+    handed = draws.to_arviz()
+    assert handed["posterior"].sizes["chain"] == 24
+    first = handed["posterior"]["friction.a"]
+    assert first.attrs["units"] == "1"
+    np.testing.assert_array_equal(first.values.ravel(), draws["friction.a"])
+    best = draws.log_probability.argmax()
+    assert abs(draws["friction.d_c"][best] / fit.values["friction.d_c"] - 1) < 3 * fit.errors["friction.d_c"] / 1e-5
+    assert handed["sample_stats"]["lp"].values.max() == draws.log_probability[best]
+    assert ss.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
 
 
 def test_blocks_keep_correlation():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -37,6 +38,10 @@ class Draws(ReadOnly):
         How they came about: block length and share of refits that converged, or acceptance and autocorrelation time.
     interrupted : bool
         Whether Ctrl-C came before all that were asked for.
+    chains : int
+        Chains that the draws belong to, one after another and equally long; 1 where each draw is independent.
+    log_probability : ndarray (m,) or None
+        Up to a constant, where it was computed.
     """
 
     fit: Fit
@@ -44,6 +49,8 @@ class Draws(ReadOnly):
     values: dict[str, Array] = field(repr=False)
     details: dict[str, float]
     interrupted: bool = False
+    chains: int = 1
+    log_probability: Array | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -74,6 +81,38 @@ class Draws(ReadOnly):
         """Draw the parameters against each other."""
         return draw(self, ax=ax)
 
+    def to_arviz(self) -> Any:
+        """The draws for ArviZ, chain by chain, values in SI units: what its diagnostics and figures take.
+
+        Returns
+        -------
+        arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
+            With a group ``posterior`` and, where it was computed, ``lp`` in ``sample_stats``.
+
+        Raises
+        ------
+        NotAvailable
+            If ArviZ is not installed.
+        """
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", FutureWarning)  # about versions of its own to come
+                import arviz
+        except ImportError as error:
+            raise NotAvailable("this needs the package arviz; install steadyslip[lab]") from error
+        groups: dict[str, Any] = {"posterior": {name: self._by_chain(values) for name, values in self.values.items()}}
+        if self.log_probability is not None:
+            groups["sample_stats"] = {"lp": self._by_chain(self.log_probability)}
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "More chains", UserWarning)  # walkers are many, and meant to be
+            found = arviz.from_dict(**groups) if hasattr(arviz, "InferenceData") else arviz.from_dict(groups)
+        for one in self.fit.space.unknowns:
+            found["posterior"][one.name].attrs["units"] = one.unit
+        return found
+
+    def _by_chain(self, values: Array) -> Array:
+        return values.reshape(self.chains, -1)
+
 
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     """Draws from the covariance of a fit, in its coordinates.
@@ -91,9 +130,9 @@ def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     return _draws(fit, "normal", np.clip(z, fit.space.low, fit.space.high), {"seed": float(seed)})
 
 
-def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float], interrupted: bool = False) -> Draws:
+def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float], **about: Any) -> Draws:
     values = fit.space.values(z)
-    return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details, interrupted)
+    return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details, **about)
 
 
 def bootstrap(
@@ -154,7 +193,7 @@ def bootstrap(
             if sum(map(len, ends)) < 2:
                 raise KeyboardInterrupt("before the first refits were done") from None
     details = {"block": float(max(lengths)), "converged": float(np.mean(np.concatenate(converged)))}
-    return _draws(fit, "bootstrap", np.concatenate(ends), details, done < count)
+    return _draws(fit, "bootstrap", np.concatenate(ends), details, interrupted=done < count)
 
 
 def _block(fit: Fit, record: int, kind: str, block: int | None) -> int:
@@ -326,13 +365,15 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     sampler._random = np.random.RandomState(seed)
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
-    kept = sampler.get_chain(discard=steps // 3, thin=max(1, int(time / 2)), flat=True)
+    cut = {"discard": steps // 3, "thin": max(1, int(time / 2))}
+    kept = sampler.get_chain(**cut).swapaxes(0, 1).reshape(-1, size)  # one walker after another
+    probable = sampler.get_log_prob(**cut).T.ravel()
     details = {
         "acceptance": float(np.mean(sampler.acceptance_fraction)),
         "autocorrelation": time,
         "steps": float(steps),
     }
-    return _draws(fit, "posterior", kept, details)
+    return _draws(fit, "posterior", kept, details, chains=walkers, log_probability=probable)
 
 
 def _stretch(fit: Fit) -> Array:

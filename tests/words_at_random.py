@@ -244,6 +244,8 @@ def scan(count, seed=0):
     """Print what is false in `count` verdicts; returns how many verdicts had something."""
     bad = 0
     for i in range(count):
+        if i and i % 100 == 0:
+            print(f"{i} of {count}", file=sys.stderr, flush=True)
         rng = np.random.default_rng([seed, i])
         try:
             rig = some_rig(rng)

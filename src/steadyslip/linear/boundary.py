@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.options import BRANCH, checked, low_and_high
 from steadyslip.core.records import Parameter
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.slider import Slider
@@ -47,6 +48,7 @@ class Margin:
     searched: tuple[float, float]
 
 
+@checked(branch=BRANCH, between=low_and_high)
 def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, branch: int = 0) -> tuple[Boundary, ...]:
     """Every value of a parameter at which stability of steady sliding changes.
 
@@ -79,6 +81,7 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, br
     return Search(rig, full, present_zeros(rig), branch).boundaries(limits)
 
 
+@checked(branch=BRANCH)
 def margins(rig: Slider, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first."""
     present = present_zeros(rig)

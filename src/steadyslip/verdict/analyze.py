@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable, ParameterError, Problem
+from steadyslip.core.options import BRANCH, checked, some_names
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.linear import formula as linear_formula
@@ -142,6 +143,7 @@ class Analysis:
         return f"```\n{self}\n```"
 
 
+@checked(branch=BRANCH, kick=some_names)
 def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:
     """Verdict on a rig.
 

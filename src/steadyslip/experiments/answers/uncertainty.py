@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.options import SEED, THREADS, checked, one_name, real_number, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.quantities import shown
@@ -114,6 +115,7 @@ class Draws(ReadOnly):
         return values.reshape(self.chains, -1)
 
 
+@checked(count=whole(1, 10**8), seed=SEED)
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     """Draws from the covariance of a fit, in its coordinates.
 
@@ -135,6 +137,7 @@ def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float], **about: An
     return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details, **about)
 
 
+@checked(count=whole(2, 10**7), block=whole(1, or_none=True), seed=SEED, threads=THREADS, kind=one_name)
 def bootstrap(
     fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
     threads: int | None = None, progress: bool | None = None,
@@ -271,6 +274,7 @@ class Profile(ReadOnly):
         return draw(self, ax=ax)
 
 
+@checked(reach=real_number(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=one_name)
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
     """Profile of a parameter: all others fitted anew at each value, side by side.
 
@@ -317,6 +321,7 @@ def _unit_of_rise(fit: Fit, i: int) -> float:
     return variance / naive if np.isfinite(variance) and naive > 0 else plain
 
 
+@checked(steps=whole(1, 10**9), walkers=whole(1, 10**6), seed=SEED, threads=THREADS)
 def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, threads: int | None = None) -> Draws:
     """Sample the posterior with emcee.
 

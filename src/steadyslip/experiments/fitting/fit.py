@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.options import THREADS, checked, one_name, real_number, whole
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan, with_loading
@@ -33,6 +34,15 @@ Told = Callable[[str, int, float], None]
 """What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
 
 
+@checked(
+    trend=whole(0, 20),
+    width=real_number(0, or_none=True),
+    starts=whole(1, 10**6),
+    threads=THREADS,
+    errors=one_name,
+    loss=one_name,
+    drive=one_name,
+)
 def fit(
     rig: Slider,
     records: Record | Sequence[Record],
@@ -147,7 +157,7 @@ def _searched(
 
         return tell
 
-    for upto in (-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts):
+    for upto in dict.fromkeys((-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts)):
         begin = starting_points(whole.parts, space, upto - len(rough.ssq), len(rough.ssq))
         rough = rough + minimise(
             lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH,

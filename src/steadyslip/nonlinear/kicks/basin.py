@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import BRANCH, THREADS, checked, one_name, real_number, real_numbers
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
@@ -68,6 +69,14 @@ class Basin(ReadOnly):
         return draw(self, ax=ax)
 
 
+@checked(
+    x=real_numbers(or_none=True),
+    v=real_numbers(or_none=True),
+    rtol=real_number(0, 0.1),
+    threads=THREADS,
+    branch=BRANCH,
+    along=one_name,
+)
 def basin(
     rig: Slider,
     x: Sequence[float] | None = None,

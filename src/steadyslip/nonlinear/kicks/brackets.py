@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.options import BRANCH, THREADS, checked, one_name, real_number, whole
 from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -44,6 +45,15 @@ class Brackets:
     beyond: Array
 
 
+@checked(
+    precision=real_number(1e-13, 0.1),
+    rtol=real_number(0, 0.1),
+    threads=THREADS,
+    branch=BRANCH,
+    kick=one_name,
+    reference=one_name,
+    direction=whole(-1, 1),
+)
 def threshold_map(
     rig: Slider,
     vary: Mapping[str, Any],

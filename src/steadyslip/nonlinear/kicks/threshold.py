@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import BRANCH, checked, one_name, real_number, whole
 from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_states
@@ -112,6 +113,14 @@ class Threshold:
         } | total(plain(self.amount), self.unit, self.rig.area)
 
 
+@checked(
+    precision=real_number(0, 0.1),
+    rtol=real_number(0, 0.1, or_none=True),
+    branch=BRANCH,
+    kick=one_name,
+    reference=one_name,
+    direction=whole(-1, 1),
+)
 def threshold(
     rig: Slider,
     kick: str = "velocity",
@@ -333,6 +342,7 @@ class KickMargin:
                 "threshold": self.threshold.to_dict()}  # fmt: skip
 
 
+@checked(precision=real_number(0, 0.1), branch=BRANCH)
 def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
     """Distance of an expected disturbance from the smallest that is not survived, and what comes of itself.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import InternalError, ParameterError, Problem
+from steadyslip.core.options import BRANCH, checked, low_and_high, one_name, real_number, whole
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure, turned_round
@@ -28,6 +29,15 @@ MET = 2e-3  # difference of logarithms of period and velocities within which cyc
 MOST_STEPS_BETWEEN = 40
 
 
+@checked(
+    amplitude=real_number(0, 0.1, or_none=True),
+    most_points=whole(1),
+    doublings=whole(0, 100),
+    rtol=real_number(0, 0.1, or_none=True),
+    between=low_and_high,
+    branch=BRANCH,
+    along=one_name,
+)
 def cycles(
     rig: Slider,
     along: str = "stiffness",

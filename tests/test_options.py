@@ -1,0 +1,90 @@
+"""Numeric options of Python calls: whatever is given, an answer or one message of ours, and soon."""
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+from fuzz_rigs import judged
+from rigs_of_theory import rig
+
+VALUES = {
+    "none": None, "text": "abc", "empty": "", "nan": float("nan"), "inf": float("inf"), "minus inf": -float("inf"),
+    "zero": 0, "negative": -1, "minus zero": -0.0, "half": 0.5, "huge": 1e300, "digits": 10**400, "tiny": 5e-324,
+    "true": True, "list": [1, 2], "nothing": [], "array": np.array([1.0, np.nan]), "complex": 1j, "object": object(),
+    "bytes": b"5", "set": {1.0},
+}  # fmt: skip
+RIG = rig(mass=0.0)
+STIFF = RIG.with_values({"stiffness": 1.5 * float(ss.critical_stiffness(RIG))})
+STEP = ss.VelocityStep(at=0.1, to=2e-6)
+QUICK = {"until": 0.2, "most_steps": 50}
+
+
+def _calls(fitted):
+    """Name, and a call with the one option."""
+
+    def simulate(**o):
+        return ss.simulate(STIFF, STEP, **(QUICK | o))
+
+    def many(**o):
+        return ss.simulate_many(STIFF, {"stiffness": np.array([3e10, 4e10])}, **({"until": 0.1, "progress": False} | o))
+
+    def threshold(**o):
+        return ss.threshold(STIFF, "displacement", **({"precision": 0.1} | o))
+
+    def brackets(**o):
+        return ss.threshold_map(STIFF, {"stiffness": np.array([3e10])}, "displacement",
+                                **({"precision": 0.1, "progress": False} | o))  # fmt: skip
+
+    def basin(**o):
+        return ss.basin(STIFF, **({"x": [0.0], "v": [1e-6], "progress": False} | o))
+
+    def cycles(**o):
+        return ss.cycles(STIFF, **({"most_points": 2, "doublings": 0} | o))
+
+    def sensitivity(**o):
+        return ss.sensitivity(RIG, {"friction.a": (0.01, 0.012), "stiffness": (1e9, 2e9)}, "critical_stiffness",
+                              **({"points": 64, "progress": False} | o))  # fmt: skip
+
+    calls = {
+        simulate: ("until", "rtol", "most_steps", "times", "initial", "method"),
+        many: ("until", "rtol", "most_steps", "times", "threads"),
+        lambda **o: ss.analyze(RIG, **o): ("branch", "kick"),
+        lambda **o: ss.boundary(RIG, "stiffness", **o): ("between", "branch"),
+        lambda **o: ss.hopf(RIG, **o): ("along", "branch"),
+        threshold: ("precision", "rtol", "direction", "branch", "reference"),
+        brackets: ("precision", "rtol", "direction", "branch", "threads"),
+        basin: ("x", "v", "rtol", "threads", "branch"),
+        cycles: ("amplitude", "most_points", "doublings", "rtol", "between", "branch"),
+        sensitivity: ("points", "seed"),
+        lambda n: ss.Grid(1e9, 2e9, n): ("n",),
+        lambda low: ss.Grid(low, 2e9, 3): ("low",),
+        lambda chunk: ss.Map(RIG, {"stiffness": [1e9, 2e9]}, ["status"], chunk=chunk): ("chunk",),
+        lambda **o: ss.VelocityStep(**({"at": 1.0, "to": 1e-6} | o)): ("at", "to"),
+        lambda **o: ss.bootstrap(fitted, **({"count": 2, "progress": False} | o)): (
+            "count", "block", "seed", "threads"),
+        lambda **o: ss.profile(fitted, "friction.a", **({"count": 3} | o)): ("reach", "count", "threads"),
+        lambda level: fitted.interval("friction.a", level): ("level",),
+        lambda **o: ss.predict(RIG, fitted, **o): ("record", "kick"),
+        lambda **o: ss.fit(ss.lab_rig(), fitted.plan.records, ["friction.a"], **({"starts": 1} | o)): (
+            "starts", "trend", "width", "threads"),
+        lambda **o: ss.precision(lab.rig(), lab.STEP, **({"until": 80.0, "samples": 100} | o)): (
+            "noise", "until", "samples"),
+    }  # fmt: skip
+    return [(call, name) for call, names in calls.items() for name in names]
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, 0), starts=3)
+
+
+def test_any_value_of_any_option(fitted):
+    faults = []
+    for call, name in _calls(fitted):
+        for kind, value in VALUES.items():
+            fault = judged(lambda c=call, n=name, v=value: c(**{n: v}))
+            if fault:
+                where = next(v for v in call.__code__.co_names if v not in ("get",))
+                faults.append(f"{where}({name}={kind}): {fault.splitlines()[0][:150]}")
+    assert not faults, "\n".join(faults)

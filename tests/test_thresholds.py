@@ -221,7 +221,7 @@ def test_unstable_cycle_bounds_the_basin():
         ({"kick": "veloctiy"}, "velocity"),
         ({"direction": 2}, "1 or -1"),
         ({"reference": "during"}, "'before' or 'after'"),
-        ({"precision": 0.0}, "allowed: from"),
+        ({"precision": 0.0}, "allowed: a finite number above 0, up to 0.1"),
         ({"kick": "impulse"}, "needs a mass"),
     ],
 )

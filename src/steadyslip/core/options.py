@@ -88,6 +88,11 @@ def by_name(value: Any) -> str:
     return "" if value is None or isinstance(value, Mapping) else "a mapping of names to values, or None"
 
 
+def sign(value: Any) -> str:
+    """1 or -1."""
+    return "" if isinstance(value, int) and not isinstance(value, bool) and value in (1, -1) else "1 or -1"
+
+
 BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000, or_none=True), whole(0, 2**63)
 
 

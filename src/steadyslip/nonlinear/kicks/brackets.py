@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.options import BRANCH, THREADS, checked, one_name, real_number, whole
+from steadyslip.core.options import BRANCH, THREADS, checked, one_name, real_number, sign
 from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -52,7 +52,7 @@ class Brackets:
     branch=BRANCH,
     kick=one_name,
     reference=one_name,
-    direction=whole(-1, 1),
+    direction=sign,
 )
 def threshold_map(
     rig: Slider,

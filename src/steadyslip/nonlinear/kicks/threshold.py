@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import BRANCH, checked, one_name, real_number, whole
+from steadyslip.core.options import BRANCH, checked, one_name, real_number, sign
 from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_states
@@ -119,7 +119,7 @@ class Threshold:
     branch=BRANCH,
     kick=one_name,
     reference=one_name,
-    direction=whole(-1, 1),
+    direction=sign,
 )
 def threshold(
     rig: Slider,

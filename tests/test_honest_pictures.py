@@ -1,9 +1,13 @@
 """Pictures that must not mislead: spacing of axes, samples without a value, runs that hardly change, probabilities."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
+import lab_records as lab
 import steadyslip as ss
 from dimensionless import unit_rig
 from steadyslip.core.quantities import percent
@@ -52,3 +56,16 @@ def test_no_probability_is_rounded_to_certainty():
     assert probability_text(0.99975, 4000) == "99.975 %"
     assert percent(0.0001) == "0.01 %"
     assert percent(1e-9) != "0 %"
+
+
+def test_a_dollar_in_a_name_is_a_dollar(tmp_path):
+    """Names of files are text, not formulas: with one dollar Matplotlib would fail, with two it would set italics."""
+    source = lab.record(lab.rig(), lab.STEP, 0)
+    for name in ("5$.txt", "a$b_{1}$.txt"):
+        record = replace(source, source=name)
+        axes = np.ravel(record.plot())
+        axes[0].figure.savefig(tmp_path / "record.png")
+        title = axes[0].title
+        assert name.partition(".")[0] in title.get_text()
+        assert not title.get_parse_math()
+        plt.close(axes[0].figure)

@@ -5,8 +5,8 @@ from steadyslip.experiments.answers.precision import Precision, best_protocol, p
 from steadyslip.experiments.answers.predict import Prediction, predict
 from steadyslip.experiments.answers.uncertainty import Draws, Profile, bootstrap, normal_draws, posterior, profile
 from steadyslip.experiments.fitting.fit import fit
-from steadyslip.experiments.fitting.result import Estimate, Fit
-from steadyslip.experiments.fitting.store import load_fit
+from steadyslip.experiments.fitting.numbers import Estimate
+from steadyslip.experiments.fitting.result import Fit, load_fit
 from steadyslip.experiments.measured.read import read_record, record_from_arrays
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.spec import Spec, fit_files, lab_rig, read_spec

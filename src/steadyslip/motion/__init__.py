@@ -5,8 +5,7 @@ rig + protocol -> jobs (arrays) -> kernels in lanes -> history or ensemble
 
 from steadyslip.motion.events import Event, SlipEvent
 from steadyslip.motion.many import Ensemble, simulate_many
-from steadyslip.motion.result import History
+from steadyslip.motion.result import History, load_history
 from steadyslip.motion.single import simulate
-from steadyslip.motion.store import load_history
 
 __all__ = ["Ensemble", "Event", "History", "SlipEvent", "load_history", "simulate", "simulate_many"]

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import unknown_name
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name, totals
-from steadyslip.core.results import ReadOnly
-from steadyslip.machine.slider import Slider
-from steadyslip.motion.events import Event, SlipEvent, slip_events
+from steadyslip.motion import store
+from steadyslip.motion.events import SlipEvent, slip_events
+from steadyslip.motion.history import HistoryData
 from steadyslip.motion.status import remedy
-from steadyslip.protocol import Protocol
 
 
 @dataclass(frozen=True, eq=False)
-class History(ReadOnly, Mapping[str, np.ndarray]):
+class History(HistoryData):
     """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
 
     Attributes
@@ -45,30 +42,6 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
     rtol : float
     steps, rejected : int
     """
-
-    rig: Slider
-    protocol: Protocol
-    data: dict[str, np.ndarray] = field(repr=False)
-    units: dict[str, str] = field(repr=False)
-    events: tuple[Event, ...] = field(repr=False)
-    status: str
-    end: float
-    method: str
-    rtol: float
-    steps: int
-    rejected: int
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        try:
-            return self.data[name]
-        except KeyError:
-            raise KeyError(unknown_name("observable", name, self.data)) from None
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.data)
-
-    def __len__(self) -> int:
-        return len(self.data)
 
     @property
     def interrupted(self) -> bool:
@@ -143,21 +116,15 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
 
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``time``, events over ``event``, with rig, protocol and versions in its attributes."""
-        from steadyslip.motion.store import to_dataset
-
-        return to_dataset(self)
+        return store.to_dataset(self)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write everything to a netCDF file (``.nc``); `load_history` reads it back."""
-        from steadyslip.motion.store import save
-
-        save(self, path)
+        store.save(self, path)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the samples as text, one column for each observable, units in the header."""
-        from steadyslip.motion.store import to_csv
-
-        to_csv(self, path)
+        store.to_csv(self, path)
 
     def plot(self, kind: str = "history", ax: Any = None) -> Any:
         """Draw the run: ``history`` (velocity, friction and normal stress in time) or ``phase`` (phase plane).
@@ -167,6 +134,19 @@ class History(ReadOnly, Mapping[str, np.ndarray]):
         matplotlib.axes.Axes or array of them
         """
         return draw(self, kind, ax=ax)
+
+
+def load_history(path: str | PathLike[str]) -> History:
+    """Read a history that `History.save` wrote.
+
+    Nothing in the file is executed; damage is found, whatever it is.
+
+    Raises
+    ------
+    NotAvailable
+        If the file is not one of ours, is damaged, or cannot be read.
+    """
+    return History(**store.read(path))
 
 
 def _plain(record: Any) -> dict[str, Any]:

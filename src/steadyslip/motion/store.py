@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +15,9 @@ from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
 from steadyslip.kernels.program import LOG_KINDS
 from steadyslip.motion.events import Event
+from steadyslip.motion.history import HistoryData
 from steadyslip.motion.observe import observable_units
 from steadyslip.motion.status import WORDS
-
-if TYPE_CHECKING:
-    from steadyslip.motion.result import History
 
 RUN = FileKind("run", 2, 2**29, "simulate again and save the run anew")
 MOST_EVENTS = 10**6
@@ -32,7 +30,7 @@ _ATTRIBUTES = {
 }  # fmt: skip
 
 
-def to_dataset(history: History) -> Any:
+def to_dataset(history: HistoryData) -> Any:
     """See `History.to_xarray`."""
     import xarray as xr
 
@@ -61,7 +59,7 @@ def to_dataset(history: History) -> Any:
     return xr.Dataset(variables, coords={"time": ("time", history.data["t"], {"units": "s"})}, attrs=attributes)
 
 
-def save(history: History, path: str | PathLike[str]) -> None:
+def save(history: HistoryData, path: str | PathLike[str]) -> None:
     """Write a history as netCDF; a file of that name is replaced only once the new one is whole.
 
     Raises
@@ -75,8 +73,8 @@ def save(history: History, path: str | PathLike[str]) -> None:
     write_table(path, RUN, to_dataset(history))
 
 
-def load_history(path: str | PathLike[str]) -> History:
-    """Read a history that `History.save` wrote.
+def read(path: str | PathLike[str]) -> dict[str, Any]:
+    """The fields of a history that `save` wrote.
 
     Nothing in the file is executed; damage is found, whatever it is.
 
@@ -87,7 +85,6 @@ def load_history(path: str | PathLike[str]) -> History:
     """
     from steadyslip.files.specifications import protocol_from_text, rig_from_text
     from steadyslip.model import build_model
-    from steadyslip.motion.result import History
     from steadyslip.protocol import Protocol
 
     table = ExpectedTable(path, RUN, _ATTRIBUTES)
@@ -110,14 +107,14 @@ def load_history(path: str | PathLike[str]) -> History:
     moments = zip(*(found[f"event_{name}"].tolist() for name in _EVENT_UNITS), strict=True)
     data = {name: found["time" if name == "t" else name] for name in units}
     _check_samples(table, data)
-    return History(
-        rig=rig,
-        protocol=protocol,
-        data=data,
-        units=units,
-        events=tuple(Event(kind, *row) for kind, row in zip(kinds, moments, strict=True)),
+    return {
+        "rig": rig,
+        "protocol": protocol,
+        "data": data,
+        "units": units,
+        "events": tuple(Event(kind, *row) for kind, row in zip(kinds, moments, strict=True)),
         **{name: attributes[name] for name in ("status", "end", "method", "rtol", "steps", "rejected")},
-    )
+    }
 
 
 def _check_words(table: ExpectedTable) -> None:
@@ -142,7 +139,7 @@ def _check_samples(table: ExpectedTable, data: dict[str, np.ndarray]) -> None:
                 raise table.fault(f"it says that it is done, but {name} is not finite throughout")
 
 
-def to_csv(history: History, path: str | PathLike[str]) -> None:
+def to_csv(history: HistoryData, path: str | PathLike[str]) -> None:
     """Write the samples as comma-separated text, forces of the whole contact where the rig has an area.
 
     Raises

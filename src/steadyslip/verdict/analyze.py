@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,13 +18,15 @@ from steadyslip.core.quantities import shown, stress_name
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
-from steadyslip.linear.search import Boundary
 from steadyslip.linear.status import on_edge
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import SteadySliding, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
+from steadyslip.verdict.export import as_dict
+from steadyslip.verdict.findings import Findings
+from steadyslip.verdict.words import headline, verdict
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Analysis:
+class Analysis(Findings):
     """Verdict on one rig; printing it gives the verdict in words.
 
     Attributes
@@ -81,36 +83,6 @@ class Analysis:
     warnings : tuple of str
     """
 
-    rig: Slider
-    stable: bool | None
-    reason: str
-    steady: SteadySliding | None
-    margins: tuple[Margin, ...]
-    warnings: tuple[str, ...] = ()
-    critical_stiffness: float | None = None
-    critical_side: str | None = None
-    critical_angular_frequency: float | None = None
-    critical_axial_stiffness: float | None = None
-    stable_stiffness: tuple[tuple[float, float], ...] = ()
-    eigenvalues: tuple[complex, ...] = ()
-    characteristic_polynomial: tuple[float, ...] = ()
-    routh: tuple[float, ...] = ()
-    growth_rate: float | None = None
-    period: float | None = None
-    damping_ratio: float | None = None
-    time_to_halve: float | None = None
-    time_to_double: float | None = None
-    on_edge: bool = False
-    branch: int = 0
-    onset: Onset | None = None
-    kicks: tuple[Threshold, ...] = ()
-    version: str = field(default="", repr=False)
-
-    @property
-    def boundaries(self) -> tuple[Boundary, ...]:
-        """Every edge found, parameter by parameter."""
-        return tuple(edge for margin in self.margins for edge in margin.edges)
-
     def formula(self) -> sp.Eq:
         """Critical stiffness of this kind of rig as a SymPy equation; see `steadyslip.formula`."""
         return linear_formula(self.rig)
@@ -121,8 +93,6 @@ class Analysis:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units per unit area (with an area, forces as well), as ``--json`` prints it."""
-        from steadyslip.verdict.export import as_dict
-
         return as_dict(self)
 
     def to_json(self) -> str:
@@ -130,13 +100,9 @@ class Analysis:
         return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
     def __str__(self) -> str:
-        from steadyslip.verdict.words import verdict
-
         return verdict(self)
 
     def __repr__(self) -> str:
-        from steadyslip.verdict.words import headline
-
         return f"<Analysis: {headline(self)}; print it for the whole verdict>"
 
     def _repr_markdown_(self) -> str:

@@ -17,17 +17,17 @@ from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.model.point import operating_point
 
 if TYPE_CHECKING:
-    from steadyslip.verdict.analyze import Analysis
+    from steadyslip.verdict.findings import Findings
 
 
-def _response(analysis: Analysis) -> Response | None:
+def _response(analysis: Findings) -> Response | None:
     """Numbers of the closed form at the branch judged; None where there are several memory variables or none."""
     point = operating_point(analysis.rig, branch=analysis.branch)
     return response_numbers(point) if has_closed_form(point.model) else None
 
 
 @quietly
-def why_all(analysis: Analysis) -> str:
+def why_all(analysis: Findings) -> str:
     """The plain cause of stability at every stiffness, where there is one."""
     known = _response(analysis)
     if known is None or known.B3 != 0:
@@ -40,13 +40,13 @@ def why_all(analysis: Analysis) -> str:
     return f": the resistance to steady sliding{with_all} {'rises' if slope > 0 else 'does not fall'} with velocity"
 
 
-def _damped(analysis: Analysis) -> bool:
+def _damped(analysis: Findings) -> bool:
     rig = analysis.rig
     return bool(rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
 @quietly
-def why_none(analysis: Analysis) -> str:
+def why_none(analysis: Findings) -> str:
     """Which condition of stability rules out every stiffness, where that can be told."""
     known = _response(analysis)
     if known is None:
@@ -88,7 +88,7 @@ def _why_oscillating(known: Response, denominator: float) -> str:
     return " (D < 0)"
 
 
-def _why_none_in_general(analysis: Analysis) -> str:
+def _why_none_in_general(analysis: Findings) -> str:
     p, q = stiffness_polynomials(operating_point(analysis.rig, branch=analysis.branch))
     if p[..., 0] <= 0 and q[..., 0] <= 0:
         return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"
@@ -98,7 +98,7 @@ def _why_none_in_general(analysis: Analysis) -> str:
 
 
 @quietly
-def why_ill_posed(analysis: Analysis) -> str:
+def why_ill_posed(analysis: Findings) -> str:
     """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
     known = _response(analysis)
     if known is not None:

@@ -10,10 +10,10 @@ from steadyslip.core.quantities import total
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
     from steadyslip.nonlinear.onset.hopf import Onset
-    from steadyslip.verdict.analyze import Analysis
+    from steadyslip.verdict.findings import Findings
 
 
-def as_dict(analysis: Analysis) -> dict[str, Any]:
+def as_dict(analysis: Findings) -> dict[str, Any]:
     """SI units per unit area; numbers that do not exist, and infinite ones, are None."""
     steady = analysis.steady
     data: dict[str, Any] = {
@@ -88,7 +88,7 @@ def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
     ]
 
 
-def _forces(analysis: Analysis, area: float) -> dict[str, Any]:
+def _forces(analysis: Findings, area: float) -> dict[str, Any]:
     """The main results for the whole contact area: N and N/m."""
     steady = analysis.steady
     return {

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from steadyslip.machine.slider import Slider
     from steadyslip.nonlinear.kicks.threshold import Threshold
     from steadyslip.nonlinear.onset.hopf import Onset
-    from steadyslip.verdict.analyze import Analysis
+    from steadyslip.verdict.findings import Findings
 
 _ONSETS = {
     "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
@@ -37,7 +37,7 @@ _BEYOND = {
 }
 
 
-def verdict(analysis: Analysis) -> str:
+def verdict(analysis: Findings) -> str:
     """The whole verdict as text, at most some 100 columns wide."""
     lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
     lines += _facts(analysis)
@@ -48,7 +48,7 @@ def verdict(analysis: Analysis) -> str:
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
 
 
-def _meaning(analysis: Analysis) -> list[str]:
+def _meaning(analysis: Findings) -> list[str]:
     """What the verdict does not say."""
     if analysis.stable is None or analysis.on_edge:
         return []
@@ -72,7 +72,7 @@ def _limited(rig: Slider) -> bool:
     return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
-def headline(analysis: Analysis) -> str:
+def headline(analysis: Findings) -> str:
     """The first line: stable, unstable, on the edge, or no steady sliding."""
     speed = shown(analysis.rig.drive.velocity, "m/s")
     if analysis.stable is None:
@@ -82,7 +82,7 @@ def headline(analysis: Analysis) -> str:
     return f"{'STABLE' if analysis.stable else 'UNSTABLE'}: steady sliding at {speed}"
 
 
-def reason(analysis: Analysis) -> str:
+def reason(analysis: Findings) -> str:
     """Why, in one sentence."""
     own = analysis.rig.parameters()["slider.stiffness"].value
     critical, side = analysis.critical_stiffness, analysis.critical_side
@@ -113,21 +113,21 @@ def reason(analysis: Analysis) -> str:
     return f"{text}, the nearest edge of the stable set given below"
 
 
-def _quantity(analysis: Analysis, value: float, unit: str) -> str:
+def _quantity(analysis: Findings, value: float, unit: str) -> str:
     """A value per unit area, or for the whole area where the rig has one, as in its file."""
     return shown(value, unit, area=analysis.rig.area)
 
 
-def _stiffness(analysis: Analysis, value: float) -> str:
+def _stiffness(analysis: Findings, value: float) -> str:
     return _quantity(analysis, value, "Pa/m")
 
 
-def _stress(analysis: Analysis, value: float) -> str:
+def _stress(analysis: Findings, value: float) -> str:
     area = analysis.rig.area
     return shown(value, "Pa") if area is None else f"{shown(value * area, 'N')} ({shown(value, 'Pa')})"
 
 
-def _facts(analysis: Analysis) -> list[str]:
+def _facts(analysis: Findings) -> list[str]:
     steady = analysis.steady
     if steady is None:
         return []
@@ -189,7 +189,7 @@ def _survived(kick: Threshold) -> str:
     return f"survives {what} {amount}{edge}{doubt}; more leads to {kick.outcome}"
 
 
-def _disturbance(analysis: Analysis) -> str:
+def _disturbance(analysis: Findings) -> str:
     if analysis.growth_rate == math.inf:
         return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
     if analysis.on_edge:
@@ -207,7 +207,7 @@ def _disturbance(analysis: Analysis) -> str:
     return f"{text} without oscillating"
 
 
-def _stable_set(analysis: Analysis) -> str:
+def _stable_set(analysis: Findings) -> str:
     parts = []
     for low, high in analysis.stable_stiffness:
         if low == 0 and high == math.inf:
@@ -221,7 +221,7 @@ def _stable_set(analysis: Analysis) -> str:
     return ", or ".join(parts) or "no stiffness"
 
 
-def _margin_table(analysis: Analysis) -> list[str]:
+def _margin_table(analysis: Findings) -> list[str]:
     """The nearest edge of each parameter, the others unchanged."""
     with_edge = [margin for margin in analysis.margins if margin.edge is not None]
     without = [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
@@ -240,7 +240,7 @@ def _margin_table(analysis: Analysis) -> list[str]:
     return lines
 
 
-def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str, str]:
+def _margin_row(analysis: Findings, margin: Margin) -> tuple[str, str, str, str, str]:
     edge = margin.edge
     if edge is None:
         raise InternalError("edge is not None")
@@ -270,7 +270,7 @@ def _margin_row(analysis: Analysis, margin: Margin) -> tuple[str, str, str, str,
     )
 
 
-def _short(analysis: Analysis, name: str) -> str:
+def _short(analysis: Findings, name: str) -> str:
     """The dotted name without its middle: friction.alpha for friction.normal_memory.alpha."""
     first, _, last = name.partition(".")[0], ".", name.rpartition(".")[2]
     known = analysis.rig.parameters()

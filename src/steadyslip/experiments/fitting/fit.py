@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.options import THREADS, checked, one_name, real_number, whole
+from steadyslip.core.options import THREADS, checked
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
-from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan, with_loading
-from steadyslip.experiments.fitting.result import Fit, SearchStory
+from steadyslip.experiments.fitting.numbers import SearchStory
+from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan
+from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.starts import search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
@@ -34,15 +35,7 @@ Told = Callable[[str, int, float], None]
 """What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
 
 
-@checked(
-    trend=whole(0, 20),
-    width=real_number(0, or_none=True),
-    starts=whole(1, 10**6),
-    threads=THREADS,
-    errors=one_name,
-    loss=one_name,
-    drive=one_name,
-)
+@checked(threads=THREADS)  # the others are declared as settings, for files too
 def fit(
     rig: Slider,
     records: Record | Sequence[Record],
@@ -258,23 +251,6 @@ def _distinct(rough: Minima, most: int) -> Array:
         if len(chosen) == most or rough.ssq[i] > HOPE * rough.ssq[order[0]]:
             break
     return np.array(chosen)
-
-
-def driven_as_measured(fit: Fit) -> dict[str, float] | None:
-    """Where the search ends if the measured columns drive the model instead, from the fit's own minimum."""
-    noisy = [c for loading in fit.plan.loading for c in (loading.load,) if c is not None and np.any(c.errors > 0)]
-    if not noisy or any(course.curve is not None for course in noisy):
-        return None
-    plan = with_loading(replace(fit.plan, drive="measured"))
-    space = plan.space()
-    z = space.coordinates(np.array([fit.values.get(u.name, 0.5 * (u.low + u.high)) for u in space.unknowns]))
-    own = dict(zip(fit.names, zip(*fit.bounds, strict=True), strict=True))
-    low, high = (np.array([own.get(u.name, u.bounds)[side] for u in space.unknowns]) for side in (0, 1))
-    comparison = plan.comparison()
-    found = minimise(lambda x, _: comparison.residuals(x), z[None], low, high, most=30, tolerance=1e-4)
-    if not np.isfinite(found.ssq[0]):
-        return None
-    return dict(zip((u.name for u in space.unknowns), map(float, space.values(found.coordinates[0])), strict=True))
 
 
 def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:

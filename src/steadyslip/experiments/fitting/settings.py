@@ -12,6 +12,7 @@ from steadyslip.core.settings import Names, Whole
 
 STARTS = 48
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")
+MOST_STARTS = 10**6
 MOST_TREND = 6
 MOST_STATES = 100
 _width = Domain(0, math.inf, False, False, "a number > 0, in units of what is fitted")
@@ -42,7 +43,7 @@ class FitSettings(Settings):
     errors: str = option(
         "auto", "correlated", "independent", doc="whether residuals remember each other", default="auto"
     )
-    starts: int = setting(Whole("points that the search may start from", 1), default=STARTS)
+    starts: int = setting(Whole("points that the search may start from", 1, MOST_STARTS), default=STARTS)
     windows: bool = option(False, True, doc="every step of a record becomes a record of its own", default=False)
     compare: tuple[str, ...] = setting(
         Names("laws to compare: `slip`, `aging`, `prz`, each also with `, two states`"), default=()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import astuple, fields, replace
 from os import PathLike
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.experiments.fitting.identify import Combination
+from steadyslip.experiments.fitting.numbers import FitNumbers, SearchStory
 from steadyslip.experiments.fitting.plan import Plan, make_plan
-from steadyslip.experiments.fitting.result import Fit, SearchStory
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
@@ -41,7 +41,10 @@ _FORMS = {
 """What the attributes hold as JSON; see `steadyslip.files.tables.fits_form`."""
 
 
-def to_dataset(fit: Fit) -> Any:
+F = TypeVar("F", bound=FitNumbers)
+
+
+def to_dataset(fit: FitNumbers) -> Any:
     """The fit as an xarray.Dataset."""
     import xarray as xr
 
@@ -83,7 +86,7 @@ def to_dataset(fit: Fit) -> Any:
     return xr.Dataset(variables, coords={"parameter": names, "other": names}, attrs=attributes)
 
 
-def save(fit: Fit, path: str | PathLike[str]) -> None:
+def save(fit: FitNumbers, path: str | PathLike[str]) -> None:
     """Write a fit; a file of that name is replaced only once the new one is whole.
 
     Raises
@@ -94,8 +97,8 @@ def save(fit: Fit, path: str | PathLike[str]) -> None:
     write_table(path, FIT, to_dataset(fit))
 
 
-def load_fit(path: str | PathLike[str]) -> Fit:
-    """Read a fit that `Fit.save` wrote.
+def read(path: str | PathLike[str], made: type[F]) -> F:
+    """A fit that `save` wrote, as an instance of `made`.
 
     Nothing in the file is executed; damage is found, whatever it is.
 
@@ -123,7 +126,7 @@ def load_fit(path: str | PathLike[str]) -> Fit:
     if table.sizes["side"] != 2:
         raise table.fault("its bounds have no two sides")
     search = stored["search"]
-    fit = Fit(
+    fit = made(
         plan=plan,
         coordinates=found["coordinates"],
         ssq=table.attributes["ssq"],
@@ -218,7 +221,7 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
     return replace(plan, rtol=rtol)
 
 
-def _check(table: ExpectedTable, fit: Fit) -> None:
+def _check(table: ExpectedTable, fit: FitNumbers) -> None:
     """Numbers that no fit has."""
     bad = {
         "coordinates": not np.all(np.isfinite(fit.coordinates)),

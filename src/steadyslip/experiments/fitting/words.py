@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from steadyslip.core.quantities import shown, total
+from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
-
-if TYPE_CHECKING:
-    from steadyslip.experiments.fitting.result import Fit
 
 WIDTH = 100
 VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
 
 
-def words(fit: Fit) -> str:
+def words(fit: FitNumbers) -> str:
     """Estimates, how good the fit is, and what to beware of."""
     names = short_names(fit.names)
     wide = max(len(name) for name in names)
@@ -39,12 +37,12 @@ def words(fit: Fit) -> str:
     return "\n".join(lines)
 
 
-def _stress_assumed(fit: Fit) -> bool:
+def _stress_assumed(fit: FitNumbers) -> bool:
     """Whether the normal stress is the rig's own, because no record has a column of it."""
     return fit.plan.pressed and all(record.normal is None for record in fit.plan.records)
 
 
-def _over_stress(fit: Fit, one: Any) -> str | None:
+def _over_stress(fit: FitNumbers, one: Any) -> str | None:
     """Stiffness over normal stress: what friction itself tells, whatever the stress; None of other parameters."""
     bare, _, record = one.name.partition("@")
     if bare not in ("slider.stiffness", "slider.axial_stiffness"):
@@ -66,7 +64,7 @@ def short_names(names: tuple[str, ...]) -> list[str]:
     return found
 
 
-def _quality(fit: Fit) -> list[str]:
+def _quality(fit: FitNumbers) -> list[str]:
     search = fit.search
     lag = max((noise.lag1 for noise in fit.noise), key=abs)
     independent = "residuals taken as correlated" if fit.correlated else "residuals taken as independent"
@@ -81,7 +79,7 @@ def _quality(fit: Fit) -> list[str]:
     ]
 
 
-def warnings(fit: Fit) -> list[str]:
+def warnings(fit: FitNumbers) -> list[str]:
     """What a reader must know before using the numbers."""
     found = [str(one) for one in fit.unidentified]
     if not fit.search.converged:
@@ -95,7 +93,7 @@ def warnings(fit: Fit) -> list[str]:
     return found
 
 
-def _vague_jumps(fit: Fit) -> list[str]:
+def _vague_jumps(fit: FitNumbers) -> list[str]:
     """Jumps whose time matters and is hardly known: errors of what they tell are then not Gaussian."""
     found = []
     for i, one in enumerate(fit.space.unknowns):
@@ -108,7 +106,7 @@ def _vague_jumps(fit: Fit) -> list[str]:
     return found
 
 
-def _between_samples(fit: Fit, one: Any) -> bool:
+def _between_samples(fit: FitNumbers, one: Any) -> bool:
     """Whether an unknown is the time of a sudden change that lies between two neighbouring samples."""
     if one.parameter.startswith("jump."):
         return True
@@ -119,7 +117,7 @@ def _between_samples(fit: Fit, one: Any) -> bool:
     return channel == "stress" and change.duration == 0
 
 
-def _untold_ramps(fit: Fit) -> list[str]:
+def _untold_ramps(fit: FitNumbers) -> list[str]:
     """Changes of the rate that may be steps or ramps: the record does not tell, and the direct effect depends on it."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
@@ -132,7 +130,7 @@ def _untold_ramps(fit: Fit) -> list[str]:
     return found
 
 
-def drive_line(fit: Fit) -> str:
+def drive_line(fit: FitNumbers) -> str:
     """What drives the model, and what that did to a, b and k."""
     plan = fit.plan
     if plan.protocol is not None:
@@ -160,7 +158,7 @@ def drive_line(fit: Fit) -> str:
     return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
 
 
-def _noisy_drive(fit: Fit, part: Any) -> str | None:
+def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
     """Whether the noise of the measured displacement moves the model about as much as the data scatter."""
     record = part.record
     if record.integrated or record.displacement is None:
@@ -180,7 +178,7 @@ def _noisy_drive(fit: Fit, part: Any) -> str | None:
     )
 
 
-def as_dict(fit: Fit) -> dict[str, Any]:
+def as_dict(fit: FitNumbers) -> dict[str, Any]:
     """SI units; what does not exist is None."""
     return {
         "version": fit.version,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,17 +13,15 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.files.output import whole_file
 from steadyslip.maps.store.arrays import Store
 
-if TYPE_CHECKING:
-    from steadyslip.maps.view.result import MapResult
+Read = Callable[..., np.ndarray]
+"""Reads an array of a store, or a region of it, by name."""
 
 FROM_STORE = ("title", "rig", "definition", "steadyslip", "versions")
 
 
-def to_netcdf(found: MapResult, path: str | PathLike[str]) -> None:
+def to_netcdf(store: Store, read: Read, path: str | PathLike[str]) -> None:
     """Write netCDF-4 with the map's dimensions, coordinates, units, rig and versions."""
     import netCDF4
-
-    store = found.store
 
     with whole_file(path) as temporary, netCDF4.Dataset(temporary, "w") as file:
         for name in FROM_STORE:
@@ -32,13 +31,13 @@ def to_netcdf(found: MapResult, path: str | PathLike[str]) -> None:
             file.createDimension(dim, size)
         for name in store.coordinates:
             variable = _variable(file, store, name)
-            variable[:] = found.read(name)
+            variable[:] = read(name)
         for name in store.results:
             _variable(file, store, name)
         for number in range(store.count):
             region = store.region(number)
             for name in store.results:
-                file[name][region] = found.read(name, region)
+                file[name][region] = read(name, region)
 
 
 def _variable(file: Any, store: Store, name: str) -> Any:
@@ -70,7 +69,7 @@ def _within(chunks: tuple[int, ...], most: int = 2**17) -> tuple[int, ...]:
     return tuple(reversed(found))
 
 
-def to_parquet(found: MapResult, path: str | PathLike[str]) -> None:
+def to_parquet(store: Store, read: Read, path: str | PathLike[str]) -> None:
     """Write one row for each point, parameters first; words for what is one of several kinds.
 
     Raises
@@ -83,13 +82,12 @@ def to_parquet(found: MapResult, path: str | PathLike[str]) -> None:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise NotAvailable("Parquet files need pyarrow; install it with pip install 'steadyslip[lab]'") from error
-    store = found.store
     notes = {name: str(store.group.attrs[name]) for name in FROM_STORE}
     writer = None
     with whole_file(path) as temporary:
         try:
             for number in range(store.count):
-                table = _rows(found, number, pa, notes)
+                table = _rows(store, read, number, pa, notes)
                 writer = writer or pq.ParquetWriter(temporary, table.schema, compression="zstd")
                 writer.write_table(table)
         finally:
@@ -97,8 +95,7 @@ def to_parquet(found: MapResult, path: str | PathLike[str]) -> None:
                 writer.close()
 
 
-def _rows(found: MapResult, number: int, pa: Any, notes: dict[str, str]) -> Any:
-    store = found.store
+def _rows(store: Store, read: Read, number: int, pa: Any, notes: dict[str, str]) -> Any:
     region = store.region(number)
     shape = tuple(part.stop - part.start for part in region)
     names, columns, units = [], [], []
@@ -112,7 +109,7 @@ def _rows(found: MapResult, number: int, pa: Any, notes: dict[str, str]) -> Any:
         add(name, pa.array(np.broadcast_to(column, shape).reshape(-1)), str(store.array(name).attrs["units"]))
     for name in store.results:
         array: Any = store.array(name)
-        values: Any = found.read(name, region).reshape(*[int(np.prod(shape))], *array.shape[len(shape) :])
+        values: Any = read(name, region).reshape(*[int(np.prod(shape))], *array.shape[len(shape) :])
         unit = str(array.attrs["units"])
         if "flag_meanings" in array.attrs:
             words = [word.replace("_", " ") for word in str(array.attrs["flag_meanings"]).split()]

@@ -228,7 +228,7 @@ class MapResult:
         NotAvailable
             If the file cannot be written.
         """
-        export.to_netcdf(self, path)
+        export.to_netcdf(self.store, self.read, path)
 
     def to_parquet(self, path: str | PathLike[str]) -> None:
         """Write one Parquet file with a row for each point.
@@ -238,7 +238,7 @@ class MapResult:
         NotAvailable
             If the file cannot be written, or pyarrow is missing.
         """
-        export.to_parquet(self, path)
+        export.to_parquet(self.store, self.read, path)
 
     def plot(self, x: str | None = None, y: str | None = None, show: str | None = None, **options: Any) -> Any:
         """Draw it; see `steadyslip.figures.map_figure`."""

@@ -1,0 +1,65 @@
+"""A run as data: what is kept in files, and what a result is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from steadyslip.core.errors import unknown_name
+from steadyslip.core.results import ReadOnly
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.events import Event
+from steadyslip.protocol import Protocol
+
+
+@dataclass(frozen=True, eq=False)
+class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
+    """What a rig does under a protocol: observables by name.
+
+    Attributes
+    ----------
+    rig : Slider
+    protocol : Protocol
+        With its end.
+    data : dict of str to ndarray
+        Time ``t`` (s) and every observable, SI units. Where a jump happens, its time occurs twice if the
+        solver's own steps are kept.
+    units : dict of str to str
+    events : tuple of Event
+        In the order of time.
+    status : str
+        ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
+        ``out of range`` (of floating point: the samples end before) or ``interrupted``.
+    end : float
+        Time reached, s: of the blow-up, of the loss of contact, or the end of the protocol.
+    method : str
+        Integration method used.
+    rtol : float
+    steps, rejected : int
+    """
+
+    rig: Slider
+    protocol: Protocol
+    data: dict[str, np.ndarray] = field(repr=False)
+    units: dict[str, str] = field(repr=False)
+    events: tuple[Event, ...] = field(repr=False)
+    status: str
+    end: float
+    method: str
+    rtol: float
+    steps: int
+    rejected: int
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        try:
+            return self.data[name]
+        except KeyError:
+            raise KeyError(unknown_name("observable", name, self.data)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return len(self.data)

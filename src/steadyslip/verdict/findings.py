@@ -1,0 +1,95 @@
+"""What an analysis finds, as data: what words, causes and plain data are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from steadyslip.linear.boundary import Margin
+from steadyslip.linear.search import Boundary
+from steadyslip.machine.slider import Slider
+from steadyslip.model.sliding import SteadySliding
+from steadyslip.nonlinear.onset.hopf import Onset
+
+if TYPE_CHECKING:
+    from steadyslip.nonlinear.kicks.threshold import Threshold
+
+
+@dataclass(frozen=True, repr=False)
+class Findings:
+    """What was found about one rig.
+
+    Attributes
+    ----------
+    rig : Slider
+    stable : bool or None
+        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
+    reason : str
+        Why, in one sentence.
+    steady : SteadySliding or None
+    critical_stiffness : float or None
+        Edge of the stable set nearest to the rig's own stiffness (Pa/m along the sliding direction).
+    critical_side : str or None
+        ``above`` or ``below``: where, next to that edge, sliding is stable.
+    critical_angular_frequency : float or None
+        Of the oscillation at the critical stiffness (rad/s), 0 if it does not oscillate.
+    critical_axial_stiffness : float or None
+        The same edge as stiffness along the axis of spring, rod or press, where the rig gives one (Pa/m).
+    stable_stiffness : tuple of (float, float)
+        All stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
+    eigenvalues : tuple of complex
+        1/s, by falling real part.
+    characteristic_polynomial : tuple of float
+        Coefficients, lowest power first (theory 3: a0, a1, ...).
+    routh : tuple of float
+        First column of the Routh array; stable if all are positive.
+    growth_rate : float or None
+        Largest real part (1/s), inf if ill-posed.
+    period : float or None
+        Of the least damped oscillation (s).
+    damping_ratio : float or None
+        Of that oscillation; negative if it grows.
+    time_to_halve, time_to_double : float or None
+        Of the slowest decay, or of the fastest growth (s).
+    on_edge : bool
+        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
+    onset : Onset or None
+        Kind of onset at the oscillatory edge in stiffness nearest to the rig, None where there is none.
+    kicks : tuple of Threshold
+        Smallest kicks that are not survived, where asked for.
+    margins : tuple of Margin
+        Distance of each parameter to its nearest edge, the most critical first.
+    branch : int
+        Which steady sliding is judged.
+    warnings : tuple of str
+    """
+
+    rig: Slider
+    stable: bool | None
+    reason: str
+    steady: SteadySliding | None
+    margins: tuple[Margin, ...]
+    warnings: tuple[str, ...] = ()
+    critical_stiffness: float | None = None
+    critical_side: str | None = None
+    critical_angular_frequency: float | None = None
+    critical_axial_stiffness: float | None = None
+    stable_stiffness: tuple[tuple[float, float], ...] = ()
+    eigenvalues: tuple[complex, ...] = ()
+    characteristic_polynomial: tuple[float, ...] = ()
+    routh: tuple[float, ...] = ()
+    growth_rate: float | None = None
+    period: float | None = None
+    damping_ratio: float | None = None
+    time_to_halve: float | None = None
+    time_to_double: float | None = None
+    on_edge: bool = False
+    branch: int = 0
+    onset: Onset | None = None
+    kicks: tuple[Threshold, ...] = ()
+    version: str = field(default="", repr=False)
+
+    @property
+    def boundaries(self) -> tuple[Boundary, ...]:
+        """Every edge found, parameter by parameter."""
+        return tuple(edge for margin in self.margins for edge in margin.edges)

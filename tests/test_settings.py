@@ -98,7 +98,7 @@ FAULTS = {
         "trend = true": "allowed: a whole number >= 0",
         "loss = 'soft'": "did you mean 'soft-l1'?",
         "drive = 'protocol'": "allowed: commanded, smoothed, measured",
-        "width = 0": "allowed: a number > 0",
+        "width = 0": "allowed: a finite number above 0",
         "width = '1 um'": "wrong dimension",
         "free = 3": "allowed: a list of names",
         "free = [1]": "allowed: a list of names",

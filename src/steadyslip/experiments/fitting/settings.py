@@ -15,7 +15,7 @@ LOSSES = ("linear", "soft-l1", "huber", "cauchy")
 MOST_STARTS = 10**6
 MOST_TREND = 6
 MOST_STATES = 100
-_width = Domain(0, math.inf, False, False, "a number > 0, in units of what is fitted")
+_width = Domain(0, math.inf, False, False, "a finite number above 0, in units of what is fitted")
 
 
 class FitSettings(Settings):

@@ -43,18 +43,6 @@ def clock(R: Array, tau: float) -> float:
     return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.END] else R[Row.STOP])
 
 
-def load_advance(R: Array, layout: Layout, tau: float) -> float:
-    """How far the load point has moved since the start of the segment."""
-    moved = R[Row.INPUT] * tau + 0.5 * R[Row.SLOPE] * tau * tau
-    for h in range(layout.harmonics):
-        omega = R[layout.omega + h]
-        if omega != 0.0:
-            phase = R[layout.phase + h]
-            amplitude = R[layout.amplitude + h]
-            moved += amplitude / omega * (math.cos(phase) - math.cos(omega * tau + phase))
-    return float(moved)
-
-
 def solve_balance(R: Array, routines: Routines, guess: float, y: Array) -> float:
     """The w that balances forces, nearest to the guess: bracketed outwards, then safeguarded Newton."""
     w = guess
@@ -108,7 +96,6 @@ def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, 
     """Start segment k: jump of the load point, new inputs, velocity from the balance. False if there is none."""
     s = j if segments.shape[0] > 1 else 0
     if k > 0:
-        R[Row.LOAD_MOVED] += load_advance(R, layout, R[Row.END])
         call(routines.restore, R, 0.0, y)
     row = segments[s, k]
     R[Row.SEGMENT] = k
@@ -308,7 +295,7 @@ def outrun(R: Array, layout: Layout, slowest: float, tau: float, y: Array) -> No
     R[Row.NOW_SIGMA] = y[n + Out.SIGMA]
     R[Row.NOW_TAU] = y[n + Out.TAU]
     R[Row.NOW_STRESS] = y[n + Out.T]
-    R[Row.NOW_X] = y[layout.x] + R[Row.LOAD_MOVED] + load_advance(R, layout, tau)
+    R[Row.NOW_X] = y[layout.x] + R[Row.LOAD_MOVED] + y[n + Out.ADVANCE]
     R[Row.NOW_SEGMENT] = R[Row.SEGMENT]
     R[Row.NOW_AT] = -1.0
 
@@ -349,7 +336,7 @@ def note(
     """Keep the tally of events, and the log where there is one."""
     n = layout.size
     time = clock(R, tau)
-    place = y[layout.x] + R[Row.LOAD_MOVED] + load_advance(R, layout, tau)
+    place = y[layout.x] + R[Row.LOAD_MOVED] + y[n + Out.ADVANCE]
     v, stress = y[n + Out.V], y[n + Out.T]
     if kind == Kind.SLIP_BEGINS:  # logged once it is fast, if ever: see quicken
         outrun(R, layout, v, tau, y)

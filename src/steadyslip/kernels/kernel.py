@@ -242,6 +242,7 @@ class Kernel:
         for i, value in enumerate(found):
             program.store(n + i, value, "y")
         program.store(n + Out.V_LP, point["in_v"], "y")
+        program.store(n + Out.ADVANCE, record.load_advance(program.number), "y")
         if self.choice.dense:
             if self.speed is not None:  # an extreme of velocity is one of the dense output in w
                 found[1] = program.load(n + Out.W_SLOPE, "y")
@@ -254,6 +255,8 @@ class Kernel:
         point = record.point(record.program.load(Row.TAU))
         for i, value in enumerate(record.evaluated(self.restored, point)):
             record.program.store(self.layout.continuous + i, value)
+        moved = record.program.load(Row.LOAD_MOVED) + record.load_advance(record.program.load(Row.TAU))
+        record.program.store(Row.LOAD_MOVED, moved)
         return record.program
 
     def _balance_program(self) -> Program:

@@ -65,8 +65,9 @@ SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, a
 class Out(IntEnum):
     """Places of the outputs, counted from the end of the state."""
 
-    V, ACCELERATION, SIGMA, TAU, T, V_LP, W_SLOPE, COUNT = 0, 1, 2, 3, 4, 5, 6, 7
-    """W_SLOPE is that of the dense output of the velocity variable; events follow from COUNT on."""
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, ADVANCE, W_SLOPE, COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8
+    """ADVANCE is the way of the load point since the start of the segment, W_SLOPE the slope of the dense output of the
+    velocity variable; events follow from COUNT on."""
 
 
 class Setting(IntEnum):
@@ -202,7 +203,7 @@ class Routines(NamedTuple):
     step : one step of every lane
     rates : rates, outputs and gap of the record's state
     outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events
-    restore : the variables that a jump leaves alone, from the record's state
+    restore : the variables that a jump leaves alone, from the record's state; what the load point moved is added up
     place : the record's state from them and the velocity variable `number`
     balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
     dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`

@@ -12,6 +12,7 @@ from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Row
 from steadyslip.kernels.nodes import Loop, Node, Program, Value, larger, primitive, select, smaller, weighted
 from steadyslip.kernels.source import Formulas
+from steadyslip.protocol.inputs import integral_to, level_at, slope_at
 
 if TYPE_CHECKING:
     from steadyslip.kernels.kernel import Kernel
@@ -19,6 +20,16 @@ if TYPE_CHECKING:
 CHANNELS = ("v", "q", "p")
 NEWTON_STEPS = 6
 Point = dict[str, Value]
+
+
+def sine(x: Value) -> Node:
+    """Of a node."""
+    return primitive("sin", x)
+
+
+def cosine(x: Value) -> Node:
+    """Of a node."""
+    return primitive("cos", x)
 
 
 def horner(coefficients: Sequence[Value], x: Node) -> Value:
@@ -81,23 +92,27 @@ class Record:
 
     def inputs(self, moment: Value) -> Point:
         """Inputs and their slopes at a local time of the segment."""
-        choice, layout, load, found = self.kernel.choice, self.kernel.layout, self.program.load, {}
+        load, found, constant = self.program.load, {}, self.kernel.choice.level == "constant"
         for i, c in enumerate(CHANNELS):
-            value: Value = load(Row.INPUT + i)
-            if choice.level != "constant":
-                slope: Value = load(Row.SLOPE + i)
-                value = value + slope * moment
-                for h in range(choice.harmonics):
-                    k = i * choice.harmonics + h
-                    amplitude, omega = load(layout.amplitude + k), load(layout.omega + k)
-                    angle = omega * moment + load(layout.phase + k)
-                    value = value + amplitude * primitive("sin", angle)
-                    slope = slope + amplitude * omega * primitive("cos", angle)
-                found[f"slope_{c}"] = slope
-            found[f"in_{c}"] = value
+            value, slope, waves = load(Row.INPUT + i), load(Row.SLOPE + i), self._waves(i)
+            found[f"in_{c}"] = value if constant else level_at(moment, value, slope, waves, sine)
+            if not constant:
+                found[f"slope_{c}"] = slope_at(moment, slope, waves, cosine)
         if self.kernel.reduction.model.imposed:
             found["time"] = load(Row.START) + moment
         return found
+
+    def _waves(self, channel: int) -> list[tuple[Node, Node, Node]]:
+        count, layout, load = self.kernel.choice.harmonics, self.kernel.layout, self.program.load
+        places = [(group + channel * count + h for group in (layout.amplitude, layout.omega, layout.phase))
+                  for h in range(count)]  # fmt: skip
+        return [(load(amplitude), load(omega), load(phase)) for amplitude, omega, phase in places]
+
+    def load_advance(self, moment: Value) -> Value:
+        """How far the load point has moved since the start of the segment."""
+        load = self.program.load
+        moved: Value = integral_to(moment, load(Row.INPUT), load(Row.SLOPE), self._waves(0), cosine)
+        return moved
 
     def state(self) -> list[Node]:
         """The record's own state."""

@@ -29,10 +29,11 @@ from steadyslip.motion.engine import (
     run_many,
 )
 from steadyslip.motion.jobs import Jobs, Options, prepare
-from steadyslip.motion.observe import observable_units, observe, out_of_range, segment_of
+from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.single import checked_times
 from steadyslip.motion.status import WORDS
 from steadyslip.protocol import Protocol
+from steadyslip.protocol.inputs import segment_of
 
 DONE = STATUSES.index("done")
 _UNITS = ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "s", "s", "1")

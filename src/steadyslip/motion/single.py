@@ -16,10 +16,11 @@ from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import Event, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
-from steadyslip.motion.observe import observable_units, observe, out_of_range, segment_of
+from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.result import History
 from steadyslip.motion.status import WORDS, remedy
 from steadyslip.protocol import Protocol
+from steadyslip.protocol.inputs import segment_of
 
 
 @checked(

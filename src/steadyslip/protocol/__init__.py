@@ -3,6 +3,7 @@
 pieces -> Protocol -> segments (one lane or many) -> kernels
 """
 
+from steadyslip.protocol.inputs import evaluate
 from steadyslip.protocol.load_point import (
     DisplacementStep,
     Hold,
@@ -13,7 +14,7 @@ from steadyslip.protocol.load_point import (
     VelocityStep,
 )
 from steadyslip.protocol.protocol import Piece, Protocol
-from steadyslip.protocol.segments import Segments, evaluate, pack
+from steadyslip.protocol.segments import Segments, pack
 from steadyslip.protocol.stress import (
     DisturbanceHarmonic,
     DisturbancePulse,

@@ -33,7 +33,7 @@ class Segments:
     value, slope : ndarray (lanes, n, 3)
         Lines.
     amplitude, angular_frequency, phase : ndarray (lanes, n, 3, h)
-        Sine waves, as many as are present at once at most; the rest are zero.
+        Sine waves, as many as are present at once at most; the rest have amplitude zero and angular frequency 1.
     """
 
     start: Array
@@ -173,7 +173,8 @@ def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, shape: tuple
     for (channel, _), present in zip(terms, active, strict=True):
         places.append(taken[channel].copy())
         taken[channel] += present
-    found = tuple(np.zeros((*shape, CHANNELS, int(taken.max(initial=0)))) for _ in range(3))
+    size = (*shape, CHANNELS, int(taken.max(initial=0)))
+    found = np.zeros(size), np.ones(size), np.zeros(size)
     for (channel, wave), present, place in zip(terms, active, places, strict=True):
         lane, segment = np.nonzero(_full(present, shape))
         slot = place[lane, segment]
@@ -185,27 +186,3 @@ def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, shape: tuple
 
 def _full(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     return np.ascontiguousarray(np.broadcast_to(array, shape))
-
-
-def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
-    """Load-point velocity (m/s), disturbance stress (Pa) and added normal stress (Pa) of the first lane at times `t`.
-
-    Just after a jump where `t` is that of a jump; at the end, just before.
-
-    Raises
-    ------
-    ParameterError
-        If a time lies outside the protocol.
-    """
-    times = np.asarray(t, dtype=float)
-    count = int(np.sum(segments.start[0] < segments.end[0]))
-    if not np.all((times >= 0) & (times <= segments.end[0, count - 1])):
-        last = float(segments.end[0, count - 1])
-        raise ParameterError([Problem("t", f"got {t!r}; allowed: times between 0 and {last!r} s")])
-    index = np.searchsorted(segments.start[0, :count], times, side="right") - 1
-    since = (times - segments.start[0, index])[..., None]
-    waves = segments.amplitude[0, index] * np.sin(
-        segments.angular_frequency[0, index] * since[..., None] + segments.phase[0, index]
-    )
-    found = segments.value[0, index] + segments.slope[0, index] * since + waves.sum(axis=-1)
-    return found[..., 0], found[..., 1], found[..., 2]

@@ -15,6 +15,7 @@ from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
 from steadyslip.experiments.measured.record import Record
 from steadyslip.protocol import Protocol, Segments, pack
+from steadyslip.protocol.inputs import inputs_at
 
 Array = np.ndarray
 LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
@@ -313,18 +314,12 @@ def _of(array: Array, own: Array, jobs: int) -> Array:
 
 def _at(segments: Segments, own: Array, times: Array, jobs: int) -> Array:
     """Inputs of the segments `own` at given times, (jobs, rows, 3)."""
-    since = (times - _of(segments.start, own, jobs))[:, :, None]
-    lane = np.arange(jobs)[:, None] if len(segments.start) > 1 else np.zeros((jobs, 1), dtype=int)
-    found: Array = segments.value[lane, own] + segments.slope[lane, own] * since
-    if segments.amplitude.shape[-1]:
-        angle = segments.angular_frequency[lane, own] * since[..., None] + segments.phase[lane, own]
-        found = found + np.sum(segments.amplitude[lane, own] * np.sin(angle), axis=-1)
-    return found
+    return inputs_at(segments, np.arange(jobs)[:, None], own, times)
 
 
 def _wave_nodes(segments: Segments, first: float, last: float) -> Array:
     """Further rows, so that sine waves are nearly straight on each."""
-    fastest = float(segments.angular_frequency.max(initial=0.0))
+    fastest = float(segments.angular_frequency.max(initial=0.0, where=segments.amplitude != 0))
     if not fastest:
         return np.empty(0)
     return np.arange(first, last, 2 * np.pi / fastest / PER_PERIOD)[1:]

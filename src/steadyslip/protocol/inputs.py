@@ -1,0 +1,140 @@
+"""What channels do at a moment: the one place where lines and sine waves are evaluated.
+
+The formulas serve whatever has arithmetic: arrays of NumPy here, nodes of a compiled program in
+`steadyslip.kernels.record`. On a segment a channel is ``value + slope t + Σ amplitude sin(ω t + phase)`` with t counted
+from the segment's start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.protocol.curves import Array
+from steadyslip.protocol.protocol import LOAD_POINT
+from steadyslip.protocol.segments import Segments
+
+Waves = Iterable[tuple[Any, Any, Any]]
+"""Amplitude, angular frequency and phase of each."""
+Function = Callable[[Any], Any]
+Indices = NDArray[np.intp]
+
+
+def level_at(t: Any, value: Any, slope: Any, waves: Waves, sine: Function) -> Any:
+    """A channel at t."""
+    found = value + slope * t
+    for amplitude, omega, phase in waves:
+        found = found + amplitude * sine(omega * t + phase)
+    return found
+
+
+def slope_at(t: Any, slope: Any, waves: Waves, cosine: Function) -> Any:
+    """Its rate of change."""
+    for amplitude, omega, phase in waves:
+        slope = slope + amplitude * omega * cosine(omega * t + phase)
+    return slope
+
+
+def integral_to(t: Any, value: Any, slope: Any, waves: Waves, cosine: Function) -> Any:
+    """Its integral from the start of the segment: for the load point, how far it has moved."""
+    found = value * t + 0.5 * slope * t * t
+    for amplitude, omega, phase in waves:
+        found = found + amplitude / omega * (cosine(phase) - cosine(omega * t + phase))
+    return found
+
+
+# -- of segments
+
+
+def segment_of(segments: Segments, lane: Any, time: Array) -> Indices:
+    """Index of the segment at each time, the later one at a breakpoint, the last one at the end.
+
+    Parameters
+    ----------
+    lane : ndarray of int
+        Of each time.
+    time : ndarray (points,)
+        s.
+    """
+    if len(segments.start) == 1:
+        index = np.searchsorted(segments.start[0], time, side="right") - 1
+    else:
+        index = np.sum(segments.start[lane] <= time[:, None], axis=1) - 1
+    real = np.sum(segments.start < segments.end, axis=1)
+    last = real[lane if len(real) > 1 else np.zeros_like(lane)] - 1
+    return np.clip(index, 0, last)
+
+
+def _parts(segments: Segments, lane: Any, segment: Any) -> tuple[Any, Array, Array, list[tuple[Array, Array, Array]]]:
+    """Where to look, lines and waves; the channels are the last axis."""
+    where = (lane if len(segments.start) > 1 else np.zeros_like(lane), segment)
+    waves = [
+        (segments.amplitude[where][..., h], segments.angular_frequency[where][..., h], segments.phase[where][..., h])
+        for h in range(segments.amplitude.shape[-1])
+    ]
+    return where, segments.value[where], segments.slope[where], waves
+
+
+def inputs_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
+    """Load-point velocity (m/s), disturbance and added normal stress (Pa): (..., 3).
+
+    Parameters
+    ----------
+    lane, segment : ndarray of int
+        Of each time, broadcast with it.
+    time : ndarray
+        Since the start of the run, s; beyond the segment its line and waves go on.
+    """
+    where, value, slope, waves = _parts(segments, lane, segment)
+    found: Array = level_at((time - segments.start[where])[..., None], value, slope, waves, np.sin)
+    return found
+
+
+def input_slopes(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
+    """Their rates of change, as `inputs_at`."""
+    where, _, slope, waves = _parts(segments, lane, segment)
+    found: Array = slope_at((time - segments.start[where])[..., None], slope, waves, np.cos)
+    return found
+
+
+def load_displacement(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
+    """Distance that the load point has moved since the start of the run, jumps included, m."""
+    every = np.arange(len(segments.start))[:, None], np.arange(segments.start.shape[1])[None]
+    whole = _moved(segments, *every, segments.end)
+    before = np.cumsum(segments.jump, axis=1) + np.cumsum(whole, axis=1) - whole
+    lane = lane if len(segments.start) > 1 else np.zeros_like(lane)
+    found: Array = before[lane, segment] + _moved(segments, lane, segment, time)
+    return found
+
+
+def _moved(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
+    where, value, slope, waves = _parts(segments, lane, segment)
+    own = [(a[..., LOAD_POINT], omega[..., LOAD_POINT], phase[..., LOAD_POINT]) for a, omega, phase in waves]
+    found: Array = integral_to(
+        time - segments.start[where], value[..., LOAD_POINT], slope[..., LOAD_POINT], own, np.cos
+    )
+    return found
+
+
+def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
+    """Load-point velocity (m/s), disturbance stress (Pa) and added normal stress (Pa) of the first lane at times `t`.
+
+    Just after a jump where `t` is that of a jump; at the end, just before.
+
+    Raises
+    ------
+    ParameterError
+        If a time lies outside the protocol.
+    """
+    times = np.asarray(t, dtype=float)
+    last = float(segments.end[0].max())
+    if not np.all((times >= 0) & (times <= last)):
+        raise ParameterError([Problem("t", f"got {t!r}; allowed: times between 0 and {last!r} s")])
+    lane = np.zeros(times.size, dtype=int)
+    first = Segments(*(part[:1] for part in vars(segments).values()))
+    found = inputs_at(first, lane, segment_of(first, lane, times.ravel()), times.ravel()).reshape(*times.shape, -1)
+    return found[..., 0], found[..., 1], found[..., 2]

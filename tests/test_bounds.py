@@ -374,7 +374,8 @@ def test_an_interrupted_run_is_what_there_is(times, tmp_path):
     assert run.interrupted
     assert run.end == told[-1] > told[0] > 0
     assert run.steps > 0
-    assert len(run["t"]) == (2 if times else run.steps + 1)
+    points = 4 if run.method == "dop853" else 1  # long steps get points between
+    assert len(run["t"]) == (2 if times else points * (run.steps - 1) + 2)  # start, jump, and all steps but the last
     assert run["t"][-1] <= run.end
     assert all(np.all(np.isfinite(values)) for values in run.data.values())
     assert all(event.time <= run.end for event in run.events)

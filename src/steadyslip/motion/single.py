@@ -60,12 +60,13 @@ def simulate(
         the friction law (names as in ``build_model(rig)``). Without mass, velocity follows from the memory:
         give one of the two (a given ``v`` adjusts the first memory variable that is not given).
     times : array_like, optional
-        Times at which to report, s, rising; the solver's own steps unless given. At a jump, the value after it.
+        Times at which to report, s, rising; the solver's own steps unless given, and three points within each of
+        those of order 8. At a jump, the value after it.
     events : bool, optional
         Whether to locate events.
     method : str, optional
-        ``explicit``, ``rosenbrock``, or ``auto``: explicit for massless rate-and-state models, which are not
-        stiff in ln v, Rosenbrock for everything else.
+        ``explicit``, ``rosenbrock``, a method's own name, or ``auto``: explicit for massless rate-and-state models,
+        which are not stiff in ln v (of order 8 where `rtol` is 1e-5 or less), Rosenbrock for everything else.
     rtol : float, optional
         Error allowed per step, relative to the size of each variable or to its scale (1 for ln v).
     most_steps : int, optional

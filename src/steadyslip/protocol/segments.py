@@ -33,7 +33,7 @@ class Segments:
     value, slope : ndarray (lanes, n, 3)
         Lines.
     amplitude, angular_frequency, phase : ndarray (lanes, n, 3, h)
-        Sine waves, as many as are present at once at most; the rest have amplitude zero and angular frequency 1.
+        Sine waves, as many as are present at once at most; the rest are zero.
     """
 
     start: Array
@@ -51,12 +51,16 @@ class Segments:
             return "harmonic"
         return "linear" if np.any(self.slope) else "constant"
 
+    def divisors(self) -> Array:
+        """Angular frequencies, 1 where there is no wave."""
+        return np.where(self.amplitude == 0, 1.0, self.angular_frequency)
+
     def rows(self, start: int, stop: int) -> Array:
         """Those of some lanes as the kernels read them: start, end, jump, values, slopes, waves."""
         lanes = slice(start, stop) if len(self.start) > 1 else slice(None)
         parts = [part[lanes, :, None] for part in (self.start, self.end, self.jump)]
         parts += [self.value[lanes], self.slope[lanes]]
-        for wave in (self.amplitude, self.angular_frequency, self.phase):
+        for wave in (self.amplitude, self.divisors(), self.phase):
             block = wave[lanes]
             parts.append(block.reshape(*block.shape[:2], -1))
         return np.ascontiguousarray(np.concatenate(parts, axis=2))
@@ -173,8 +177,7 @@ def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, shape: tuple
     for (channel, _), present in zip(terms, active, strict=True):
         places.append(taken[channel].copy())
         taken[channel] += present
-    size = (*shape, CHANNELS, int(taken.max(initial=0)))
-    found = np.zeros(size), np.ones(size), np.zeros(size)
+    found = tuple(np.zeros((*shape, CHANNELS, int(taken.max(initial=0)))) for _ in range(3))
     for (channel, wave), present, place in zip(terms, active, places, strict=True):
         lane, segment = np.nonzero(_full(present, shape))
         slot = place[lane, segment]

@@ -123,3 +123,11 @@ def test_no_number_that_is_none_is_printed():
     a_rig = unit_rig("aging", 0.5, 0.3, 1e-3)
     run = ss.simulate(a_rig, until=40.0, initial={"v": 1.2})
     assert "nan" not in str(run)
+
+
+def test_a_rate_that_is_lost_in_rounding_is_said_to_be():
+    """A block so heavy that its root is lost beside the others: the sign is known from the coefficients, no rate is."""
+    found = ss.analyze(ss.read_rig("examples/slow-axis.toml", ["mass=1e60 kg"]))
+    assert found.stable is False
+    assert "grows too slowly for a rate to be told from rounding" in str(found)
+    assert "neither grows nor dies" not in str(found)

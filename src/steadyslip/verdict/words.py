@@ -198,8 +198,8 @@ def _disturbance(analysis: Findings) -> str:
         text = f"doubles in {shown(analysis.time_to_double, 's')}"
     elif analysis.time_to_halve is not None:
         text = f"halves in {shown(analysis.time_to_halve, 's')}"
-    else:
-        text = "neither grows nor dies"
+    else:  # a root that is lost beside the others, though its sign is not
+        return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
     leading = analysis.eigenvalues[0]
     if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
         text += f", oscillating with period {shown(analysis.period, 's')}"

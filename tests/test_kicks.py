@@ -214,6 +214,15 @@ def test_peaks_that_shrink_towards_a_cycle_are_no_return():
     assert outcomes(a_rig, "velocity", [0.5], -1) == ["oscillation"]
 
 
+def test_cycles_of_several_slip_events_are_cycles():
+    """Two states, past two period doublings: four events, no two alike, until the motion repeats itself."""
+    states = (ss.State(b=0.010313918056883623, d_c=1e-6), ss.State(b=0.008294462572654671, d_c=4.530570134031203e-6))
+    friction = ss.RateState(a=0.013579666218587378, mu_ref=0.6, v_ref=1e-6, states=states, evolution=ss.Slip())
+    a_rig = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=6945501792.881493,
+                      drive=ss.Steady(1e-6))  # fmt: skip
+    assert outcomes(a_rig, "normal-stress", [0.008168182941285275], -1) == ["oscillation"]
+
+
 def test_outcomes_change_at_a_threshold_with_mass():
     """A step of velocity, beyond which mass makes the new sliding unstable."""
     a_rig = heavy(ss.Slip(), 1.3, 1e10)

@@ -1,5 +1,7 @@
 """Closed orbits near the ends of many runs at once, found by Newton's method and judged by their multipliers.
 
+Those of one slip event, or one turn, are looked for here; longer ones by `orbits.verify`, one run after another.
+
 The flow over one period and its derivative come from runs side by side: one from the state itself, two for each
 variable beside it (central differences). That is coarser than the variational equations of `flow`, enough to tell
 attraction from repulsion, and it needs no other kernel than the runs themselves.
@@ -7,13 +9,15 @@ attraction from repulsion, and it needs no other kernel than the runs themselves
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steadyslip.kernels.program import STATUSES
 from steadyslip.nonlinear.kicks.neighbourhood import rates_at
-from steadyslip.nonlinear.kicks.outcomes import Runs, advanced_runs
+from steadyslip.nonlinear.kicks.outcomes import Runs, advanced_runs, constant_inputs
+from steadyslip.nonlinear.orbits.flow import Runs as ConstantInputs
+from steadyslip.nonlinear.orbits.verify import cycle_near
 
 Array = np.ndarray
 BESIDE = 1e-4  # distance of the runs beside, in natural sizes
@@ -26,6 +30,15 @@ ON = 0.05  # distance of the run from the orbit, in sizes of the orbit, at which
 PRECISE = 0.01  # error of the orbit, in sizes of it, that is allowed
 AWAY = 1e-3  # distance from steady sliding below which a closed orbit is not told from it
 DONE = STATUSES.index("done")
+
+
+def on_long_cycle(runs: Runs, one: int, state: Array) -> bool:
+    """Whether one run, now at `state` (n,), is on an attracting cycle of several slip events, or turns."""
+    which, rest = np.array([one]), runs.rest
+    inputs = constant_inputs(np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which])
+    jobs = replace(runs.repeated(one, 1).jobs, segments=inputs)
+    cycle = cycle_near(ConstantInputs(jobs), state) if jobs.posed[0] else None
+    return cycle is not None and cycle.growth < 1 - ATTRACTS
 
 
 @dataclass

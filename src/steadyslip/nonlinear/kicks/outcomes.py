@@ -36,6 +36,7 @@ DECAYS = 6.0  # and decay times in the first span of a run; each span is twice a
 MOST_TURNS = 1000.0  # natural periods, and
 MOST_LOADING = 4000.0  # natural lengths after which a motion is undecided,
 MOST_STEPS = 4_000_000  # or steps
+LONG, LATE = 0.05, 0.4  # share of this time after which longer cycles are looked for too; where sliding is stable
 NEUTRAL_TURNS = 100.0  # where small motions neither grow nor decay: what stays bounded so long counts as returned
 ALIKE = 1e-2  # relative change of the time between slip events from span to span below which a cycle is looked for
 
@@ -176,7 +177,7 @@ def outcomes_of(
 
     `advanced` is told now and then how many more have been decided.
     """
-    from steadyslip.nonlinear.kicks.closed_orbits import attracted
+    from steadyslip.nonlinear.kicks.closed_orbits import attracted, on_long_cycle
     from steadyslip.nonlinear.kicks.shells import Shells
 
     count = len(runs.rest.velocity)
@@ -211,6 +212,9 @@ def outcomes_of(
         if len(tried):
             closed = attracted(runs, open_[tried], state[open_[tried]], apart[tried], threads)
             found[open_[tried[closed]]] = OSCILLATION
+        long = np.where(runs.rest.stable[going], LATE, LONG) * most[going]
+        waiting = going[(found[going] == OPEN) & ~neutral & (elapsed[going] > long)]
+        found[[one for one in waiting if on_long_cycle(runs, one, state[one])]] = OSCILLATION
         between[open_] = apart
         late = (elapsed[open_] >= most[open_]) | (steps[open_] >= MOST_STEPS * runs.effort) | (runs.budget.steps <= 0)
         found[open_[late & (found[open_] == OPEN)]] = UNDECIDED

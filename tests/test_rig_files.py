@@ -331,3 +331,15 @@ def test_rigs_with_an_area_come_back_to_the_last_bit(area, numbers, change):
     text = ss.rig_to_text(rig, protocol)
     assert ss.rig_from_text(text) == rig
     assert protocol_from_text(text) == protocol
+
+
+def test_a_message_has_an_end():
+    """A file can be wrong in thousands of places; nobody reads more than a page of them."""
+    text = '[friction]\nlaw = "rate-state"\na = 0.01\nmu_ref = 0.6\nv_ref = 1e-6\n' + "[[friction.states]]\n" * 500
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(text, "rig.toml")
+    shown = str(caught.value)
+    assert len(caught.value.problems) > 500
+    assert len(shown) < 20_000
+    assert f"{len(caught.value.problems)} problems" in shown
+    assert f"... and {len(caught.value.problems) - 40} more" in shown

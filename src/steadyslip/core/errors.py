@@ -56,6 +56,10 @@ class Problem:
         return Problem(name, self.message, self.line)
 
 
+SHOWN = 40
+"""Problems that a message lists; `ParameterError.problems` has all."""
+
+
 class ParameterError(SteadyslipError, ValueError):
     """One or more parameters are missing, misspelt or outside their domain."""
 
@@ -65,11 +69,13 @@ class ParameterError(SteadyslipError, ValueError):
         super().__init__(self._text())
 
     def _text(self) -> str:
-        lines = [str(problem) for problem in self.problems]
+        lines = [str(problem) for problem in self.problems[:SHOWN]]
+        if len(self.problems) > SHOWN:
+            lines.append(f"... and {len(self.problems) - SHOWN} more")
         if self.title and len(lines) == 1:
             return f"{self.title}: {lines[0]}"
         if self.title:
-            return "\n".join([f"{self.title}: {len(lines)} problems", *(f"  {i}" for i in lines)])
+            return "\n".join([f"{self.title}: {len(self.problems)} problems", *(f"  {i}" for i in lines)])
         return "\n".join(lines)
 
 

@@ -121,7 +121,8 @@ def main() -> None:
     options = parser.parse_args()
     only = tuple(options.only.split(","))
     for part, count in ((kicks, options.kicks), (thresholds, options.thresholds), (basins, options.basins)):
-        part(count, np.random.default_rng(options.seed), only)
+        if count:
+            part(count, np.random.default_rng(options.seed), only)
 
 
 if __name__ == "__main__":

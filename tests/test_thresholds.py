@@ -117,6 +117,17 @@ def test_impulse_with_mass():
         assert (peaks[-1] > 1.05 * peaks[1]) != survives
 
 
+def test_velocity_that_is_solved_for_is_watched_in_lanes_too():
+    """LuGre without mass: the velocity is no variable of the state; kicks and events run side by side all the same."""
+    friction = ss.LuGre(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10.0,
+                        viscous=5.0)  # fmt: skip
+    a_rig = ss.Slider(friction=friction, contact=ss.Constant(preload=1e6), stiffness=1e12, drive=ss.Steady(3e-3))
+    found = ss.simulate_many(a_rig, {"stiffness": [1e12, 2e12]}, ss.DisplacementStep(at=0.0, by=1e-7), until=0.1,
+                             events=True)  # fmt: skip
+    assert list(found.status) == ["done", "done"]
+    assert ss.threshold(a_rig, "displacement").size == np.inf
+
+
 def test_no_kick_is_large_enough_for_a_hardening_rig():
     found = ss.threshold(unit_rig("slip", -0.3, 0.5))
     assert found.size == np.inf

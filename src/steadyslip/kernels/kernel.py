@@ -169,7 +169,7 @@ class Kernel:
             variables.add(reduction.unknown)
         self.speed: Formulas | None = None
         self.limit: Formulas | None = None
-        alone = speed.free_symbols & variables == {W} and not inverse.free_symbols & variables
+        alone = speed.free_symbols & variables == {W} and not inverse.free_symbols & variables and W in reduction.state
         if self.choice.dense and alone:
             self.speed = self._formulas([self._fixed(speed)])
             self.limit = Formulas([self._fixed(inverse.xreplace({v: W}))], {W: "v"})

@@ -50,6 +50,9 @@ class Program:
 
     def constants(self, point: OperatingPoint) -> np.ndarray:
         """Constants of every rig, (rigs, number)."""
+        return _constants(point, self) if point.size == 1 else self._table(point)
+
+    def _table(self, point: OperatingPoint) -> np.ndarray:
         found = self._constants(*map(np.asarray, point.arguments), point.stresses)
         size = max([1, *(np.size(value) for value in found)])
         table = np.empty((size, len(found)))
@@ -65,6 +68,11 @@ class Program:
             table[:, column] = values[name]
         table[:, len(SETTINGS) :] = atol
         return table
+
+
+@question
+def _constants(point: OperatingPoint, machine: Program) -> np.ndarray:
+    return machine._table(point)
 
 
 @question

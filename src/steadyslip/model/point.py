@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,8 @@ class OperatingPoint(Keeper):
 
     def part(self, rows: slice | np.ndarray) -> OperatingPoint:
         """Some rigs of a flat point; single numbers are for all of them."""
+        if self.size == 1 and not any(map(np.ndim, self.arguments)):
+            return self
         cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, self.sigma)]
         found = self.with_arguments(cut[:-1], np.broadcast_shapes(*map(np.shape, cut)))
         found.__dict__["sigma"] = cut[-1]
@@ -143,10 +145,18 @@ def operating_point(
         If names are unknown, values are outside their domain or break a condition with others, or shapes do not
         broadcast; all problems are listed.
     """
+    if not (vary or present or scan):
+        return _own_point(rig, branch)
     together = _varied(rig, vary or {})
     varied = together.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
     return _placed(build_model(rig, present=[*structural, *present]), rig, together, branch, scan)
+
+
+@lru_cache(maxsize=256)
+def _own_point(rig: Slider, branch: int) -> OperatingPoint:
+    """Of a rig as it is, with the answers that were asked of it before."""
+    return _placed(build_model(rig), rig, _varied(rig, {}), branch, False)
 
 
 def point_of(model: Model, rig: Slider, vary: Vary | None, branch: int) -> OperatingPoint:

@@ -65,6 +65,7 @@ def weights(point: OperatingPoint) -> Weights:
     return Weights(direct, by_slip, rest[:count], rest[count : 2 * count], rest[2 * count :], by_unknown)
 
 
+@question
 def posed(point: OperatingPoint) -> np.ndarray:
     """Whether the balance of forces rises with its unknown (velocity, or acceleration) in steady sliding.
 
@@ -73,6 +74,7 @@ def posed(point: OperatingPoint) -> np.ndarray:
     return np.atleast_1d(weights(point).by_unknown > 0)
 
 
+@question
 def eliminable(point: OperatingPoint) -> int | None:
     """The memory variable to leave out: of those that allow it, the one with most weight in friction.
 
@@ -90,7 +92,8 @@ def eliminable(point: OperatingPoint) -> int | None:
     return None
 
 
-def natural_scales(reduction: Reduction, point: OperatingPoint) -> tuple[dict[str, Any], Any]:
+@question
+def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[dict[str, Any], Any]:
     """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance.
 
     By name; and the size of the unknown that is left to solve for, which has no name among them.

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.questions import question
 from steadyslip.core.records import twin
 from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.program import Program, program
 from steadyslip.machine.slider import Slider
@@ -110,29 +112,41 @@ class Jobs:
 
     def tables(self, machine: Program, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
         """Constants, initial, settings and segment rows of some jobs."""
-        point, options = self.point.part(slice(start, stop)), self.options
-        constants = machine.constants(point)
-        scales, unknown = natural_scales(self.reduction, point)
+        point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
         velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
-        sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in self.reduction.names)))
-        settings = machine.settings(
-            {
-                "rtol": options.rtol,
-                "most_steps": options.most_steps,
-                "v_high": point.drive * BLOW_UP,
-                "v_low": point.drive * options.arrest,
-                "sigma_low": CONTACT_SHARE * point.stresses,
-                "watch": float(watch),
-                "record": float(record),
-                "guess": guess(self.reduction, point, initial, velocity),
-                "z_scale": unknown,
-                "first_step": scales["x"] / point.drive,
-                "v_drive": point.drive,
-            },
-            options.rtol * sizes,
-        )
-        return constants, initial, settings, self.segments.rows(start, stop)
+        at_start = guess(self.reduction, point, initial, velocity)
+        ask = _kept_settings if point.size == 1 else _settings
+        settings = ask(point, machine, self.reduction, self.options)
+        settings = np.tile(settings, (max(len(settings), np.size(at_start)) // len(settings), 1))
+        settings[:, Setting.GUESS] = at_start
+        settings[:, Setting.WATCH], settings[:, Setting.RECORD] = watch, record
+        return machine.constants(point), initial, settings, self.segments.rows(start, stop)
+
+
+def _settings(point: OperatingPoint, machine: Program, reduction: Reduction, options: Options) -> np.ndarray:
+    """Rows of settings, but for what depends on the start and on what is wanted."""
+    scales, unknown = natural_scales(point, reduction)
+    sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))
+    return machine.settings(
+        {
+            "rtol": options.rtol,
+            "most_steps": options.most_steps,
+            "v_high": point.drive * BLOW_UP,
+            "v_low": point.drive * options.arrest,
+            "sigma_low": CONTACT_SHARE * point.stresses,
+            "watch": 0.0,
+            "record": 0.0,
+            "guess": 0.0,
+            "z_scale": unknown,
+            "first_step": scales["x"] / point.drive,
+            "v_drive": point.drive,
+        },
+        options.rtol * sizes,
+    )
+
+
+_kept_settings = question(_settings)
 
 
 def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
@@ -176,7 +190,7 @@ def prepare(
     own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
     plan = Protocol.of(protocol).varied({name: value for name, value in vary.items() if name not in own})
     point = operating_point(rig, own, branch=branch)
-    _refuse_singular(rig, point)
+    _refuse_singular(rig, point, bool(own))
     final = plan.until if until is None else until
     if final is None:
         raise ParameterError([Problem("until", "missing; give the end of the run in s, such as until=200")])
@@ -193,8 +207,9 @@ def prepare(
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
 
 
-def _refuse_singular(rig: Slider, point: OperatingPoint) -> None:
+def _refuse_singular(rig: Slider, point: OperatingPoint, varied: bool) -> None:
     """What the friction law says cannot be followed beyond small motions."""
-    for condition in twin(rig, point.named()).friction.motion_conditions():
+    friction = (twin(rig, point.named()) if varied else rig).friction
+    for condition in friction.motion_conditions():
         if (problem := condition.problem()) is not None:
             raise NotAvailable(f"friction.{problem}")

@@ -65,8 +65,8 @@ def observe(
     machine.code.observe(constants, settings, np.ascontiguousarray(states), inputs, lane.astype(np.int64), values)
     found = dict(zip(("v", "acceleration", "normal_stress", "shear_stress", "spring_stress"), values.T, strict=False))
     found["x"] = states[:, 0]
-    continuous = {str(s): values[:, 5 + i] for i, s in enumerate(reduction.continuous)}
-    found |= {item.name: continuous[str(item.symbol)] for item in (*model.memory, *model.integrals)}
+    continuous = dict(zip(reduction.continuous, values.T[5:], strict=True))
+    found |= {item.name: continuous[item.symbol] for item in (*model.memory, *model.integrals)}
     found["load_velocity"], found["disturbance"] = inputs[:, 0], inputs[:, 1]
     found["load_displacement"] = load_displacement(*where)
     found["slip"] = found["x"] + found["load_displacement"]

@@ -103,7 +103,8 @@ def simulate(
     requested = checked_times(times, final)
     machine = jobs.program(lanes=1, dense=True)
     outcome = run_single(jobs, machine, requested, watch=events, record=times is None, progress=progress)
-    plan = replace(Protocol.of(protocol), until=final)
+    plan = Protocol.of(protocol)
+    plan = plan if plan.until == final else replace(plan, until=final)
     return _history(rig, plan, jobs, machine, outcome, requested, times is None)
 
 

@@ -72,6 +72,8 @@ def segment_of(segments: Segments, lane: Any, time: Array) -> Indices:
 def _parts(segments: Segments, lane: Any, segment: Any) -> tuple[Any, Array, Array, list[tuple[Array, Array, Array]]]:
     """Where to look, lines and waves; the channels are the last axis."""
     where = (lane if len(segments.start) > 1 else np.zeros_like(lane), segment)
+    if not segments.amplitude.shape[-1]:
+        return where, segments.value[where], segments.slope[where], []
     found = [wave[where] for wave in (segments.amplitude, segments.divisors(), segments.phase)]
     waves = [(found[0][..., h], found[1][..., h], found[2][..., h]) for h in range(segments.amplitude.shape[-1])]
     return where, segments.value[where], segments.slope[where], waves

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.results import read_only
 from steadyslip.protocol.curves import Array, Curve, Jump, Wave, chain, column, knots, side_by_side
 from steadyslip.protocol.protocol import CHANNELS, LOAD_POINT, ROUNDING, Protocol
 
@@ -114,6 +116,14 @@ def pack(protocol: Protocol, velocity: Any, until: Any) -> Segments:
     ParameterError
         If arrays differ in length, `until` is not positive, or the pieces that set the velocity overlap in a lane.
     """
+    try:
+        hash((protocol, velocity, until))
+    except TypeError:  # arrays
+        return _packed(protocol, velocity, until)
+    return _packed_before(protocol, velocity, until)
+
+
+def _packed(protocol: Protocol, velocity: Any, until: Any) -> Segments:
     final = column(until)
     if not np.all((final > 0) & np.isfinite(final)):
         raise ParameterError([Problem("until", f"got {until!r}; allowed: a finite number > 0 in s")])
@@ -130,6 +140,11 @@ def pack(protocol: Protocol, velocity: Any, until: Any) -> Segments:
         slope[:, :, channel] += rate
     waves = _waves(terms.waves, start, end, shape)
     return Segments(_full(start, shape), _full(end, shape), jump, value, slope, *waves)
+
+
+@lru_cache(maxsize=32)
+def _packed_before(protocol: Protocol, velocity: float, until: float) -> Segments:
+    return Segments(*map(read_only, vars(_packed(protocol, velocity, until)).values()))
 
 
 def _terms(protocol: Protocol, velocity: Any) -> _Terms:

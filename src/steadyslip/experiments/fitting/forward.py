@@ -193,7 +193,7 @@ class Forward:
     def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
         """rtol, guess of the unknown and its scale, limit of steps, absolute tolerances."""
         reduction = self.program.reduction
-        scales, unknown = natural_scales(reduction, values)
+        scales, unknown = natural_scales(values, reduction)
         size = len(reduction.names)
         settings = np.empty((jobs, 4 + size * (1 + self.size)))
         settings[:, 0] = self.rtol

@@ -187,7 +187,7 @@ def rest_of(jobs: Jobs, velocity: Array, pressure: Array) -> Rest:
         n = len(reduction.state)
         state, unknown = found[:, :n], found[:, -1]
         state = np.where(np.all(np.isfinite(found), axis=1)[:, None], state, np.nan)
-        own, _ = natural_scales(reduction, point)
+        own, _ = natural_scales(point, reduction)
         if reduction.velocity == "linear":
             own["w"] = velocity
         scales = _columns([own[name] for name in reduction.names], count)

@@ -1,12 +1,14 @@
 """The house: a name means one thing, and the folders keep their order."""
 
 import ast
+import dataclasses
 from collections import defaultdict
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import steadyslip
+import steadyslip as ss
 
 SOURCE = Path(steadyslip.__file__).parent
 
@@ -53,3 +55,54 @@ def test_modules_do_not_import_in_circles():
         folder = own.split(".")[1:2]
         needed -= {other for other in needed if other.split(".")[1:2] == folder and folder and folder[0] in still}
     TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
+
+
+KNOWS_LAWS = ("laws", "machine", "testing", "reproduce")
+"""Folders that may name a law; and the figure of the paper that is about one."""
+OF_THE_PAPER = {Path("figures/mass.py"), Path("figures/critical.py"), Path("linear/paper.py")}
+FOUNDED = {"velocity", "stiffness", "axial_stiffness", "mass", "damping", "radiation_damping", "area"}
+"""Parameters of every rig: the slider's own, and the velocity of its drive."""
+
+
+def laws_and_their_fields():
+    """Classes of every family, the words that rig files use for them, and the names of their parameters."""
+    families = (ss.FrictionLaw, ss.ContactLaw, ss.Evolution, ss.NormalMemory, ss.Drive)
+    laws = [law for family in families for law in family.registry.values()]
+    laws = [law for law in laws if law.__module__.startswith("steadyslip.")]
+    fields = {item.name for law in (*laws, ss.State) for item in dataclasses.fields(law)} - {
+        "direction"
+    }  # a method too
+    roles = {item.name for family in families for item in dataclasses.fields(family)} - {"velocity"}
+    assert not roles
+    parts = {"evolution", "states", "normal_memory"}
+    return {law.__name__ for law in laws} | {"State"}, {law.name for law in laws}, (fields | parts) - FOUNDED
+
+
+def prose(tree):
+    """Strings that are docstrings, or text for people: with a blank in them."""
+    return {id(node) for node in ast.walk(tree) if isinstance(node, ast.Constant) and " " in str(node.value)}
+
+
+def test_only_laws_know_laws():
+    """No class of a law imported, no parameter or private method of one used, no name of one compared."""
+    classes, words, fields = laws_and_their_fields()
+    arguments = {("experiments/spec.py", "v_ref")}  # of `lab_rig`, which makes a rig of the usual law
+    telling = {word for word in words | fields if {"_", "-"} & set(word)}  # others mean more than a law
+    found = []
+    for path, tree in trees().items():
+        if path.parts[0] in KNOWS_LAWS or path in OF_THE_PAPER:
+            continue
+        spoken = prose(tree)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("steadyslip.laws"):
+                found += [f"{path}:{node.lineno} imports {a.name}" for a in node.names if a.name in classes]
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute | ast.Name):
+                owner = node.value.attr if isinstance(node.value, ast.Attribute) else node.value.id
+                if owner in ("friction", "contact", "drive") and (node.attr in fields or node.attr.startswith("_")):
+                    found.append(f"{path}:{node.lineno} uses {owner}.{node.attr}")
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in spoken:
+                last = node.value.rpartition(".")[2]
+                dotted = node.value.startswith(("friction.", "contact.", "drive.")) and last in fields
+                if (dotted or node.value in telling) and (path.as_posix(), node.value) not in arguments:
+                    found.append(f"{path}:{node.lineno} says {node.value!r}")
+    assert "\n".join(found) == ""

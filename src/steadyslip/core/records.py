@@ -59,6 +59,7 @@ KINDS = {
     "slip distance": "slip over which a memory fades",
     "reference rate": "velocity at which other parameters hold",
     "stress share": "share of the response to normal stress that is not immediate",
+    "normal stress": "of the contact, in steady sliding or without coupling to the motion",
     "stiffness": "of the spring, or of what acts as one",
 }
 """What a parameter can be to the stages that look for meaning, not for names."""
@@ -86,6 +87,8 @@ class Parameter:
         What it is to those who scale motions or fit records without knowing the law: one of `KINDS`, or nothing.
     size : float or None
         Change that matters, of a parameter that may be zero or of either sign; a positive one has its own size.
+    letter : str
+        Its symbol in equations; its name unless given.
     standing : float or None
         Stands for the parameter where it is yet to be fitted.
     """
@@ -99,6 +102,7 @@ class Parameter:
     kind: str = ""
     size: float | None = None
     standing: float | None = None
+    letter: str = ""
 
     def __post_init__(self) -> None:
         if self.kind and self.kind not in KINDS:
@@ -193,9 +197,10 @@ def parameter(
     kind: str = "",
     size: float | None = None,
     standing: float | None = None,
+    letter: str = "",
 ) -> Any:
     """Declare a numeric parameter; ``default=None`` makes it optional, the rest is as in `Parameter`."""
-    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing)
+    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter)
     return field(default=default, metadata={_ROLE: role})
 
 

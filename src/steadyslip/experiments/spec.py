@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import Field, dataclass, field, fields, replace
 from os import PathLike
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.progress import progress_text
-from steadyslip.core.records import Parameter, checked_number, given, positive, resolve
+from steadyslip.core.records import FrozenRecord, Parameter, Part, checked_number, given, positive, resolve, role_of
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
@@ -22,21 +22,15 @@ from steadyslip.experiments.measured.settings import RecordSettings
 from steadyslip.files.specifications.layout import Section
 from steadyslip.files.specifications.read import read_specification, text_of
 from steadyslip.files.specifications.toml import Table
+from steadyslip.laws import contact as contact_laws, friction as friction_laws
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.laws.friction import FrictionLaw
+from steadyslip.machine.drive import Drive
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
 TABLES = (Section("record", RecordSettings), Section("fit", FitSettings))
 """The tables of such a file besides those of a rig."""
-_STANDING = {
-    "friction.a": 0.01,
-    "friction.b": 0.01,
-    "friction.d_c": 1e-5,
-    "friction.mu_ref": 0.6,
-    "slider.stiffness": 1e10,
-}
-"""Values that stand for parameters that a file leaves to the fit; they have no influence."""
-_SETTINGS = {"friction.v_ref": 1e-6, "drive.velocity": 1e-6, "contact.steady_normal_stress": 1e6}
-"""The same for what each record determines."""
 
 
 @dataclass(frozen=True)
@@ -111,10 +105,11 @@ class Spec:
                 )
                 raise ParameterError([Problem("drive.velocity", message)])
             rig = rig.with_values({"drive.velocity": rate})
-        if self.v_ref_given or "friction.v_ref" not in rig.parameters():
+        references = [name for name in rig.of_kind("reference rate") if name.startswith("friction.")]
+        if self.v_ref_given or not references:
             return rig, parts
         slow = rig.drive.velocity if rate is None or not rate > 0 else rate
-        return rig.with_values({"friction.v_ref": slow}), parts
+        return rig.with_values(dict.fromkeys(references, slow)), parts
 
 
 def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
@@ -150,11 +145,11 @@ def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ())
     options = {n: list(v) if isinstance(v, tuple) else v for n, v in given(settings).items() if n not in own}
     if settings.free is None and missing:
         options["free"] = sorted(name for name in missing if name in rig.parameters())
-        if "friction.mu_ref" not in missing and "friction.mu_ref" in rig.parameters():
-            options["fixed"] = [*settings.fixed, "friction.mu_ref"]
+        if known := [name for name in rig.of_kind("friction level") if name not in missing]:
+            options["fixed"] = [*settings.fixed, *known]
     return Spec(
         rig, found.protocol, record if isinstance(record, RecordSettings) else RecordSettings(), options,
-        settings.compare, settings.windows, *(filled.given(name, found.changed) for name in _Filled.FROM_RECORDS),
+        settings.compare, settings.windows, *(filled.given(kind, found.changed) for kind in _Filled.FROM_RECORDS),
     )  # fmt: skip
 
 
@@ -203,18 +198,21 @@ def _checked(name: str, unit: str, value: Any) -> float:
 
 
 class _Filled:
-    """Puts values where a file has none, and knows which of them are to be fitted or are those of the records."""
+    """Puts values where a file has none, and knows which of them are to be fitted or are those of the records.
 
-    FROM_RECORDS = ("friction.v_ref", "contact.steady_normal_stress", "drive.velocity")
+    What may be missing, and what stands for it, the laws declare (`Parameter.standing`).
+    """
+
+    FROM_RECORDS = ("reference rate", "normal stress", "drive velocity")
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.missing: set[str] = set()
-        self.standing: set[str] = set()
+        self.standing: dict[str, str] = {}
 
-    def given(self, name: str, changed: set[str]) -> bool:
+    def given(self, kind: str, changed: set[str]) -> bool:
         """Whether the file, or a change, says what records would say otherwise."""
-        return name not in self.standing or name in changed
+        return kind not in self.standing or self.standing[kind] in changed
 
     def complete(self, tables: Table) -> None:
         """Fill the tables."""
@@ -225,55 +223,91 @@ class _Filled:
         contact, drive, slider = (tables.setdefault(n, {}) for n in ("contact", "drive", "slider"))
         if any(not isinstance(table, dict) for table in (friction, contact, drive, slider)):
             return
-        if friction.setdefault("law", "rate-state") == "rate-state":
-            self._friction(friction, states)
-        elif isinstance(states, int) and states > 1:
-            message = f"got {states!r}; the law {friction['law']!r} has no number of states"
-            self.problems.append(Problem("fit.states", message))
-        if not {"stiffness", "axial_stiffness"} & set(slider) and not drive.get("kp"):
-            self._fit(slider, "stiffness", "slider.stiffness", _STANDING["slider.stiffness"])
-        self._stand(drive, "drive.velocity")
+        law = FrictionLaw.registry.get(str(friction.setdefault("law", friction_laws.USUAL)))
+        if law is not None:
+            self._law(friction, law, "friction.", states)
+        stiff = [item for item in fields(Slider) if _kind(item) == "stiffness"]
+        gains = {item.name for one in Drive.registry.values() for item in fields(one) if _kind(item) == "stiffness"}  # type: ignore[arg-type]
+        if not {item.name for item in stiff} & set(slider) and not any(drive.get(name) for name in gains):
+            self._fill(slider, stiff[0], "slider.")
+        if "velocity" not in drive:
+            drive["velocity"] = 1e-6
+            self.standing["drive velocity"] = "drive.velocity"
         if not pressed:
-            contact["law"] = "constant"
-        if contact.get("law") == "constant" and not {"preload", "steady_normal_stress"} & set(contact):
-            self._stand(contact, "contact.steady_normal_stress")
+            contact["law"] = contact_laws.USUAL
+        if contact.get("law") == contact_laws.USUAL:
+            loads = [item for item in fields(ContactLaw.registry[contact_laws.USUAL]) if _kind(item) == "normal stress"]  # type: ignore[arg-type]
+            if not {item.name for item in loads} & set(contact):
+                for item in loads:
+                    self._fill(contact, item, "contact.")
 
-    def _fit(self, table: Table, key: str, name: str, value: float) -> None:
-        if key not in table:
-            table[key] = value
-            self.missing.add(name)
-
-    def _stand(self, table: Table, name: str) -> None:
-        key = name.rpartition(".")[2]
-        if key not in table:
-            table[key] = _SETTINGS[name]
-            self.standing.add(name)
-
-    def _friction(self, friction: Table, states: Any) -> None:
-        self._stand(friction, "friction.v_ref")
-        self._fit(friction, "a", "friction.a", _STANDING["friction.a"])
-        self._fit(friction, "mu_ref", "friction.mu_ref", _STANDING["friction.mu_ref"])
-        members = friction.get("states")
-        if members is None and isinstance(states, int) and 1 < states <= MOST_STATES:
-            if {"b", "d_c"} & set(friction):
-                message = "friction has b or d_c of a single state; leave them away"
-                self.problems.append(Problem("fit.states", message))
-                return
-            members = friction["states"] = [{} for _ in range(states)]
-        if isinstance(members, list) and all(isinstance(member, dict) for member in members):
-            for i, member in enumerate(members, start=1):
-                self._fit(member, "b", f"friction.states.{i}.b", _STANDING["friction.b"] / i)
-                self._fit(member, "d_c", f"friction.states.{i}.d_c", _STANDING["friction.d_c"] * 10.0 ** (i - 1))
+    def _fill(self, table: Table, item: Field[Any], prefix: str, factor: float = 1.0) -> None:
+        """A value for a parameter that has none, if it declares one that may stand for it."""
+        role = role_of(item)
+        if item.name in table or not isinstance(role, Parameter) or role.standing is None:
+            return
+        table[item.name] = role.standing * factor
+        if role.kind in self.FROM_RECORDS:
+            self.standing[role.kind] = f"{prefix}{item.name}"
         else:
-            self._fit(friction, "b", "friction.b", _STANDING["friction.b"])
-            self._fit(friction, "d_c", "friction.d_c", _STANDING["friction.d_c"])
-        memory = friction.get("normal_memory")
-        if memory == "linker-dieterich":
-            memory = friction["normal_memory"] = {"law": "linker-dieterich"}
-        if isinstance(memory, dict) and memory.get("law") == "linker-dieterich":
-            own = isinstance(members, list) and any("alpha" in m for m in members if isinstance(m, Mapping))
-            if not own:
-                self._fit(memory, "alpha", "friction.normal_memory.alpha", 0.3)
+            self.missing.add(f"{prefix}{item.name}")
+
+    def _law(self, table: Table, law: type[FrozenRecord], prefix: str, states: Any = None) -> None:
+        """All parameters of a law and of its parts; of a list of states either the law's own, or the list's."""
+        items = {item.name: item for item in fields(law)}  # type: ignore[arg-type]  # every law is a dataclass
+        roles = {name: role for name, item in items.items() if isinstance(role := role_of(item), Part)}
+        lists = [name for name, role in roles.items() if role.many]
+        if not lists and isinstance(states, int) and states > 1:
+            self.problems.append(Problem("fit.states", f"got {states!r}; the law {law.name!r} has no number of states"))
+        elsewhere: set[str] = set()
+        for name in lists:
+            elsewhere |= self._members(table, name, roles[name].family, prefix, states)
+        for name, item in items.items():
+            if name not in elsewhere:
+                self._fill(table, item, prefix)
+        for name, role in roles.items():
+            if not role.many:
+                self._part(table, name, role, prefix, elsewhere)
+
+    def _members(self, table: Table, name: str, family: type[FrozenRecord], prefix: str, states: Any) -> set[str]:
+        """Fill the members of a list; what they have, given or filled, the law itself need not."""
+        items = [item for item in fields(family) if getattr(role_of(item), "standing", None) is not None]  # type: ignore[arg-type]
+        single = {item.name for item in items} & set(table)
+        if name not in table and isinstance(states, int) and 1 < states <= MOST_STATES:
+            if single:
+                words = " or ".join(item.name for item in items)
+                self.problems.append(Problem("fit.states", f"friction has {words} of a single state; leave them away"))
+                return {item.name for item in items}
+            table[name] = [{} for _ in range(states)]
+        members = table.get(name)
+        if not (isinstance(members, list) and all(isinstance(member, dict) for member in members)):
+            return set()
+        for i, member in enumerate(members, start=1):
+            for item in items:
+                apart = 10.0 ** (i - 1) if _kind(item) == "slip distance" else 1.0 / i
+                self._fill(member, item, f"{prefix}{name}.{i}.", apart)
+        return {item.name for item in items} | {key for member in members for key in member}
+
+    def _part(self, table: Table, name: str, role: Part, prefix: str, elsewhere: set[str]) -> None:
+        """The parameters of a part, beside the law's own or in a table of their own."""
+        chosen = table.get(name)
+        own = chosen.get("law") if isinstance(chosen, dict) else chosen
+        law = role.family.registry.get(own) if isinstance(own, str) else None
+        if law is None:
+            return
+        items = [item for item in fields(law) if getattr(role_of(item), "standing", None) is not None]  # type: ignore[arg-type]
+        items = [item for item in items if item.name not in elsewhere]
+        if items and not role.inline and not isinstance(chosen, dict):
+            chosen = table[name] = {"law": own}
+        for item in items:
+            target = table if role.inline or not isinstance(chosen, dict) else chosen
+            self._fill(target, item, prefix if role.inline else f"{prefix}{name}.")
+
+
+def _kind(item: Field[Any]) -> str:
+    """What a field's parameter is; see `steadyslip.core.records.KINDS`."""
+    role = role_of(item)
+    return role.kind if isinstance(role, Parameter) else ""
 
 
 def _left_open(missing: set[str], settings: FitSettings, rig: Slider) -> list[Problem]:
@@ -294,7 +328,7 @@ def _left_open(missing: set[str], settings: FitSettings, rig: Slider) -> list[Pr
 
     absent = missing & named("fixed")
     if settings.free is not None:
-        absent |= missing - named("free") - {"friction.mu_ref"}
+        absent |= missing - named("free") - set(rig.of_kind("friction level"))
     if problems:  # a misspelt name is not a missing one
         return problems
     message = "has no value and is not fitted; give it one, or name it in [fit] free"

@@ -57,12 +57,9 @@ def slip_distance(rig: Slider) -> float:
         raise NotAvailable(
             f"the contact is {rig.contact.name!r}, which has no spring angle to vary; allowed: inclined-spring"
         )
-    known = rig.parameters()
-    for name in ("friction.d_c", "friction.states.1.d_c"):
-        address = known.get(name)
-        if address is not None and address.value is not None:
-            return address.value
-    raise NotAvailable(f"the friction law {rig.friction.name!r} has no slip distance d_c; allowed: rate-state")
+    for name in rig.of_kind("slip distance"):
+        return float(rig.value(name) or 0.0)
+    raise NotAvailable(f"the friction law {rig.friction.name!r} has no slip distance to scale with")
 
 
 def mass_of_equal_stiffness(rig: Slider, angles: Iterable[float]) -> float:

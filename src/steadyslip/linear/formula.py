@@ -53,8 +53,11 @@ def _formula(model: Model) -> sp.Eq:
     del known["k"]
     friction = model.steady[model.contact.friction] / model.contact.sigma_ss
     mu = _in_time(lambda: sp.simplify(friction), friction)
+    levels = [model.parameters[name] for name in model.with_role("friction level")]
     numerator, denominator = cubic.hopf_line(**known)
-    short = _in_time(lambda: _shortest(_with_mu(numerator, mu), _with_mu(denominator, mu)), numerator / denominator)
+    short = _in_time(
+        lambda: _shortest(*(_with_mu(part, mu, levels) for part in (numerator, denominator))), numerator / denominator
+    )
     return sp.Eq(sp.Symbol("k_cr") + model.gain, short, evaluate=False)
 
 
@@ -86,10 +89,10 @@ def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
     return found[0] if found else otherwise
 
 
-def _with_mu(expression: sp.Expr, mu: sp.Expr) -> sp.Expr:
-    """Write mu_ss for the steady friction coefficient wherever its reference value occurs in it."""
-    reference = next((symbol for symbol in mu.free_symbols if symbol.name == "mu_ref"), None)
-    if reference is None or mu.diff(reference) != 1:
+def _with_mu(expression: sp.Expr, mu: sp.Expr, levels: list[sp.Symbol]) -> sp.Expr:
+    """Write mu_ss for the steady friction coefficient wherever one of its reference values `levels` occurs in it."""
+    reference = next((symbol for symbol in levels if mu.diff(symbol) == 1), None)
+    if reference is None:
         return expression
     return sp.expand(expression.xreplace({reference: MU_SS - (mu - reference)}))
 

@@ -72,17 +72,10 @@ def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> Any:
-        added = _gain(part.model)(*part.arguments)[0]
         with np.errstate(all="ignore"):
-            return (part.named()["slider.stiffness"] + added) / (_nearest_edge(part) + added)
+            return (part.named()["slider.stiffness"] + part.gain) / (_nearest_edge(part) + part.gain)
 
     return point.wrap(in_chunks(point, kernel), "safety_factor", "1")
-
-
-@question
-def _gain(model: Model) -> Callable[..., list[Any]]:
-    """Stiffness that the controller adds, as a function of the model's parameters."""
-    return array_function([*model.parameters.values()], [model.gain])
 
 
 def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:

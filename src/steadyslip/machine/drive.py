@@ -37,7 +37,7 @@ class Steady(Drive, name="steady", kw_only=False):
 class PD(Drive, name="pd", kw_only=False):
     """A position controller with proportional and derivative gain, following the ramp v0 t."""
 
-    kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True)
+    kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True, kind="stiffness")
     kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True)
 
     def proportional(self) -> Any:

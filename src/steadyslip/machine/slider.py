@@ -38,9 +38,11 @@ class Slider(FrozenRecord, section="slider"):
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
-    stiffness: float | None = parameter("Pa/m", nonnegative, "stiffness k along the sliding direction", default=None)
+    stiffness: float | None = parameter(
+        "Pa/m", nonnegative, "stiffness k along the sliding direction", default=None, kind="stiffness", standing=1e10
+    )
     axial_stiffness: float | None = parameter(
-        "Pa/m", nonnegative, "stiffness along the axis of spring, rod or press, instead", default=None
+        "Pa/m", nonnegative, "stiffness along the axis of spring, rod or press, instead", default=None, kind="stiffness"
     )
     mass: float = parameter("kg/m^2", nonnegative, "mass m; 0 is quasistatic", default=0.0, structural=True)
     damping: float = parameter("Pa s/m", nonnegative, "dashpot c beside the spring", default=0.0, structural=True)
@@ -82,6 +84,15 @@ class Slider(FrozenRecord, section="slider"):
             If `name` is unknown or ambiguous; the message lists the nearest valid names.
         """
         return resolve(name, self.parameters())
+
+    def of_kind(self, kind: str) -> tuple[str, ...]:
+        """Dotted names of the given parameters whose laws declare them to be of a `kind`, in order."""
+        return tuple(n for n, a in self.parameters().items() if a.role.kind == kind and a.value is not None)
+
+    def stiffness_name(self) -> str:
+        """The parameter that is this rig's stiffness: the spring's, along the slide or its axis, else a gain."""
+        own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
+        return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
     def value(self, name: str) -> float | None:
         """The value of a parameter in SI units, None if it is not given."""

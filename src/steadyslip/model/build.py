@@ -19,8 +19,6 @@ _LETTERS = {
     "slider.damping": "c",
     "slider.radiation_damping": "eta",
     "drive.velocity": "v_0",
-    "contact.preload": "sigma_0",
-    "contact.angle": "psi",
 }
 _RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 
@@ -70,7 +68,7 @@ def _build_cached(structure: _Structure) -> Model:
 def _parameter_symbols(rig: Slider, present: frozenset[str]) -> dict[str, Any]:
     """A symbol for every given parameter; structural zeros stay zero, gauges stay symbols."""
     symbols: dict[str, Any] = {}
-    taken = set(_RESERVED) | set(_LETTERS.values())
+    taken = set(_RESERVED) | set(_LETTERS.values()) | {a.role.letter for a in parameters(rig).values()}
     for name, address in parameters(rig).items():
         if name == "slider.area" or address.value is None:
             continue
@@ -79,7 +77,7 @@ def _parameter_symbols(rig: Slider, present: frozenset[str]) -> dict[str, Any]:
             continue
         domain = address.role.domain
         symbols[name] = sp.Symbol(
-            _LETTERS.get(name) or _unused_letter(name, taken),
+            _LETTERS.get(name) or address.role.letter or _unused_letter(name, taken),
             real=True,
             positive=True if domain.low == 0 and not domain.low_allowed else None,
             nonnegative=True if domain.low == 0 else None,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy as sp
 
@@ -12,10 +12,6 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import array_function
 from steadyslip.core.questions import Keeper
 from steadyslip.core.records import Parameter
-
-if TYPE_CHECKING:
-    from steadyslip.machine.slider import Slider
-    from steadyslip.model.point import OperatingPoint
 
 
 @dataclass(frozen=True)
@@ -95,7 +91,8 @@ class Model(Keeper):
 
     A Model answers questions; what is worked out once is kept with it (`steadyslip.core.questions`): its `memory`,
     expressions `inlined` or `at_steady`, array functions of its parameters (`function`), and, in the modules beside
-    this one, `linearise`, `reduce_model`, `system` (Taylor terms), `steady_equation`. Numbers come with `at`.
+    this one, `linearise`, `reduce_model`, `system` (Taylor terms), `steady_equation`. Numbers come with an
+    `operating_point`.
 
     Attributes
     ----------
@@ -197,12 +194,6 @@ class Model(Keeper):
     def with_role(self, kind: str) -> tuple[str, ...]:
         """Dotted names of the parameters whose laws declare them to be of a `kind`."""
         return tuple(name for name in self.parameters if self.roles[name].kind == kind)
-
-    def at(self, rig: Slider, vary: Mapping[str, Any] | None = None, branch: int = 0) -> OperatingPoint:
-        """Numbers for this model: those of a rig of its structure, some of them varied; see `operating_point`."""
-        from steadyslip.model.point import point_of
-
-        return point_of(self, rig, vary, branch)
 
     # -- words
 

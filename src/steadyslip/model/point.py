@@ -80,6 +80,11 @@ class OperatingPoint(Keeper):
         return _axial_share(self.model)(self.named())
 
     @property
+    def gain(self) -> Any:
+        """Stiffness that a controller adds, Pa/m."""
+        return _gain(self.model)(*self.arguments)[0]
+
+    @property
     def stresses(self) -> np.ndarray:
         """`sigma` as a flat array, with one entry at least."""
         return np.atleast_1d(np.asarray(self.sigma, dtype=float))
@@ -159,21 +164,6 @@ def _own_point(rig: Slider, branch: int) -> OperatingPoint:
     return _placed(build_model(rig), rig, _varied(rig, {}), branch, False)
 
 
-def point_of(model: Model, rig: Slider, vary: Vary | None, branch: int) -> OperatingPoint:
-    """An operating point of a model at hand.
-
-    Raises
-    ------
-    ParameterError
-        As for `operating_point`, and if the rig is not of the model's structure.
-    """
-    together = _varied(rig, vary or {})
-    own = build_model(rig, [name for name in model.parameters if name in rig.parameters()])
-    if own is not model and own.equations() != model.equations():
-        raise ParameterError([Problem("rig", "is of another structure than this model; ask build_model(rig)")])
-    return _placed(model, rig, together, branch, False)
-
-
 def _placed(model: Model, rig: Slider, together: Together, branch: int, scan: bool) -> OperatingPoint:
     varied, valid = together.values, True
     if varied and scan:
@@ -187,6 +177,11 @@ def _placed(model: Model, rig: Slider, together: Together, branch: int, scan: bo
         values["slider.stiffness"] = 0.0  # a controller alone
     arguments = tuple(values[name] for name in model.parameters)
     return OperatingPoint(model, arguments, together.shape, together.wrap, branch, valid)
+
+
+@question
+def _gain(model: Model) -> Callable[..., list[Any]]:
+    return array_function([*model.parameters.values()], [model.gain])
 
 
 @question

@@ -252,8 +252,9 @@ def _warnings(
     if not rig.friction.memory():
         found.append(
             "this friction law has no memory of sliding, so it cannot predict a critical stiffness; "
-            "use a law with memory (rate-state, lugre)"
+            "use a law with memory"
         )
     if states[values.branch].friction <= 0:
-        found.append("the friction coefficient in steady sliding is not positive; check mu_ref and the velocity")
+        level = "".join(f"{name.rpartition('.')[2]} and " for name in rig.of_kind("friction level"))
+        found.append(f"the friction coefficient in steady sliding is not positive; check {level}the velocity")
     return tuple(found)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
-from steadyslip.laws.friction import RateState
 from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
@@ -58,7 +57,7 @@ def _meaning(analysis: Findings) -> list[str]:
         if not analysis.kicks:
             lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
         return lines if analysis.onset is not None or analysis.kicks else lines[:2]
-    if analysis.growth_rate != math.inf and isinstance(analysis.rig.friction, RateState) and not _limited(analysis.rig):
+    if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away and not _limited(analysis.rig):
         return [
             "",
             "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",

@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError, ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.laws.friction import PRZ, Aging, RateState, Slip, State
 from steadyslip.machine.slider import Slider
-
-EVOLUTIONS = {"slip": Slip, "aging": Aging, "prz": PRZ}
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,28 +104,27 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
     return LawComparison({label: fits[label] for label in order}, {label: criteria[label] for label in order})
 
 
-def compare_laws(
-    rig: Slider, records: Any, laws: Sequence[str] = ("slip", "aging", "prz", "slip, two states"), **options: Any
-) -> LawComparison:
+def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, **options: Any) -> LawComparison:
     """Fit several rate-and-state laws to the same records.
 
     Parameters
     ----------
     rig : Slider
-        With rate-and-state friction; everything but its evolution law and number of states is kept.
+        Whose friction law names alternatives: rate-and-state friction every evolution law without parameters of its
+        own, with one state or two. Everything else is kept.
     records : Record or sequence of Record
-    laws : sequence of str
-        ``slip``, ``aging`` or ``prz``, each also with ``, two states``.
+    laws : sequence of str, optional
+        Their labels, such as ``aging`` or ``slip, two states``; a few usual ones unless given.
     **options
         As for `fit`. Ctrl-C compares the laws that have been fitted, where there are two or more.
 
     Raises
     ------
     ParameterError
-        If a law is unknown or the rig has another kind of friction.
+        If a law is unknown or the rig's friction has no alternatives.
     """
     fits: dict[str, Fit] = {}
-    rigs = {label: with_law(rig, label) for label in laws}
+    rigs = {label: with_law(rig, label) for label in (rig.friction.compared if laws is None else laws)}
     try:
         for label, one in rigs.items():
             fits[label] = fit(one, records, **options)
@@ -139,23 +135,14 @@ def compare_laws(
 
 
 def with_law(rig: Slider, label: str) -> Slider:
-    """The rig with the evolution law and number of states that a label names."""
+    """The rig with the friction law, of those that its own names as alternatives, that a label names."""
+    known = rig.friction.alternatives()
+    if not known:
+        raise ParameterError(
+            [Problem("rig", f"has {type(rig.friction).__name__} friction, which names no alternatives")]
+        )
     word, _, states = (part.strip() for part in label.partition(","))
-    if word not in EVOLUTIONS or states not in ("", "two states"):
-        known = ", ".join(f"{name}, '{name}, two states'" for name in EVOLUTIONS)
-        raise ParameterError([Problem("laws", f"got {label!r}; allowed: {known}")])
-    friction = rig.friction
-    if not isinstance(friction, RateState):
-        raise ParameterError([Problem("rig", f"has {type(friction).__name__} friction; allowed: RateState")])
-    b, d_c = (friction.b, friction.d_c) if not friction.states else (friction.states[0].b, friction.states[0].d_c)
-    if d_c is None:
-        raise InternalError("d_c is not None")
-    if b is None:
-        raise InternalError("b is not None")
-    evolution = EVOLUTIONS[word]()
-    if states:
-        pair = (State(b=0.6 * b, d_c=d_c), State(b=0.4 * b, d_c=10 * d_c))
-        changed = replace(friction, evolution=evolution, states=pair, b=None, d_c=None)
-    else:
-        changed = replace(friction, evolution=evolution, states=(), b=b, d_c=d_c)
-    return replace(rig, friction=changed)
+    friction = known.get(f"{word}, {states}" if states else word)
+    if friction is None:
+        raise ParameterError([Problem("laws", f"got {label!r}; allowed: {', '.join(map(repr, known))}")])
+    return replace(rig, friction=friction)

@@ -235,7 +235,7 @@ def normal_stress_protocols(rig: Slider, share: float = 0.05) -> dict[str, Proto
 
 def _slip_time(rig: Slider) -> float:
     """Time to slide one slip distance, s."""
-    distances = [a.value for name, a in rig.parameters().items() if name.endswith(".d_c") and a.value]
+    distances = [value for name in rig.of_kind("slip distance") if (value := rig.value(name)) is not None]
     if not distances:
         raise NotAvailable("this friction law has no slip distance to scale experiments with; give candidates")
     return max(distances) / rig.drive.velocity

@@ -15,8 +15,6 @@ from steadyslip.core.quantities import outside, percent, shown
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.laws.friction import RateState
-from steadyslip.laws.friction.normal_memory import NoMemory
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
 from steadyslip.machine.slider import Slider
@@ -248,11 +246,7 @@ def _predicted(target: Slider, draws: Draws, vary: dict[str, Array], kicks: tupl
 
 def with_fitted_friction(rig: Slider, fit: Fit, record: int = 0) -> Slider:
     """The rig with the friction that a fit found."""
-    friction = fit.rig(record).friction
-    own = rig.friction
-    if isinstance(friction, RateState) and isinstance(own, RateState) and isinstance(friction.normal_memory, NoMemory):
-        friction = replace(friction, normal_memory=own.normal_memory)
-    return replace(rig, friction=friction)
+    return replace(rig, friction=fit.rig(record).friction.completed_by(rig.friction))
 
 
 def _name_of(fit: Fit, parameter: str, record: int) -> str:
@@ -261,12 +255,13 @@ def _name_of(fit: Fit, parameter: str, record: int) -> str:
 
 def _difference(rig: Slider, vary: dict[str, Array]) -> dict[str, Array]:
     """b − a, which decides where b and a do not by themselves."""
-    known = {n: a.value for n, a in rig.parameters().items() if n == "friction.a" or n.rpartition(".")[2] == "b"}
-    if "friction.a" not in known or len(known) < 2 or not set(known) & set(vary):
+    direct, evolved = rig.of_kind("direct effect"), rig.of_kind("evolution effect")
+    if not direct or not evolved or not {*direct, *evolved} & set(vary):
         return {}
-    values = {name: np.asarray(vary.get(name, value), dtype=float) for name, value in known.items()}
-    direct = values.pop("friction.a")
-    return {"friction.b − friction.a": np.sum(np.broadcast_arrays(*values.values()), axis=0) - direct}
+    own = [np.asarray(vary.get(name, rig.value(name)), dtype=float) for name in (*direct, *evolved)]
+    columns = np.broadcast_arrays(*own)
+    label = f"friction.{evolved[0].rpartition('.')[2]} − {direct[0]}"
+    return {label: np.sum(columns[len(direct) :], axis=0) - np.sum(columns[: len(direct)], axis=0)}
 
 
 def _shares(vary: dict[str, Array], critical: Array, growth: Array) -> dict[str, float]:

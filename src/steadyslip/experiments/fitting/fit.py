@@ -211,19 +211,20 @@ def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
 
 def _ordered(coordinates: Array, space: Space) -> Array:
     """States by rising slip distance, so that equal minima look equal."""
-    members: dict[tuple[str, str], dict[str, int]] = {}
+    members: dict[tuple[int | None, str], dict[str, dict[str, int]]] = {}
     for i, one in enumerate(space.unknowns):
-        if one.parameter.startswith("friction.states."):
-            _, _, number, last = one.parameter.split(".")
-            members.setdefault((str(one.record), number), {})[last] = i
+        owner, _, last = one.parameter.rpartition(".")
+        family, _, number = owner.rpartition(".")
+        if number.isdigit():
+            members.setdefault((one.record, family), {}).setdefault(number, {})[one.kind or last] = i
     found = coordinates.copy()
-    for label in dict.fromkeys(record for record, _ in members):
-        states = [places for (record, _), places in members.items() if record == label]
-        if len(states) < 2 or any(set(s) != set(states[0]) or "d_c" not in s for s in states):
+    for family_members in members.values():
+        states = list(family_members.values())
+        if len(states) < 2 or any(set(s) != set(states[0]) or "slip distance" not in s for s in states):
             continue
-        ranks = np.argsort(coordinates[:, [s["d_c"] for s in states]], axis=1)
-        for last in states[0]:
-            columns = [s[last] for s in states]
+        ranks = np.argsort(coordinates[:, [s["slip distance"] for s in states]], axis=1)
+        for what in states[0]:
+            columns = [s[what] for s in states]
             found[:, columns] = np.take_along_axis(coordinates[:, columns], ranks, axis=1)
     return found
 

@@ -27,8 +27,7 @@ from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.measured.record import Record
-from steadyslip.laws.contact import Constant
-from steadyslip.laws.contact.basic import Prescribed
+from steadyslip.laws.contact import pressed_at
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
@@ -36,7 +35,7 @@ from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
 Array = np.ndarray
 MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
 """Samples of a record beyond which a fit works with means of them, and how many."""
-NEVER_FREE = ("drive.velocity", "slider.area", "friction.v_ref")
+NEVER_FREE = ("drive.velocity", "slider.area")
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class Plan:
     @property
     def pressed(self) -> bool:
         """Whether the normal stress is imposed, so that the record's own drives the model."""
-        return isinstance(self.rig.contact, (Constant, Prescribed))
+        return self.rig.contact.is_imposed()
 
     def space(self) -> Space:
         """The unknowns: shared ones, separate ones record by record, trends."""
@@ -174,11 +173,11 @@ class Plan:
         stress = None if self.drive == "measured" else self.loading[i].stress
         if stress is not None and not self.follows:  # of a protocol that leaves the normal stress to the record
             pressed = stress.at(record.time)
-            rig = replace(rig, contact=Constant(steady_normal_stress=float(pressed[0])))
+            rig = replace(rig, contact=pressed_at(float(pressed[0])))
             return rig, (record.normal if stress.changes else pressed) - pressed[0]
         if stress is not None:
-            return replace(rig, contact=Constant(steady_normal_stress=float(stress.at(record.time[:1])[0]))), None
-        rig = replace(rig, contact=Constant(steady_normal_stress=float(record.normal[0])))
+            return replace(rig, contact=pressed_at(float(stress.at(record.time[:1])[0]))), None
+        rig = replace(rig, contact=pressed_at(float(record.normal[0])))
         return rig, record.normal - record.normal[0]
 
 
@@ -204,8 +203,8 @@ def make_plan(
     problems: list[Problem] = []
     known = _can_be_free(rig, plan_protocol)
     names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
-    if free is not None and "friction.mu_ref" in known and "friction.mu_ref" not in names:
-        names = [*names, "friction.mu_ref"]
+    if free is not None:  # the level of friction is not asked for, but never known beforehand
+        names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
     held = _resolved("fixed", fixed, rig.parameters(), problems)
     names = [name for name in dict.fromkeys(names) if name not in held]
     apart = _resolved("separate", separate, dict.fromkeys(names), problems)
@@ -213,9 +212,7 @@ def make_plan(
     for name in ("errors", "starts"):  # of the search, not of what is compared
         options.pop(name, None)
     if not names and not problems:
-        problems.append(
-            Problem("free", "nothing is free; name parameters such as friction.a, friction.b, friction.d_c")
-        )
+        problems.append(Problem("free", f"nothing is free; name parameters such as {', '.join(list(known)[:3])}"))
     weights = options.get("weights")
     if weights is not None and not problems:
         options["weights"] = _checked_weights(weights, many, problems)
@@ -248,6 +245,7 @@ def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
     found = {
         name: a for name, a in rig.parameters().items()
         if a.value is not None and name not in NEVER_FREE and not a.role.gauge
+        and not (a.role.kind == "reference rate" and name.startswith("friction."))
     }  # fmt: skip
     if protocol is not None:
         found |= {n: a for n, a in parameters(protocol, "protocol.").items() if n.endswith(".at")}

@@ -177,12 +177,11 @@ def search_bounds(parts: Sequence[RecordPart], space: Space) -> tuple[Array, Arr
     found = [features(part.record, part.rig.drive.velocity) for part in parts]
     for i, unknown in enumerate(space.unknowns):
         own = found if unknown.record is None else [found[unknown.record]]
-        last = unknown.parameter.rpartition(".")[2]
-        if last in ("d_c", "slip_distance"):
+        if unknown.kind == "slip distance":
             ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
-        elif last == "a":
+        elif unknown.kind == "direct effect":
             ends = 1e-5, 1.0
-        elif last in ("stiffness", "axial_stiffness", "kp"):
+        elif unknown.kind == "stiffness":
             stress = max(_stress(part) for part in parts)
             ends = min(f.least_slope for f in own) * stress * 1e-2, max(f.slope for f in own) * stress * 1e3
         else:
@@ -197,23 +196,22 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
     name = unknown.parameter
     d_c, a, b, steepness, alpha, spare = design
     rig = part.rig
-    last = name.rpartition(".")[2]
-    if name == "friction.a":
+    member = next((int(part) for part in name.split(".") if part.isdigit()), 0)
+    if unknown.kind == "direct effect":
         return a
-    if name == "friction.mu_ref":
-        reference = rig.parameters()["friction.v_ref"].value or 1.0
-        return np.asarray(own.friction - (a - b) * np.log(rig.drive.velocity / reference))
-    if last == "b":
-        if ".states." in name:  # the first state takes up what the others leave
-            member = int(name.split(".")[2])
+    if unknown.kind == "friction level":
+        references = [rig.value(name) for name in rig.of_kind("reference rate") if name.startswith("friction.")]
+        rate = rig.drive.velocity / (references[0] or 1.0) if references else 1.0
+        return np.asarray(own.friction - (a - b) * np.log(rate))
+    if unknown.kind == "evolution effect":
+        if member:  # the first state takes up what the others leave
             return b * (0.35 + 0.5 * spare) if member == 1 else b * (0.65 - 0.5 * spare)
         return b
-    if last in ("d_c", "slip_distance"):
-        member = int(name.split(".")[2]) if ".states." in name else 1
-        return d_c * (3.0 + 30.0 * spare) ** (member - 1)
-    if last == "alpha":
+    if unknown.kind == "slip distance":
+        return d_c * (3.0 + 30.0 * spare) ** max(member - 1, 0)
+    if unknown.kind == "stress share":
         return alpha
-    if last in ("stiffness", "axial_stiffness", "kp"):
+    if unknown.kind == "stiffness":
         return steepness * _stress(part)
     if name.startswith(("trend.", "offset")):
         return np.zeros_like(a)

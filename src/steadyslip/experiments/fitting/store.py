@@ -208,9 +208,9 @@ def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, 
     free, rtol, drive = options.pop("free"), options.pop("rtol"), options.pop("drive")
     commanded = drive == "protocol"
     try:
+        rig = rig_from_text(text, source)
         plan = make_plan(
-            rig_from_text(text, source), records, free,
-            fixed=[] if "friction.mu_ref" in free else ["friction.mu_ref"],
+            rig, records, free, fixed=[name for name in rig.of_kind("friction level") if name not in free],
             protocol=protocol_from_text(text, source) if commanded else None,
             drive="commanded" if commanded else drive, weights=weights, **options,
         )  # fmt: skip

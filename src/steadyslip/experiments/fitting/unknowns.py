@@ -10,8 +10,6 @@ import numpy as np
 from steadyslip.core.records import Address
 
 Array = np.ndarray
-NATURAL = {"b": 0.01, "mu_ref": 0.01, "alpha": 0.2, "direct_share": 0.2}
-"""Changes that matter, of parameters that may be zero or of either sign."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,8 @@ class Unknown:
         Change of a plain parameter that is one unit of its coordinate.
     low, high : float
         What the parameter may be.
+    kind : str
+        What its law says it is; see `steadyslip.core.records.KINDS`.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Unknown:
     size: float
     low: float
     high: float
+    kind: str = ""
 
     def coordinate(self, value: Any) -> Any:
         return np.log(value) if self.logarithmic else np.asarray(value) / self.size
@@ -65,13 +66,13 @@ def unknown(address: Address, record: int | None, scale: float | None = None) ->
     """The free parameter at an address: logarithmic if it must be positive and has no natural zero."""
     name, domain = address.name, address.role.domain
     own = f"{name}@{record + 1}" if record is not None else name
-    last = name.rpartition(".")[2]
-    positive = domain.low == 0 and not domain.low_allowed and last != "mu_ref"
-    nonnegative = domain.low == 0 and domain.low_allowed and address.role.unit != "1"
-    size = scale or NATURAL.get(last, abs(address.value or 0.0) or 1.0)
-    logarithmic = (positive or nonnegative) and scale is None
-    low = max(domain.low, 1e-6) if last == "mu_ref" else domain.low
-    return Unknown(own, name, address.role.unit, record, logarithmic, size, low, domain.high)
+    role = address.role
+    positive = domain.low == 0 and not domain.low_allowed
+    nonnegative = domain.low == 0 and domain.low_allowed and role.unit != "1"
+    size = scale or role.size or abs(address.value or 0.0) or 1.0
+    logarithmic = (positive or nonnegative) and scale is None and role.size is None
+    low = 1e-4 * size if positive and role.size is not None else domain.low
+    return Unknown(own, name, role.unit, record, logarithmic, size, low, domain.high, role.kind)
 
 
 class Space:

@@ -10,6 +10,7 @@ import numpy as np
 from steadyslip.core.quantities import shown, total
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.numerics.splitting import displacement_noise
+from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
@@ -151,11 +152,17 @@ def drive_line(fit: FitNumbers) -> str:
     if other is None:
         return text
     shares = [
-        f"{label} {other[name] / fit.values[name] - 1:+.0%}"
-        for label, name in (("a", "friction.a"), ("b", "friction.b"), ("k", "slider.stiffness"))
+        f"{'k' if name == 'slider.stiffness' else name.rpartition('.')[2]} {other[name] / fit.values[name] - 1:+.0%}"
+        for name in _steep_names(fit.rig(0))
         if name in other and fit.values.get(name)
     ]
     return f"{text}; the measured displacement would make {', '.join(shares)}" if shares else text
+
+
+def _steep_names(rig: Slider) -> tuple[str, ...]:
+    """The parameters that a noisy displacement changes most."""
+    kinds = ("direct effect", "evolution effect", "stiffness")
+    return tuple(name for kind in kinds for name in rig.of_kind(kind))
 
 
 def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:

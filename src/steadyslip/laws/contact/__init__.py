@@ -1,6 +1,6 @@
 """Contact laws: the normal stress as a function of displacement, velocity, acceleration and forces."""
 
-from steadyslip.laws.contact.basic import Constant, Linear, Prescribed
+from steadyslip.laws.contact.basic import Constant, Linear, Prescribed, pressed_at
 from steadyslip.laws.contact.law import ContactLaw, Motion, PreloadedContact
 from steadyslip.laws.contact.mechanisms import (
     DilatingLayer,
@@ -13,7 +13,11 @@ from steadyslip.laws.contact.mechanisms import (
     Triaxial,
 )
 
+USUAL = Constant.name
+"""The law of files that name none."""
+
 __all__ = [
+    "USUAL",
     "Constant",
     "ContactLaw",
     "DilatingLayer",
@@ -28,4 +32,5 @@ __all__ = [
     "SliderCrank",
     "SlopedGuide",
     "Triaxial",
+    "pressed_at",
 ]

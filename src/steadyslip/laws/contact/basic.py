@@ -14,6 +14,11 @@ class Constant(PreloadedContact, name="constant"):
     """A normal stress that never changes (dead weight, servo-controlled press): B0 = ... = B3 = 0."""
 
 
+def pressed_at(stress: float) -> Constant:
+    """The contact of a press that holds a normal stress (Pa)."""
+    return Constant(steady_normal_stress=stress)
+
+
 class Prescribed(PreloadedContact, name="prescribed"):
     """A normal stress imposed from outside: σ(t) = σ0 + amplitude · cos(2πt/period).
 

@@ -76,6 +76,10 @@ class ContactLaw(FrozenRecord, family="contact law"):
         """Normal stress due to the motion (Pa)."""
         return 0
 
+    def is_imposed(self) -> bool:
+        """Whether the normal stress is given from outside, whatever the block does."""
+        return type(self).coupling is ContactLaw.coupling
+
     def imposed(self, time: Expression) -> Expression:
         """Prescribed change of normal stress with time (Pa), zero on average."""
         return 0
@@ -105,9 +109,21 @@ class ContactLaw(FrozenRecord, family="contact law"):
 class PreloadedContact(ContactLaw):
     """Base of contacts that take either the preload σ0 or the steady normal stress σss."""
 
-    preload: float | None = parameter("Pa", positive, "normal stress σ0 without coupling to the motion", default=None)
+    preload: float | None = parameter(
+        "Pa",
+        positive,
+        "normal stress σ0 without coupling to the motion",
+        default=None,
+        kind="normal stress",
+        letter="sigma_0",
+    )
     steady_normal_stress: float | None = parameter(
-        "Pa", positive, "normal stress σss in steady sliding, instead of preload", default=None
+        "Pa",
+        positive,
+        "normal stress σss in steady sliding, instead of preload",
+        default=None,
+        kind="normal stress",
+        standing=1e6,
     )
 
     def inconsistencies(self) -> Iterator[Problem]:

@@ -25,7 +25,7 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
     B0...B3 = 0, c tan ψ, tan ψ, 0 with c a dashpot beside the spring. Lock-up: ψ <= −arccot μss (eq. 27).
     """
 
-    angle: float = parameter("rad", angle, "spring angle ψ, positive when it pulls out of the surface")
+    angle: float = parameter("rad", angle, "spring angle ψ, positive when it pulls out of the surface", letter="psi")
 
     def coupling(self, motion: Motion) -> Expression:
         return -motion.spring * sp.tan(self.angle)
@@ -81,7 +81,7 @@ class Triaxial(ContactLaw, name="triaxial"):
     k = K sin θ cos²θ along the cut. B0...B3 = 0, −c tan θ, −tan θ, 0. Lock-up: tan θ >= 1/μss.
     """
 
-    angle: float = parameter("rad", acute, "angle θ between saw cut and loading axis")
+    angle: float = parameter("rad", acute, "angle θ between saw cut and loading axis", letter="psi")
     confining_pressure: float | None = parameter("Pa", positive, "confining pressure P_c", default=None)
     steady_normal_stress: float | None = parameter(
         "Pa", positive, "normal stress σss in steady sliding, instead of confining_pressure", default=None

@@ -4,10 +4,15 @@ from steadyslip.laws.friction.bristle import CoulombStribeck, LuGre
 from steadyslip.laws.friction.evolution import PRZ, Aging, Evolution, Nagata, Slip
 from steadyslip.laws.friction.law import FrictionLaw
 from steadyslip.laws.friction.normal_memory import LinkerDieterich, NoMemory, NormalMemory, PrakashClifton
-from steadyslip.laws.friction.rate_state import RateState, State
+from steadyslip.laws.friction.rate_state import RateState
+from steadyslip.laws.friction.state import State
+
+USUAL = RateState.name
+"""The law of files that name none."""
 
 __all__ = [
     "PRZ",
+    "USUAL",
     "Aging",
     "CoulombStribeck",
     "Evolution",

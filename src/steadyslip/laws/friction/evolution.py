@@ -6,12 +6,15 @@ share one linearisation and differ only beyond it.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
-from steadyslip.core.records import FrozenRecord, nonnegative, parameter
+from steadyslip.core.errors import Problem
+from steadyslip.core.records import Condition, FrozenRecord, nonnegative, parameter
 from steadyslip.laws.friction.law import Expression
+from steadyslip.laws.friction.normal_memory import NormalMemory
+from steadyslip.laws.friction.state import State
 
 
 class Evolution(FrozenRecord, family="evolution law"):
@@ -30,6 +33,22 @@ class Evolution(FrozenRecord, family="evolution law"):
     def divides(self) -> bool:
         """Whether `scaled_rate` divides by b."""
         return type(self).scaled_rate is Evolution.scaled_rate
+
+    def offset(self, sigma: Expression, tau: Expression) -> Expression:
+        """What the memory variable Ψ holds beside bΘ, as a function of the stresses, integrated exactly that way."""
+        return sp.Integer(0)
+
+    def has_offset(self) -> bool:
+        """Whether the state follows the stresses."""
+        return type(self).offset is not Evolution.offset
+
+    def problems(self, states: Sequence[State], memory: NormalMemory) -> Iterator[Problem]:
+        """Problems with what is given together; names are those of the friction law's fields."""
+        yield from ()
+
+    def conditions_with(self, b: Expression) -> Iterator[Condition]:
+        """Relations that numbers must obey together; `b` is the friction law's, if it has one state."""
+        yield from ()
 
     def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         """The usual state θ in seconds that belongs to Θ: Θ = ln(v* θ/d_c) unless stated otherwise."""
@@ -68,9 +87,20 @@ class PRZ(Evolution, name="prz"):
 class Nagata(Aging, name="nagata"):
     """Nagata law (Nagata et al. 2012): aging with an extra −(c_N θ/b) d(τ/σ)/dt.
 
-    The extra term is integrated exactly by the memory variable of `RateState`; `rate` is the aging part.
+    The extra term is integrated exactly by the memory variable Ψ = bΘ + c_N τ/σ; `rate` is the aging part.
     """
 
-    needs_stress: ClassVar[bool] = True
-
     c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N")
+
+    def offset(self, sigma: Expression, tau: Expression) -> Expression:
+        return self.c_nagata * tau / sigma
+
+    def problems(self, states: Sequence[State], memory: NormalMemory) -> Iterator[Problem]:
+        if states:
+            yield Problem("evolution", f"{self.name} is defined for one state; use slip, aging or prz")
+        if memory.has_strength():
+            word = memory.name
+            yield Problem("normal_memory", f"{word} is not defined with {self.name}; use none or linker-dieterich")
+
+    def conditions_with(self, b: Expression) -> Iterator[Condition]:
+        yield Condition("b", b != 0, f"got 0; {self.name} divides by b, use aging instead", (b,))

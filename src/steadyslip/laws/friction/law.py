@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
 import sympy as sp
 
@@ -22,6 +22,10 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     Subclasses set ``memory`` and define `strength`, `rates` and `steady_memory`; the rest has defaults.
     Stresses are in Pa per unit nominal area, velocity in m/s, positive in the direction of loading.
     """
+
+    runs_away: ClassVar[bool] = False
+    """Whether friction alone, without mass or damping, lets velocity grow beyond all bounds in finite time."""
+    compared: ClassVar[tuple[str, ...]] = ()
 
     def memory(self) -> tuple[str, ...]:
         """Names of the memory variables, in the order used everywhere; empty for a law without."""
@@ -59,6 +63,14 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         stick. A law whose strength has no step at rest has no use for this.
         """
         return sp.tanh(v / (1e-6 * velocity))
+
+    def completed_by(self, other: FrictionLaw) -> FrictionLaw:
+        """This law, as fitted to records, with what they cannot tell taken from `other`."""
+        return self
+
+    def alternatives(self) -> Mapping[str, FrictionLaw]:
+        """Laws of the same kind that records may speak for instead, by label; `compared` are tried by default."""
+        return {}
 
     def motion_conditions(self) -> Iterator[Condition]:
         """Relations between numbers that motion needs beyond small perturbations; as `conditions`, named likewise."""

@@ -168,7 +168,7 @@ def parameter_along(rig: Slider, along: str) -> str:
     name = rig.resolve(along)
     if name != "slider.stiffness" or rig.stiffness is not None:
         return name
-    return "drive.kp" if rig.axial_stiffness is None else "slider.axial_stiffness"
+    return rig.stiffness_name()
 
 
 def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
@@ -249,7 +249,8 @@ def onset_map(rig: Slider, vary: Mapping[str, Any] | None = None) -> dict[str, A
     """
     point = operating_point(rig, vary)
     along = parameter_along(rig, "slider.stiffness")
-    place = list(point.model.parameters).index("drive.kp" if along == "drive.kp" else "slider.stiffness")
+    names = list(point.model.parameters)
+    place = names.index(along if along in names else "slider.stiffness")  # k too where the axial one is given
     found = in_chunks(point, lambda part: _onsets(part, place))
     kind, edge, coefficient = np.moveaxis(np.asarray(found), -1, 0)
     return {
@@ -263,12 +264,17 @@ def _onsets(point: OperatingPoint, place: int) -> Array:
     """Kind, edge and c1 of each rig, (..., 3), along the stiffness or gain that is argument number `place`."""
     arguments = list(point.arguments)
     own = np.broadcast_to(arguments[place], point.shape).reshape(-1)
-    if list(point.model.parameters)[place] == "drive.kp":  # a gain acts as a spring would
+    bare, slope = point, np.ones((1, 1))
+    if list(point.model.parameters)[place] != "slider.stiffness":  # a gain acts as a spring would
+        arguments[place] = 1.0
+        unit = point.with_arguments(arguments).gain
         arguments[place] = 0.0
-    bare = replace(point, arguments=tuple(arguments))
+        bare = point.with_arguments(arguments)
+        slope = np.broadcast_to(unit - bare.gain, point.shape).reshape(-1, 1)
     found = stable_set(*(np.broadcast_to(c, (*point.shape, c.shape[-1])) for c in stiffness_polynomials(bare)))
     count = point.size
     edges, frequencies, changes = (a.reshape(count, -1) for a in (found.edges, found.frequencies, found.changes))
+    edges = edges / slope
     usable = changes.astype(bool) & (frequencies > 0) & np.isfinite(frequencies)
     distance = np.where(usable, np.abs(edges - own[:, None]), np.inf)
     nearest = np.argmin(distance, axis=1)

@@ -4,12 +4,13 @@ It shares nothing with the kernels but the Model: the balance is solved by brack
 the plain variables x, ln v, memory.
 """
 
+import math
+
 import numpy as np
 import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from steadyslip.core.expressions import array_function
 from steadyslip.model.point import operating_point
 
 
@@ -40,28 +41,28 @@ class Oracle:
                 expression = expression.xreplace({symbol: definition})
             return expression.xreplace(numbers)
 
-        self.balance = array_function(symbols, [inlined(contact.balance)])
+        self.balance = scalar_function(symbols, [inlined(contact.balance)])
         rates = model.rate_of
-        self.rates = array_function(symbols, [inlined(rates[s]) for s in self.others])
-        self.stresses = array_function(symbols, [*map(inlined, (contact.normal, contact.friction, contact.spring))])
+        self.rates = scalar_function(symbols, [inlined(rates[s]) for s in self.others])
+        self.stresses = scalar_function(symbols, [*map(inlined, (contact.normal, contact.friction, contact.spring))])
         self.start = [float(sp.sympify(model.steady[s]).xreplace(numbers)) for s in self.memory]
         self.start += [0.0] * (len(self.others) - len(self.memory))
 
     def unknown(self, t, x, v, rest):
         """Acceleration, or without inertia the velocity, that balances forces."""
+        given = (*rest, *self.inputs(t))
         if self.model.inertial:
-            return bracketed(lambda a: float(self.balance(x, v, a, *rest, *self.inputs(t))[0]), 0.0, self.drive)
+            return linear_root(lambda a: self.balance(x, v, a, *given)[0], self.drive)
         if self.plain:
-            return bracketed(lambda v: float(self.balance(x, v, 0.0, *rest, *self.inputs(t))[0]), 0.0, self.drive)
-        u = bracketed(
-            lambda u: float(self.balance(x, self.drive * np.exp(u), 0.0, *rest, *self.inputs(t))[0]), 0.0, 0.5
-        )
-        return self.drive * np.exp(u)
+            return bracketed(lambda v: self.balance(x, v, 0.0, *given)[0], 0.0, self.drive)
+        u = bracketed(lambda u: self.balance(x, self.drive * math.exp(u), 0.0, *given)[0], 0.0, 0.5)
+        return self.drive * math.exp(u)
 
     def slope(self, t, y):
+        y = y.tolist()
         x, rest = y[0], y[2:] if self.model.inertial else y[1:]
         if self.model.inertial:
-            v = y[1] if self.plain else self.drive * np.exp(y[1])
+            v = y[1] if self.plain else self.drive * math.exp(y[1])
             a = self.unknown(t, x, v, rest)
             return [
                 v - self.inputs(t)[0],
@@ -91,6 +92,32 @@ class Oracle:
 
 def zero(t):
     return 0.0
+
+
+def asinh_exp(x, y):
+    """asinh(x exp(y)) where exp(y) may leave floating point."""
+    size = math.log(abs(x) + 5e-324) + y
+    return math.copysign(math.asinh(math.exp(size)) if size < 300 else size + math.log(2), x)
+
+
+def scalar_function(arguments, expressions):
+    """Values of expressions from plain floats, all in Python's own mathematics; NaN beyond floating point."""
+    function = sp.lambdify(arguments, expressions, modules=[{"asinh_exp": asinh_exp}, "math"], cse=True)
+
+    def evaluate(*values):
+        try:
+            return function(*values)
+        except (OverflowError, ValueError, ZeroDivisionError):
+            return [math.nan] * len(expressions)
+
+    return evaluate
+
+
+def linear_root(function, step):
+    """A root where the function is a straight line; bracketed if it turns out not to be one."""
+    at, further = function(0.0), function(step)
+    found = -at / (further - at) * step if further != at else math.nan
+    return found if abs(function(found)) <= 1e-12 * abs(at) else bracketed(function, 0.0, step)
 
 
 def bracketed(function, guess, step):

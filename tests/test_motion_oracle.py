@@ -60,9 +60,10 @@ def test_kernels_follow_the_model(law, contact, mass):
     a_rig = rig(friction=friction, contact=contact, mass=mass, radiation_damping=0.0 if law == "lugre" else 2e10)
     got, outcome = interpreted(a_rig, ss.NormalStressStep(at=until / 3, by=1e5), until, {"x": kick}, 1e-9)
     assert outcome.status[0] == 1
-    x, v, *memory = Oracle(a_rig, plain=plain).run(until / 3, x=kick)
+    method = "Radau" if mass or law == "lugre" else "DOP853"  # for what is stiff, and what is not
+    x, v, *memory = Oracle(a_rig, plain=plain).run(until / 3, x=kick, method=method)
     pressed = Oracle(a_rig, pressure=lambda t: 1e5, plain=plain)
-    expected = pressed.run(until, x=x, v=v, memory=memory, start=until / 3)
+    expected = pressed.run(until, x=x, v=v, memory=memory, start=until / 3, method=method)
     scale = np.maximum(np.abs(expected), [1e-6, 1e-6, *[1e-9 if plain else 1e-3] * len(memory)])
     assert np.max(np.abs(got - expected) / scale) < (5e-6 if law == "lugre" else 2e-8)
 

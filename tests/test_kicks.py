@@ -45,11 +45,11 @@ def heavy(law, factor, mass, a=0.01, b=0.015):
 # -- the steady sliding that a kick leads to
 
 
-@pytest.mark.parametrize("mass", [0.0, 1e3])
 @pytest.mark.parametrize("contact", CONTACTS, ids=lambda c: c.name)
-def test_own_steady_sliding_and_its_growth_rate(contact, mass):
+def test_own_steady_sliding_and_its_growth_rate(contact):
     """Nothing moves there, and the eigenvalues are those of the characteristic polynomial."""
-    for friction in ONE_MEMORY[1:3]:
+    heavy = CONTACTS.index(contact) % 2
+    for friction, mass in zip(ONE_MEMORY[1:3], (1e3 * heavy, 1e3 * (1 - heavy)), strict=True):
         a_rig = rig(friction=friction, contact=contact, mass=mass)
         rest = rest_at(a_rig)
         rates = rates_at(rest, rest.state[:, None, :])[0, 0] / rest.scales[0]

@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
-from test_motion_oracle import LAWS
+from test_motion_oracle import LAWS, half
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -193,9 +193,7 @@ def test_error_of_default_settings():
 # -- small motions
 
 
-@pytest.mark.parametrize("mass", [0.0, 1e9], ids=["massless", "mass"])
-@pytest.mark.parametrize("contact", CONTACTS, ids=lambda law: law.name)
-@pytest.mark.parametrize("law", LAWS, ids=str)
+@pytest.mark.parametrize(("law", "contact", "mass"), half(1))
 def test_small_kicks_grow_as_the_eigenvalues_say(law, contact, mass):
     """A small kick is a sum of exponentials with the rates that linear stability gives, and nothing else is left.
 

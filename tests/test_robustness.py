@@ -83,7 +83,7 @@ def judged(text: str) -> None:
 
 
 @given(st.data())
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_value_anywhere(data):
     lines = TEXT.splitlines()
     keys = [i for i, line in enumerate(lines) if re.match(r"\w+ =", line)]
@@ -108,7 +108,7 @@ def test_any_value_anywhere_in_a_protocol(data):
 
 
 @given(st.data())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_any_damage_to_the_text(data):
     text = TEXT + EXPERIMENT
     for _ in range(data.draw(st.integers(1, 4))):
@@ -119,7 +119,7 @@ def test_any_damage_to_the_text(data):
 
 
 @given(st.data())
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_any_size_of_any_parameter(data):
     """Thirty decades to each side: an answer, or the message that floating point ends."""
     rig = ss.read_rig(EXAMPLE)

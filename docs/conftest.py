@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from steadyslip import ContactLaw, FrictionLaw
+from steadyslip import ContactLaw, FrictionLaw, NormalMemory
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -15,5 +15,5 @@ os.environ["MPLBACKEND"] = "Agg"
 def _undisturbed(monkeypatch, tmp_path):
     shutil.copytree(Path(__file__).parents[1] / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
-    for family in (FrictionLaw, ContactLaw):
+    for family in (FrictionLaw, ContactLaw, NormalMemory):
         monkeypatch.setattr(family, "registry", dict(family.registry))

@@ -1,0 +1,146 @@
+"""The Model answers: once each, for several contacts where it says so; operating points check arrays in one place."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+import xarray as xr
+
+import steadyslip as ss
+from steadyslip.core.questions import Keeper, question
+from steadyslip.model import Contact, Model, Variable, build_model, operating_point
+from steadyslip.model.linearisation import characteristic_coefficients, linearise
+from steadyslip.model.taylor import system
+
+ROCK = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6)
+RIG = ss.Slider(friction=ROCK, contact=ss.Constant(preload=5e6), stiffness=2e9, drive=ss.Steady(1e-6))
+INCLINED = replace(RIG, contact=ss.InclinedSpring(preload=5e6, angle=0.3))
+
+
+class Oracle(Keeper):
+    def __init__(self):
+        self.asked = 0
+
+
+@question
+def twice(whom, number, add=0):
+    whom.asked += 1
+    return 2 * number + add
+
+
+def test_a_question_is_asked_once_and_its_answer_does_not_travel():
+    one, other = Oracle(), Oracle()
+    assert [twice(one, 3), twice(one, 3), twice(one, 4), twice(one, 3, add=1)] == [6, 6, 8, 7]
+    assert (one.asked, other.asked) == (3, 0)
+    back = pickle.loads(pickle.dumps(one))
+    assert twice(back, 3) == 6
+    assert back.asked == 4
+
+
+def test_models_are_shared_and_keep_what_they_were_asked():
+    model = build_model(RIG)
+    assert build_model(replace(RIG, stiffness=7e9)) is model
+    assert linearise(model) is linearise(model)
+    assert characteristic_coefficients(model) is characteristic_coefficients(build_model(RIG))
+
+
+def test_variables_say_what_they_are():
+    rig = replace(RIG, mass=1e6, drive=ss.PID(1e-6, kp=1e8, ki=1e6))
+    model = build_model(rig)
+    assert [(v.name, v.kind) for v in model.variables] == [
+        ("x", "slip"), ("v", "velocity"), ("Theta", "memory"), ("integral", "integral")
+    ]  # fmt: skip
+    assert model.memory == model.contact.memory
+    assert [item.name for item in model.integrals] == ["integral"]
+    assert model.gain == model.parameters["drive.kp"]
+    assert model.with_role("evolution effect") == ("friction.b",)
+
+
+def test_inlined_leaves_no_stress():
+    model = build_model(INCLINED)
+    assert not model.inlined(model.contact.balance).free_symbols & set(model.definitions)
+
+
+def test_a_point_checks_arrays_by_name_and_shape():
+    point = operating_point(RIG, {"stiffness": np.array([1e9, 2e9]), "friction.a": np.array([[0.01], [0.02], [0.03]])})
+    assert point.shape == (3, 2)
+    assert point.sigma == pytest.approx(5e6)
+    wrong = {"stiffness": [1e9, -1.0], "friction.a": [[0.01]] * 3, "nothing": 1.0}
+    with pytest.raises(ss.ParameterError) as caught:
+        operating_point(RIG, wrong)
+    assert {problem.name for problem in caught.value.problems} == {"slider.stiffness", "nothing"}
+    with pytest.raises(ss.ParameterError, match="do not broadcast"):
+        operating_point(RIG, {"stiffness": [1e9, 2e9], "friction.a": [0.01, 0.02, 0.03]})
+    named = xr.DataArray([1e9, 2e9], dims="k")
+    with pytest.raises(ss.ParameterError, match="bare array beside DataArrays"):
+        operating_point(RIG, {"stiffness": named, "friction.a": [0.01, 0.02]})
+
+
+def test_a_part_of_a_point_is_the_point_of_a_part():
+    angles = np.linspace(-0.6, 0.6, 7)
+    whole = operating_point(INCLINED, {"contact.angle": angles})
+    part = whole.part(np.array([5, 1]))
+    again = operating_point(INCLINED, {"contact.angle": angles[[5, 1]]})
+    assert np.array_equal(part.sigma, again.sigma)
+    assert part.shape == again.shape == (2,)
+    assert [p.size for p in whole.pieces(3)] == [3, 3, 1]
+    assert np.array_equal(np.concatenate([p.sigma for p in whole.pieces(3)]), whole.sigma)
+
+
+# -- several contacts
+
+
+def two_blocks(masses: bool) -> Model:
+    """Two blocks in a row, made of two one-block models: springs from each to the load point, and one between them."""
+    single = build_model(RIG, present=["slider.mass"] if masses else [])
+    between = sp.Symbol("k_between", nonnegative=True)
+    copies, names = [], []
+    shared = {single.parameters["drive.velocity"], *single.inputs.values()}
+    symbols = {s for e in (*single.rates, *single.definitions.values(), single.contact.balance) for s in e.free_symbols}
+    symbols |= {*single.definitions, *(v.symbol for v in single.variables), *single.arguments}
+    symbols |= {single.contact.acceleration, single.contact.velocity}
+    for i in (1, 2):
+        own = {s: sp.Symbol(f"{s.name}_{i}", **s.assumptions0) for s in symbols - shared}
+        copies.append(own)
+        names.append({n: s.xreplace(own) for n, s in single.parameters.items()})
+
+    def put(expression, own):
+        return sp.sympify(expression).xreplace(own)
+
+    variables, rates, definitions, contacts, steady = [], [], {}, [], {}
+    x = [single.contact.slip.xreplace(own) for own in copies]
+    for i, own in enumerate(copies):
+        variables += [replace(v, name=f"{v.name}_{i + 1}", symbol=put(v.symbol, own)) for v in single.variables]
+        rates += [put(rate, own) for rate in single.rates]
+        definitions |= {put(s, own): put(d, own) for s, d in single.definitions.items()}
+        definitions[put(single.contact.spring, own)] -= between * (x[i] - x[1 - i])
+        steady |= {put(s, own): put(e, own) for s, e in single.steady.items()}
+        kept = {name: getattr(single.contact, name) for name in Contact.__dataclass_fields__ if name != "memory"}
+        memory = tuple(Variable(f"{v.name}_{i}", put(v.symbol, own), v.unit, v.doc, v.kind) for v in single.memory)
+        contacts.append(Contact(memory=memory, **{n: e if e is None else put(e, own) for n, e in kept.items()}))
+    parameters = {f"{i}.{n}": s for i, own in enumerate(names, start=1) for n, s in own.items()}
+    parameters = {n: s for n, s in parameters.items() if n != "2.drive.velocity"} | {"between": between}
+    return Model(
+        tuple(variables), tuple(rates), definitions, tuple(contacts), single.inputs, parameters, {}, sp.Integer(0),
+        None, steady, {},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("masses", [False, True])
+def test_two_contacts_have_the_eigenvalues_of_their_modes(masses):
+    """Alike blocks move together as one block does, and against each other as one block on k + 2 k_between."""
+    model = two_blocks(masses)
+    point = operating_point(replace(RIG, mass=1e4) if masses else RIG)
+    alone, between = point.named(), 0.7e9
+    numbers = [alone[name.partition(".")[2]] if name != "between" else between for name in model.parameters]
+    c = np.array(model.function(characteristic_coefficients(model))(*numbers, 5e6, 5e6), dtype=float)
+    found = np.sort_complex(np.roots(c[::-1]))
+    modes = [ss.eigenvalues(replace(RIG, mass=1e4 if masses else 0.0, stiffness=k)) for k in (2e9, 2e9 + 2 * between)]
+    expected = np.concatenate(modes)
+    assert found == pytest.approx(np.sort_complex(expected[np.isfinite(expected)]), rel=1e-6)
+    terms = system(model)
+    assert len(terms.unknowns) == len(model.variables) + 2 + 6
+    with pytest.raises(ss.NotAvailable, match="2 contacts"):
+        _ = model.contact

@@ -9,6 +9,9 @@ import numpy as np
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 
+Num = Any
+"""A number, an array of numbers or a SymPy expression: formulas are written once for all three."""
+
 
 class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like the SymPy functions it stands beside
     """asinh(x exp(y)), evaluated without overflow for large y (regularised rate-and-state friction)."""

@@ -10,14 +10,25 @@ Plain arithmetic: every function takes numbers, arrays or SymPy expressions. Arg
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from steadyslip.core.expressions import Num
 
 
 def coefficients(
-    *, f: Any, S: Any, r: Any, f1: Any, mu: Any, B0: Any, B1: Any, B2: Any, B3: Any, m: Any, k: Any
-) -> tuple[Any, Any, Any, Any]:
+    *,
+    f: Num,
+    S: Num,
+    r: Num,
+    f1: Num,
+    mu: Num,
+    B0: Num,
+    B1: Num,
+    B2: Num,
+    B3: Num,
+    m: Num,
+    k: Num,
+) -> tuple[Num, Num, Num, Num]:
     """a0, a1, a2, a3 of the characteristic polynomial, lowest power first."""
     K = k * B2 + B3
     return (
@@ -29,8 +40,8 @@ def coefficients(
 
 
 def hopf_line(
-    *, f: Any, S: Any, r: Any, f1: Any, mu: Any, B0: Any, B1: Any, B2: Any, B3: Any, m: Any
-) -> tuple[Any, Any]:
+    *, f: Num, S: Num, r: Num, f1: Num, mu: Num, B0: Num, B1: Num, B2: Num, B3: Num, m: Num
+) -> tuple[Num, Num]:
     """N and D of the condition a2 a1 > a3 a0, which reads D k > N.
 
     D > 0: stable above N/D; D < 0: stable only below. The printed eq. 20 has f1(λ1 − λ) for r f (λ1 − λ)
@@ -44,14 +55,25 @@ def hopf_line(
 
 
 def squared_frequency(
-    *, f: Any, S: Any, r: Any, f1: Any, mu: Any, B0: Any, B1: Any, B2: Any, B3: Any, m: Any, k: Any
-) -> Any:
+    *,
+    f: Num,
+    S: Num,
+    r: Num,
+    f1: Num,
+    mu: Num,
+    B0: Num,
+    B1: Num,
+    B2: Num,
+    B3: Num,
+    m: Num,
+    k: Num,
+) -> Num:
     """β² at the critical stiffness, eq. 18: a0/a2 (equal to a1/a3 with inertia)."""
     a0, _, a2, _ = coefficients(f=f, S=S, r=r, f1=f1, mu=mu, B0=B0, B1=B1, B2=B2, B3=B3, m=m, k=k)
     return a0 / a2
 
 
-def stable_interval(numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2: Any, a3: Any) -> tuple[Any, Any]:
+def stable_interval(numerator: Num, denominator: Num, mu_b2: Num, mu_b3: Num, a2: Num, a3: Num) -> tuple[Num, Num]:
     """The one interval of k > 0 in which all Hurwitz conditions hold.
 
     Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. Without
@@ -70,19 +92,19 @@ def stable_interval(numerator: Any, denominator: Any, mu_b2: Any, mu_b3: Any, a2
     return unless(valid, low), unless(valid, high)
 
 
-def positive(value: Any) -> Any:
+def positive(value: Num) -> Num:
     """Where `value` > 0; plain True if everywhere, found in one pass, so that masks cost only where needed."""
     if np.ndim(value) == 0:
         return bool(value > 0)
     return True if np.min(value) > 0 else value > 0
 
 
-def unless(valid: Any, value: Any) -> Any:
+def unless(valid: Num, value: Num) -> Num:
     """`value` where `valid`, NaN elsewhere."""
     return value if valid is True or np.all(valid) else np.where(valid, value, np.nan)
 
 
-def _half_line(low: Any, high: Any, slope: Any, right: Any, valid: Any) -> tuple[Any, Any, Any]:
+def _half_line(low: Num, high: Num, slope: Num, right: Num, valid: Num) -> tuple[Num, Num, Num]:
     """Intersect (low, high) with slope·k > right; the common case of one sign throughout first."""
     with np.errstate(divide="ignore", invalid="ignore"):
         if positive(slope) is True:

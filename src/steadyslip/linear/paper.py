@@ -13,16 +13,27 @@ dimensionless mass m* = m v0²/(σss L) [m_star], dimensionless stiffness κ = k
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from steadyslip.core.expressions import Num
 from steadyslip.linear import cubic
 
 
 def characteristic_at(
-    beta: Any, k: Any, *, m: Any, f: Any, f1: Any, r: Any, lam: Any, lam1: Any, B0: Any, B1: Any, B2: Any, B3: Any
-) -> Any:
+    beta: Num,
+    k: Num,
+    *,
+    m: Num,
+    f: Num,
+    f1: Num,
+    r: Num,
+    lam: Num,
+    lam1: Num,
+    B0: Num,
+    B1: Num,
+    B2: Num,
+    B3: Num,
+) -> Num:
     """Eq. 17: the real part condition at s = iβ; zero at (β, k) on the stability boundary.
 
     Right as printed. Together with eq. 18 it is the characteristic equation at s = iβ.
@@ -34,8 +45,8 @@ def characteristic_at(
 
 
 def critical_frequency_squared(
-    k: Any, *, f: Any, f1: Any, r: Any, lam: Any, lam1: Any, B0: Any, B1: Any, B2: Any, B3: Any
-) -> Any:
+    k: Num, *, f: Num, f1: Num, r: Num, lam: Num, lam1: Num, B0: Num, B1: Num, B2: Num, B3: Num
+) -> Num:
     """Eq. 18: β² at stiffness k, from the imaginary part at s = iβ. Right as printed.
 
     A negative value means that no oscillatory boundary exists at this k.
@@ -45,7 +56,7 @@ def critical_frequency_squared(
     return numerator / (B0 * (lam1 - 1) * r * f1 + f + B1 * f1)
 
 
-def spurious_stiffness(*, f: Any, f1: Any, r: Any, lam: Any, lam1: Any, B0: Any, B1: Any, B2: Any, B3: Any) -> Any:
+def spurious_stiffness(*, f: Num, f1: Num, r: Num, lam: Num, lam1: Num, B0: Num, B1: Num, B2: Num, B3: Num) -> Num:
     """Eq. 19: the root of the quadratic in k that belongs to β² = −r² (eq. 21) and is discarded.
 
     Erratum: the last term of the numerator is printed f1(λ + 1); it must be r f (λ + 1).
@@ -54,14 +65,14 @@ def spurious_stiffness(*, f: Any, f1: Any, r: Any, lam: Any, lam1: Any, B0: Any,
     return -numerator / (B2 * f1 * (lam1 - 1))
 
 
-def spurious_frequency_squared(r: Any) -> Any:
+def spurious_frequency_squared(r: Num) -> Num:
     """Eq. 21: β² = −r² of the discarded root. Right as printed."""
     return -(r**2)
 
 
 def critical_stiffness(
-    *, m: Any, f: Any, f1: Any, r: Any, lam: Any, lam1: Any, B0: Any, B1: Any, B2: Any, B3: Any
-) -> Any:
+    *, m: Num, f: Num, f1: Num, r: Num, lam: Num, lam1: Num, B0: Num, B1: Num, B2: Num, B3: Num
+) -> Num:
     """Eq. 20: the critical stiffness of the general linear contact.
 
     Errata: the numerator is printed with f1(λ1 − λ) for r f (λ1 − λ), and the denominator lacks B1 f1; right
@@ -73,19 +84,28 @@ def critical_stiffness(
     return numerator / denominator
 
 
-def inclined_normal_stress(x: Any, *, sigma_ss: Any, k: Any, angle: Any) -> Any:
+def inclined_normal_stress(x: Num, *, sigma_ss: Num, k: Num, angle: Num) -> Num:
     """Eqs 22-23: σ = σss + k x tan ψ, x the slip of the block ahead of steady sliding (m). Right as printed."""
     return sigma_ss + k * x * np.tan(angle)
 
 
-def inclined_coefficients(angle: Any) -> tuple[Any, Any, Any, Any]:
+def inclined_coefficients(angle: Num) -> tuple[Num, Num, Num, Num]:
     """Eq. 24: (B0, B1, B2, B3) of the inclined spring: 0, 0, tan ψ, 0. Right as printed."""
     return 0.0, 0.0, np.tan(angle), 0.0
 
 
 def inclined_critical_stiffness(
-    *, a: Any, b: Any, d_c: Any, mu_ss: Any, alpha: Any, sigma_ss: Any, angle: Any, m: Any = 0.0, v0: Any = 1.0
-) -> Any:
+    *,
+    a: Num,
+    b: Num,
+    d_c: Num,
+    mu_ss: Num,
+    alpha: Num,
+    sigma_ss: Num,
+    angle: Num,
+    m: Num = 0.0,
+    v0: Num = 1.0,
+) -> Num:
     """Eq. 25: critical stiffness of the inclined spring with slip or aging law and Linker–Dieterich memory.
 
     Erratum to the dynamic form, whose printed denominator Aσss/L − α ln ψ m v0/L is garbled: it is
@@ -100,8 +120,8 @@ def inclined_critical_stiffness(
 
 
 def inclined_frequency_squared(
-    *, a: Any, b: Any, d_c: Any, mu_ss: Any, alpha: Any, angle: Any, v0: Any, m_star: Any = 0.0
-) -> Any:
+    *, a: Num, b: Num, d_c: Num, mu_ss: Num, alpha: Num, angle: Num, v0: Num, m_star: Num = 0.0
+) -> Num:
     """Eq. 26: β² at the critical stiffness of the inclined spring.
 
     Right as printed, for the quasistatic case; with mass the denominator gains −α m* tan ψ (theory 4).
@@ -111,12 +131,12 @@ def inclined_frequency_squared(
     return (b - a) * (v0 / d_c) ** 2 * (1 + mu_ss * tangent) / denominator
 
 
-def lock_up_angle(mu_ss: Any) -> Any:
+def lock_up_angle(mu_ss: Num) -> Num:
     """Eq. 27: steady sliding needs ψ > −arccot μss (rad). Right as printed, with or without mass."""
     return -np.arctan2(1.0, mu_ss)
 
 
-def inclined_dimensionless_stiffness(*, a: Any, b: Any, mu_ss: Any, alpha: Any, angle: Any, m_star: Any = 0.0) -> Any:
+def inclined_dimensionless_stiffness(*, a: Num, b: Num, mu_ss: Num, alpha: Num, angle: Num, m_star: Num = 0.0) -> Num:
     """Eq. 28: κ_cr = k_cr L/σss against dimensionless mass. Right as printed.
 
     Infinite at m*_cr2 (eq. 31), where a positive angle loses its last stabilising stiffness; beyond it the
@@ -127,21 +147,21 @@ def inclined_dimensionless_stiffness(*, a: Any, b: Any, mu_ss: Any, alpha: Any, 
     return (b - a) * (a + m_star) / denominator
 
 
-def quasistatic_mass_limit(a: Any) -> Any:
+def quasistatic_mass_limit(a: Num) -> Num:
     """Eq. 29: the quasistatic critical stiffness is a close approximation for m* much below A."""
     return a
 
 
-def mass_of_equal_stiffness(*, a: Any, mu_ss: Any, alpha: Any) -> Any:
+def mass_of_equal_stiffness(*, a: Num, mu_ss: Num, alpha: Num) -> Num:
     """Eq. 30: m*_cr1, the mass at which κ_cr does not depend on the angle. Right as printed."""
     return a * (mu_ss - alpha) / alpha
 
 
-def mass_of_no_stiffness(*, a: Any, mu_ss: Any, alpha: Any, angle: Any) -> Any:
+def mass_of_no_stiffness(*, a: Num, mu_ss: Num, alpha: Num, angle: Num) -> Num:
     """Eq. 31: m*_cr2, the mass from which on no finite stiffness is stable; for ψ > 0 only. Right as printed."""
     return mass_of_equal_stiffness(a=a, mu_ss=mu_ss, alpha=alpha) + a / (alpha * np.tan(angle))
 
 
-def dimensionless_normal_stress(x: Any, *, sigma_ss: Any, kappa: Any, d_c: Any, angle: Any) -> Any:
+def dimensionless_normal_stress(x: Num, *, sigma_ss: Num, kappa: Num, d_c: Num, angle: Num) -> Num:
     """Eq. 32: σ = σss (1 + κ (x/L) tan ψ). Right as printed; loss of contact where it is <= 0."""
     return sigma_ss * (1 + kappa * x / d_c * np.tan(angle))

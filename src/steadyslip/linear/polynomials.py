@@ -130,7 +130,7 @@ def _close_pair(c: Array, one: ComplexArray, other: ComplexArray) -> ComplexArra
     return pair
 
 
-def _quadratic(c: Any) -> ComplexArray:
+def _quadratic(c: Array) -> ComplexArray:
     """Roots of c0 + c1 s + c2 s² without cancellation; a pair that is double to within rounding is real."""
     c0, c1, c2 = (part.astype(np.longdouble) for part in c.T)
     discriminant = c1 * c1 - 4 * c0 * c2

@@ -16,6 +16,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import Num
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import quietly
@@ -42,27 +43,27 @@ class Response:
         Mass, and total stiffness between block and load point.
     """
 
-    f: Any
-    S: Any
-    r: Any
-    f1: Any
-    mu: Any
-    B0: Any
-    B1: Any
-    B2: Any
-    B3: Any
-    m: Any
-    k: Any
+    f: Num
+    S: Num
+    r: Num
+    f1: Num
+    mu: Num
+    B0: Num
+    B1: Num
+    B2: Num
+    B3: Num
+    m: Num
+    k: Num
 
     def as_dict(self) -> dict[str, Any]:
         """The ingredients by name, as the functions of `steadyslip.linear.cubic` take them."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
-    def characteristic_polynomial(self) -> tuple[Any, Any, Any, Any]:
+    def characteristic_polynomial(self) -> tuple[Num, Num, Num, Num]:
         """a0, a1, a2, a3, lowest power first."""
         return cubic.coefficients(**self.as_dict())
 
-    def critical_stiffness(self) -> Any:
+    def critical_stiffness(self) -> Num:
         """N/D, the oscillatory edge in the total stiffness (Pa/m); eq. 20 corrected."""
         known = self.as_dict()
         known.pop("k")
@@ -70,12 +71,12 @@ class Response:
         return numerator / denominator
 
     @property
-    def lam(self) -> Any:
+    def lam(self) -> Num:
         """The paper's λ = −S/f (eq. 15)."""
         return -self.S / self.f
 
     @property
-    def lam1(self) -> Any:
+    def lam1(self) -> Num:
         """The paper's λ1 = μ/f1 (eq. 16)."""
         return self.mu / self.f1
 

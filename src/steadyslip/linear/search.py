@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.quantities import shown, unit
-from steadyslip.linear.polynomials import damping_measures, roots
+from steadyslip.linear.polynomials import Array, damping_measures, roots
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
@@ -82,17 +82,17 @@ class Search:
         address = rig.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
 
-    def values(self, x: Any) -> OperatingPoint:
+    def values(self, x: float | Array) -> OperatingPoint:
         return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
 
     # -- the range
 
-    def grid(self, between: tuple[float, float] | None) -> Any:
+    def grid(self, between: tuple[float, float] | None) -> Array:
         """Sample values of rigs that can be built, rising; the rig's own value is one of them."""
         samples = self._whole_grid() if between is None else self._grid_between(*between)
-        return samples[np.broadcast_to(self.values(samples).valid, samples.shape)]
+        return np.asarray(samples[np.broadcast_to(self.values(samples).valid, samples.shape)])
 
-    def _whole_grid(self) -> Any:
+    def _whole_grid(self) -> Array:
         domain = self.role.domain
         if np.isfinite(domain.high):
             inset = 1e-9 * (domain.high - domain.low)
@@ -111,7 +111,7 @@ class Search:
                 samples = np.concatenate([[0.0], samples])
         return np.unique(np.append(samples, self.value))
 
-    def _grid_between(self, low: float, high: float) -> Any:
+    def _grid_between(self, low: float, high: float) -> Array:
         samples = [np.linspace(low, high, _LINEAR)]
         for a, b, sign in ((low, high, 1.0), (-high, -low, -1.0)):  # even in logarithm too
             if b > 0:
@@ -133,10 +133,10 @@ class Search:
 
     # -- status along the parameter
 
-    def status(self, x: Any) -> Any:
+    def status(self, x: Array) -> NDArray[np.int64]:
         return status(self.values(np.asarray(x, dtype=float)))
 
-    def measures(self, x: Any) -> Any:
+    def measures(self, x: Array) -> Array:
         """Two functions that pass through zero at an edge: damping of pairs, and of single eigenvalues."""
         return damping_measures(roots(characteristic(self.values(np.asarray(x, dtype=float)))))
 
@@ -157,7 +157,7 @@ class Search:
             low, high = low[inside], high[inside]
             return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
 
-    def _with_hidden_windows(self, grid: Any) -> Any:
+    def _with_hidden_windows(self, grid: Array) -> Array:
         """Add samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
         status, measures = self.status(grid), self.measures(grid)
         same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & np.isin(status[1:-1], (STABLE, UNSTABLE))
@@ -170,7 +170,7 @@ class Search:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
         return np.unique(np.concatenate(extra))
 
-    def _descended(self, which: int, sign: Any, low: Any, high: Any) -> list[Any]:
+    def _descended(self, which: int, sign: Array, low: Array, high: Array) -> list[Array]:
         """Lowest points of a measure (times its sign) inside brackets, ever more closely."""
         found = []
         row = np.arange(len(low))
@@ -182,7 +182,7 @@ class Search:
             low, high = x[row, best - 1], x[row, best + 1]
         return found
 
-    def _narrowed(self, low: Any, high: Any, low_status: Any) -> tuple[Any, Any]:
+    def _narrowed(self, low: Array, high: Array, low_status: NDArray[np.int64]) -> tuple[Array, Array]:
         """Brackets down to rounding, all at once; keeps the lowest change inside each."""
         for _ in range(12):
             if not len(low):
@@ -245,7 +245,7 @@ class Search:
             self._stiffness_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
         )
 
-    def _stiffness_edge(self, k: float, frequency: float, intervals: Any) -> Boundary:
+    def _stiffness_edge(self, k: float, frequency: float, intervals: Array) -> Boundary:
         kind = "divergence" if frequency == 0 else "ill-posed" if np.isinf(frequency) else "oscillatory"
         stable = "above" if np.any(intervals[:, 0] == k) else "below"
         bracket = (float(np.nextafter(k, 0)), float(np.nextafter(k, np.inf)))

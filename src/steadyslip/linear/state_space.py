@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import sympy as sp
 
 from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, UnknownNameError
 from steadyslip.core.questions import question
+from steadyslip.linear.polynomials import Array
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import linearise
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 INPUTS = ("load_velocity", "disturbance", "normal_disturbance")
 
 
-def jacobian(rig: Slider) -> Any:
+def jacobian(rig: Slider) -> Array:
     """Jacobian (1/s and mixed units) of the Model's own variables at steady sliding.
 
     Order as in ``build_model(rig).variables``; the algebraic unknown is eliminated. Its eigenvalues are the
@@ -31,7 +32,7 @@ def jacobian(rig: Slider) -> Any:
     return state_matrices(rig, ())[0]
 
 
-def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, Any]:
+def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Array, Array, Array, Array]:
     """A, B, C, D for the given outputs (names of ``Model.observables``); inputs are `INPUTS`.
 
     Raises
@@ -61,7 +62,7 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Any, Any, Any, 
     return found
 
 
-def _solved(blocks: Any, n: int, p: int) -> tuple[Any, Any, Any, Any]:
+def _solved(blocks: Sequence[Array], n: int, p: int) -> tuple[Array, Array, Array, Array]:
     """The matrices, with the unknown in terms of variables and inputs."""
     width = n + len(INPUTS) + 1
     table = np.array([float(b) for b in blocks]).reshape(n + p + 1, width)
@@ -74,7 +75,7 @@ def _solved(blocks: Any, n: int, p: int) -> tuple[Any, Any, Any, Any]:
 
 
 @question
-def _matrix_function(model: Model, outputs: tuple[str, ...]) -> Any:
+def _matrix_function(model: Model, outputs: tuple[str, ...]) -> Callable[..., list[Array]]:
     """Rows: rates, outputs, balance. Columns: variables, inputs, unknown."""
     linear = linearise(model)
     contact = model.contact

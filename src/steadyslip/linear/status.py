@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
 from steadyslip.linear.response import has_closed_form, response_numbers
@@ -15,7 +14,7 @@ ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms,
 ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
 
 
-def status(point: OperatingPoint) -> Any:
+def status(point: OperatingPoint) -> NDArray[np.int64]:
     """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed too) or UNKNOWN (out of floating point, or no rig)."""
     with np.errstate(all="ignore"):
         exists = np.isfinite(point.sigma)
@@ -26,7 +25,7 @@ def status(point: OperatingPoint) -> Any:
         return np.where(point.valid, found, UNKNOWN)
 
 
-def on_edge(point: OperatingPoint) -> Any:
+def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits."""
     with np.errstate(all="ignore"):
         ratio = 0.5 * damping_measures(roots(characteristic(point)))[0]
@@ -37,4 +36,4 @@ def on_edge(point: OperatingPoint) -> Any:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
         static = np.abs(sum(terms)) / sum(np.abs(term) for term in terms)
-        return (np.abs(ratio) <= ON_THE_EDGE) | (static <= ON_THE_EDGE)
+        return np.asarray((np.abs(ratio) <= ON_THE_EDGE) | (static <= ON_THE_EDGE))

@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
+from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import array_function
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
-from steadyslip.linear.polynomials import StableSet, quietly, roots, stable_set
+from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, quietly, roots, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
@@ -71,9 +73,9 @@ def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
     """
     point = operating_point(rig, vary)
 
-    def kernel(part: OperatingPoint) -> Any:
+    def kernel(part: OperatingPoint) -> Array:
         with np.errstate(all="ignore"):
-            return (part.named()["slider.stiffness"] + part.gain) / (_nearest_edge(part) + part.gain)
+            return np.asarray((part.named()["slider.stiffness"] + part.gain) / (_nearest_edge(part) + part.gain))
 
     return point.wrap(in_chunks(point, kernel), "safety_factor", "1")
 
@@ -114,7 +116,7 @@ def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
     """
     point = operating_point(rig, vary)
 
-    def kernel(part: OperatingPoint) -> Any:
+    def kernel(part: OperatingPoint) -> ComplexArray:
         return roots(characteristic(part))
 
     return point.wrap(in_chunks(point, kernel), "eigenvalues", "1/s", ("mode",))
@@ -127,7 +129,7 @@ def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
     """
     point = operating_point(rig, vary)
 
-    def kernel(part: OperatingPoint) -> Any:
+    def kernel(part: OperatingPoint) -> Array:
         c = characteristic(part)
         with np.errstate(invalid="ignore"):
             rate = np.max(np.where(np.isnan(found := roots(c).real), -np.inf, found), axis=-1)
@@ -139,12 +141,12 @@ def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
 # --- coefficients as arrays -------------------------------------------------------------------------
 
 
-def characteristic(point: OperatingPoint) -> Any:
+def characteristic(point: OperatingPoint) -> Array:
     """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
     return _stacked(point.evaluate(_coefficient_function(point.model)), point)
 
 
-def stiffness_polynomials(point: OperatingPoint) -> tuple[Any, Any]:
+def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
     """p and q of p(s) + k q(s), each (..., n+1), lowest first; k is the spring's own stiffness."""
     both = point.evaluate(_split_function(point.model))
     half = len(both) // 2
@@ -156,12 +158,12 @@ def general_set(point: OperatingPoint) -> StableSet:
     return stable_set(*stiffness_polynomials(point))
 
 
-def ill_posed(c: Any) -> Any:
+def ill_posed(c: Array) -> NDArray[np.bool_]:
     """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3)."""
-    return (c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0))
+    return np.asarray((c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0)))
 
 
-def _stacked(parts: list[Any], point: OperatingPoint) -> Any:
+def _stacked(parts: list[Array], point: OperatingPoint) -> Array:
     out = np.empty((*point.shape, len(parts)))
     for i, part in enumerate(parts):
         out[..., i] = part
@@ -171,12 +173,12 @@ def _stacked(parts: list[Any], point: OperatingPoint) -> Any:
 
 
 @question
-def _coefficient_function(model: Model) -> Callable[..., list[Any]]:
+def _coefficient_function(model: Model) -> Callable[..., list[Array]]:
     return model.function(characteristic_coefficients(model))
 
 
 @question
-def _split_function(model: Model) -> Callable[..., list[Any]]:
+def _split_function(model: Model) -> Callable[..., list[Array]]:
     p, q = stiffness_split(model)
     return model.function([*p, *q])
 
@@ -184,7 +186,7 @@ def _split_function(model: Model) -> Callable[..., list[Any]]:
 # --- the interval of the closed form ----------------------------------------------------------------
 
 
-def closed_form_interval(point: OperatingPoint) -> tuple[Any, Any]:
+def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
     """Ends of the one stable interval of a rig with one memory variable (cubic in closed form)."""
     exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
@@ -196,7 +198,7 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Any, Any]:
 
 
 @question
-def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Any]]:
+def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
     """Everything that `closed_form_interval` needs, compiled into one function."""
     part = response(model)
     known = part.as_dict()
@@ -209,7 +211,7 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Any]]:
     if not equation.affine:
         general = model.function(wanted)
 
-        def by_search(point: OperatingPoint) -> list[Any]:
+        def by_search(point: OperatingPoint) -> list[Array]:
             return [np.isfinite(point.sigma), *point.evaluate(general)]
 
         return by_search
@@ -218,7 +220,7 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Any]]:
         wanted[2] = sp.Integer(0)  # a0 > 0 is then the condition that steady sliding exists, tested anyway
     direct = array_function(arguments, [sigma, slope, *(w.xreplace({model.contact.sigma_ss: sigma}) for w in wanted)])
 
-    def in_one_go(point: OperatingPoint) -> list[Any]:
+    def in_one_go(point: OperatingPoint) -> list[Array]:
         with np.errstate(divide="ignore", invalid="ignore"):
             stress, coupling, *rest = direct(*point.arguments)
         return [cubic.positive(1 - coupling) & cubic.positive(stress), *rest]
@@ -263,7 +265,7 @@ def set_of_one(point: OperatingPoint) -> StableSet:
 # --- intervals to answers, chunk by chunk -----------------------------------------------------------
 
 
-def _interval_ends(point: OperatingPoint) -> tuple[Any, Any]:
+def _interval_ends(point: OperatingPoint) -> tuple[Array, Array]:
     """Lower and upper ends of the stable intervals, (..., m)."""
     if has_closed_form(point.model):
         low, high = closed_form_interval(point)
@@ -272,14 +274,14 @@ def _interval_ends(point: OperatingPoint) -> tuple[Any, Any]:
     return intervals[..., 0], intervals[..., 1]
 
 
-def _nearest_edge(point: OperatingPoint) -> Any:
+def _nearest_edge(point: OperatingPoint) -> Array:
     """The finite positive end of a stable interval nearest to the rig's own stiffness."""
     own = point.named()["slider.stiffness"]
     low, high = _interval_ends(point)
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # the common case, worth its own line for arrays of rigs
-            return cubic.unless(cubic.positive(low), low)
+            return np.asarray(cubic.unless(cubic.positive(low), low))
         is_low = (low > 0) & ~((high < np.inf) & (np.abs(high - own) < np.abs(low - own)))
         return np.where(is_low, low, np.where(high < np.inf, high, np.nan))
     ends = np.concatenate([low, high], axis=-1)
@@ -290,9 +292,9 @@ def _nearest_edge(point: OperatingPoint) -> Any:
 
 
 @quietly
-def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], Any]) -> Any:
+def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], NDArray[Any]]) -> NDArray[Any]:
     """Apply a kernel to the varied rigs some thousand at a time."""
-    whole: Any = None
+    whole: NDArray[Any] | None = None
     done = 0
     for part in point.pieces(_CHUNK):
         result = np.asarray(kernel(part))
@@ -301,11 +303,13 @@ def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], Any]) ->
             whole = np.empty((point.size, *extra), dtype=result.dtype)
         whole[done : done + part.size] = np.broadcast_to(result, (*part.shape, *extra)).reshape(-1, *extra)
         done += part.size
+    if whole is None:
+        raise InternalError("at least one piece")
     return whole.reshape(point.shape + whole.shape[1:])
 
 
 @quietly
-def _in_chunks_of_intervals(point: OperatingPoint) -> tuple[Any, Any]:
+def _in_chunks_of_intervals(point: OperatingPoint) -> tuple[Array, Array]:
     """Interval ends of all rigs; chunks may differ in the number of intervals."""
     pieces = [
         (np.broadcast_to(low, (*part.shape, low.shape[-1])), np.broadcast_to(high, (*part.shape, low.shape[-1])))

@@ -42,13 +42,13 @@ def scipy_rival(method: str) -> Run:
                     return m.copy()
 
                 options["jac"] = jacobian
-            begin = time.perf_counter()
+            begin = time.process_time()
             with np.errstate(all="ignore"):
                 done = solve_ivp(
                     slope, (0, problem.until), start, method=method, rtol=max(tolerance, 1e-13), atol=tolerance,
                     t_eval=[problem.until], **options,
                 )  # fmt: skip
-            seconds += time.perf_counter() - begin
+            seconds += time.process_time() - begin
             ends.append(done.y[:, -1] if done.success and done.y.size else np.full(len(start), np.nan))
         return np.array(ends), seconds
 
@@ -93,9 +93,9 @@ def heyoka_single(problem: Problem, tolerance: float, variants: np.ndarray) -> t
         integrator.time = 0.0
         integrator.state[:] = problem.initial(variant)
         integrator.pars[:] = variant
-        begin = time.perf_counter()
+        begin = time.process_time()
         integrator.propagate_until(problem.until)
-        seconds += time.perf_counter() - begin
+        seconds += time.process_time() - begin
         ends.append(integrator.state.copy())
     return np.array(ends), seconds
 
@@ -113,7 +113,7 @@ def heyoka_batch(problem: Problem, tolerance: float, variants: np.ndarray) -> tu
         )
     integrator = _MADE[key]
     ends = np.empty((len(variants), size))
-    begin = time.perf_counter()
+    begin = time.process_time()
     for first in range(0, len(variants) - width + 1, width):
         chunk = variants[first : first + width]
         integrator.set_time(0.0)
@@ -121,7 +121,7 @@ def heyoka_batch(problem: Problem, tolerance: float, variants: np.ndarray) -> tu
         integrator.pars[:] = chunk.T
         integrator.propagate_until(problem.until)
         ends[first : first + width] = integrator.state.T
-    return ends, time.perf_counter() - begin
+    return ends, time.process_time() - begin
 
 
 def diffrax_vmap(problem: Problem, tolerance: float, variants: np.ndarray) -> tuple[np.ndarray, float]:
@@ -155,9 +155,9 @@ def diffrax_vmap(problem: Problem, tolerance: float, variants: np.ndarray) -> tu
         _MADE[key] = jax.jit(jax.vmap(one))
         _MADE[key](variants, np.array([problem.initial(v) for v in variants])).block_until_ready()
     starts = np.array([problem.initial(v) for v in variants])
-    begin = time.perf_counter()
+    begin = time.process_time()
     ends = np.asarray(_MADE[key](variants, starts).block_until_ready())
-    return ends, time.perf_counter() - begin
+    return ends, time.process_time() - begin
 
 
 def installed(name: str) -> bool:

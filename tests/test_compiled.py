@@ -264,7 +264,6 @@ def test_no_two_quantities_of_a_record_share_a_place():
     places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 6)]
     places += [(layout.omega, 6), (layout.phase, 6), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
     places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 4), (layout.happened, 4), (layout.counted, 8)]
-    places += [(layout.now, 3)]
     taken = [place + i for place, count in places for i in range(count)]
     assert sorted(taken) == list(range(layout.rows))
 

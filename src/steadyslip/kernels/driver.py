@@ -174,13 +174,11 @@ def start_job(
     R[Row.PEAK_PERIOD] = math.nan
     R[Row.PEAK_GROWTH] = math.nan
     R[Row.NOW_BEGIN] = math.nan
-    R[Row.NOW_AT] = -1.0
-    R[Row.CROSSED] = -1.0
     R[Row.LOG] = 1.0 if log.shape[0] > 0 else 0.0
     R[Row.NOW_FROM] = math.inf
     if R[Row.WATCH] > 0.0 and R[layout.mark + Event.SLIP] > 0.0:
         look_now(R, layout, routines, 0.0, y)
-        note(R, layout, routines, Kind.SLIP_BEGINS, 0.0, y, log, cursor)
+        note(R, layout, Kind.SLIP_BEGINS, 0.0, y, log, cursor)
     return True
 
 
@@ -251,9 +249,7 @@ def follow(
         change = R[layout.happened + e]
         if change != 0.0 and (e <= Event.CONTACT or log.shape[0] > 0):
             kind = 2 * e + (2 if change > 0.0 else 1)
-            known = kind == Kind.SLIP_ENDS and R[Row.CROSSED] >= 0.0
-            order[count, 0] = R[Row.CROSSED] if known else located(R, layout, routines, kind, y)
-            order[count, 1] = kind
+            order[count, 0], order[count, 1] = located(R, layout, routines, kind, y), kind
             count += 1
     for _ in range(count):
         first = 0
@@ -264,7 +260,7 @@ def follow(
         order[first, 0] = 2.0
         look_back(R, layout, routines, theta, y)
         tau = tau_old + theta * h
-        note(R, layout, routines, kind, tau, y, log, cursor)
+        note(R, layout, kind, tau, y, log, cursor)
         if kind == Kind.LOST:
             R[Row.TAU] = tau
             for i in range(layout.size):
@@ -274,7 +270,6 @@ def follow(
                     R[layout.counted + int(order[i, 1]) - 1] -= 1.0
             return True
     R[Row.HAPPENED] = 0.0
-    R[Row.CROSSED] = -1.0
     R[Row.PEAK_VELOCITY] = max(R[Row.PEAK_VELOCITY], v)
     R[Row.LOWEST_VELOCITY] = min(R[Row.LOWEST_VELOCITY], v)
     R[Row.NOW_PEAK] = max(R[Row.NOW_PEAK], v)
@@ -297,19 +292,6 @@ def outrun(R: Array, layout: Layout, slowest: float, tau: float, y: Array) -> No
     R[Row.NOW_STRESS] = y[n + Out.T]
     R[Row.NOW_X] = y[layout.x] + R[Row.LOAD_MOVED] + y[n + Out.ADVANCE]
     R[Row.NOW_SEGMENT] = R[Row.SEGMENT]
-    R[Row.NOW_AT] = -1.0
-
-
-def recall(R: Array, layout: Layout, routines: Routines, y: Array) -> None:
-    """What was observed where slip began, if only state and time were kept: before its segment ends."""
-    tau, highest, event = R[Row.NOW_AT], R[Row.NOW_PEAK], R[Row.NOW_EVENT]
-    if tau < 0.0:
-        return
-    for i in range(layout.size):
-        y[i] = R[layout.now + i]
-    call(routines.outputs, R, tau, y)
-    outrun(R, layout, R[Row.NOW_FROM], tau, y)
-    R[Row.NOW_PEAK], R[Row.NOW_EVENT] = highest, event
 
 
 def quicken(R: Array, layout: Layout, y: Array, log: Array, cursor: Array) -> None:
@@ -330,9 +312,7 @@ def quicken(R: Array, layout: Layout, y: Array, log: Array, cursor: Array) -> No
         cursor[Cursor.LOGGED] = i + 1
 
 
-def note(
-    R: Array, layout: Layout, routines: Routines, kind: int, tau: float, y: Array, log: Array, cursor: Array
-) -> None:  # fmt: skip
+def note(R: Array, layout: Layout, kind: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
     """Keep the tally of events, and the log where there is one."""
     n = layout.size
     time = clock(R, tau)
@@ -353,7 +333,6 @@ def note(
         log[i, 4], log[i, 5], log[i, 6], log[i, 7] = y[n + Out.TAU], stress, place, R[Row.SEGMENT]
         cursor[Cursor.LOGGED] = i + 1
     if kind == Kind.SLIP_ENDS:
-        recall(R, layout, routines, y)
         begin = R[Row.NOW_BEGIN]
         if R[Row.ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
             R[Row.RECURRENCE] = begin - R[Row.EVENT_BEGIN]
@@ -485,7 +464,6 @@ def go_on(
         if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
             return Status.DONE
         h, before, slipping = R[Row.H], R[Row.V], R[layout.mark + Event.SLIP]
-        recall(R, layout, routines, y)
         if not enter_segment(R, layout, routines, j, k, segments, y):
             return Status.NO_VELOCITY
         await_sample(R, times)
@@ -506,7 +484,7 @@ def crossed(
     v = y[layout.size + Out.V]
     slipping = R[layout.mark + Event.SLIP] > 0.0
     if slipping != was_slipping:
-        note(R, layout, routines, Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS, 0.0, y, log, cursor)
+        note(R, layout, Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS, 0.0, y, log, cursor)
     if slipping and R[Row.NOW_EVENT] == 0.0 and before < min(v, R[Row.NOW_FROM]):
         outrun(R, layout, before, 0.0, y)
         quicken(R, layout, y, log, cursor)

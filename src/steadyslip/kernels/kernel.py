@@ -190,7 +190,7 @@ class Kernel:
             w=reduction.names.index("w") if "w" in reduction.names else -1,
             x=reduction.names.index("x"),
             events=len(EVENTS) if choice.dense else 0,
-            watched=choice.dense and choice.lanes > 1 and self.speed is not None,
+            watched=choice.lanes > 1 and self.speed is not None and reduction.unknown is None,
         )
 
     @cached_property

@@ -40,18 +40,18 @@ class Row(IntEnum):
     """Length of the last step, where it began, and the rate of the velocity variable there."""
     EXTENDED = 38
     """Whether the stages are there that only dense output needs."""
-    HAPPENED, CROSSED = 39, 40
-    """How many events the last step has, and where in it, as a share, slip was found to end (-1: not known)."""
-    W_LIMIT, W_LP = 41, 42
+    HAPPENED = 39
+    """How many events the last step has."""
+    W_LIMIT, W_LP = 40, 41
     """Velocity variable above which the block slips and that of the load point, while inputs are constant."""
     # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
-    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 43, 44, 45
-    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 46, 47, 48, 49, 50, 51
-    LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 52, 53, 54
-    PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 55, 56, 57
+    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 42, 43, 44
+    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 45, 46, 47, 48, 49, 50
+    LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 51, 52, 53
+    PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 54, 55, 56
     # slip that may become a slip event: since when, and what was there
-    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN, NOW_AT = 58, 59, 60, 61, 62
-    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 63, 64, 65, 66, 67, 68
+    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 57, 58, 59, 60
+    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 61, 62, 63, 64, 65, 66
 
 
 INPUTS = 3
@@ -158,8 +158,6 @@ class Layout(NamedTuple):
     """Which of them changed sign in the last step: 1 rose, -1 fell."""
     counted: int
     """How often each kind of event happened."""
-    now: int
-    """State at the begin of slip that may become a slip event."""
     seen: int
     before: int
     rows: int
@@ -175,7 +173,7 @@ def make_layout(
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "amplitude": waves, "omega": waves,
         "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages,
-        "mark": events, "happened": events, "counted": 2 * events, "now": size if events else 0, "seen": seen,
+        "mark": events, "happened": events, "counted": 2 * events, "seen": seen,
         "before": own if seen else 0,
     }  # fmt: skip
     places, position = {}, max(Row) + 1

@@ -1,9 +1,8 @@
 """The program that finds frequent events in all lanes at once, and keeps the tally of lanes without a log.
 
 Extremes of velocity and the begin and end of slip are roots of the dense output's polynomial in the velocity variable,
-or of its derivative. A lane where that is not enough keeps its flag and is left to the driver: slip events that end,
-contact that is lost, several events within a step, slip that begins or ends while inputs change, a root that is not
-found at once.
+or of its derivative. A lane where that is not enough keeps its flag and is left to the driver: contact that is lost,
+several events within a step, slip that begins or ends while inputs change, a root that is not found at once.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from steadyslip.kernels.layout import SLIP_EVENT, Event, Row
+from steadyslip.kernels.layout import SLIP_EVENT, Event, Out, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, larger, log, select, smaller
 from steadyslip.kernels.record import Record, horner, slope_of
 from steadyslip.kernels.source import Formulas
@@ -45,8 +44,6 @@ class Watch(Record):
         left = (load(layout.happened + Event.CONTACT) < 0.0) | (self.turns & (self.begins | self.ends)) | ~self.found
         if self.kernel.choice.level != "constant":
             left = left | self.begins | self.ends
-        located, left = ~left, left | (self.ends & (self.now_event > 0.0))
-        store(Row.CROSSED, select(located & self.ends, self.theta, -1.0))
         self.here = (count > 0.0) & ~left
         store(Row.HAPPENED, select(self.here, 0.0, count))
         self._turn()
@@ -77,13 +74,15 @@ class Watch(Record):
             value, slope, bend = (as_node(horner(c, theta)) for c in (wanted, slopes, bends))
             change = 2.0 * value * slope / (2.0 * slope * slope - value * bend)
             theta = smaller(larger(theta - change, 0.0), 1.0)
-        self.theta, self.found = theta, abs(change) <= FOUND
+        self.found = abs(change) <= FOUND
         self.tau = self.tau_old + theta * self.h
         self.there = self.between(theta)
         start, stop = program.load(Row.START), program.load(Row.STOP)
         self.time = select(self.tau < program.load(Row.END), smaller(start + self.tau, stop), stop)
         point = self.inputs(self.tau) | {f"y{i}": y for i, y in enumerate(self.there)}
         self.v, self.v_lp = self.speed(self.constants | point)[0], point["in_v"]
+        self.stress = kernel.outputs(self.constants | point)[Out.T]
+        self.place = self.there[kernel.layout.x] + program.load(Row.LOAD_MOVED) + self.load_advance(self.tau)
 
     def _kept(self, row: int, condition: Node, value: Value) -> Node:
         """Store a value where a condition holds, and return what is there now."""
@@ -128,7 +127,25 @@ class Watch(Record):
         self.program.store(Row.NOW_EVENT, select(anew | over, 0.0, event))
         highest = select(here & self.peak, larger(load(Row.NOW_PEAK), self.v), load(Row.NOW_PEAK))
         self.program.store(Row.NOW_PEAK, select(anew, self.v, highest))
-        kept: Sequence[tuple[int, Value]] = [(Row.NOW_BEGIN, self.time), (Row.NOW_AT, self.tau)]
-        kept = [*kept, *((self.kernel.layout.now + i, y) for i, y in enumerate(self.there))]
-        for row, value in kept:
+        self._complete(over & (self.now_event > 0.0))
+        for row, value in ((Row.NOW_BEGIN, self.time), (Row.NOW_STRESS, self.stress), (Row.NOW_X, self.place)):
             self._kept(row, anew, value)
+
+    def _complete(self, complete: Node) -> None:
+        """The tally of a slip event that ends."""
+        load, begin = self.program.load, self.program.load(Row.NOW_BEGIN)
+        self._kept(Row.RECURRENCE, complete & (load(Row.ANY_BEGIN) > 0.0), begin - load(Row.EVENT_BEGIN))
+        found: Sequence[tuple[int, Value]] = (
+            (
+                Row.ANY_BEGIN,
+                select(begin > 0.0, 1.0, 0.0),
+            ),  # one that was going on at the start has no begin of its own
+            (Row.EVENTS, load(Row.EVENTS) + 1.0),
+            (Row.EVENT_BEGIN, begin),
+            (Row.EVENT_DURATION, self.time - begin),
+            (Row.EVENT_SLIP, self.place - load(Row.NOW_X)),
+            (Row.EVENT_STRESS_DROP, load(Row.NOW_STRESS) - self.stress),
+            (Row.EVENT_PEAK_VELOCITY, load(Row.NOW_PEAK)),
+        )
+        for row, value in found:
+            self._kept(row, complete, value)

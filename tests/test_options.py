@@ -7,6 +7,7 @@ import lab_records as lab
 import steadyslip as ss
 from fuzz_rigs import judged
 from rigs_of_theory import rig
+from steadyslip.core.options import checked, real_numbers
 
 VALUES = {
     "none": None, "text": "abc", "empty": "", "nan": float("nan"), "inf": float("inf"), "minus inf": -float("inf"),
@@ -88,3 +89,16 @@ def test_any_value_of_any_option(fitted):
                 where = next(v for v in call.__code__.co_names if v not in ("get",))
                 faults.append(f"{where}({name}={kind}): {fault.splitlines()[0][:150]}")
     assert not faults, "\n".join(faults)
+
+
+def test_a_default_given_by_name_is_allowed():
+    """`until=None` means what leaving it out means: the end of the protocol."""
+
+    @checked(until=real_numbers())
+    def end_of(until: float | None = None) -> float | None:
+        return until
+
+    assert end_of(until=None) is None
+    assert end_of(3.0) == 3.0
+    with pytest.raises(ss.ParameterError, match="until"):
+        end_of("soon")

@@ -97,7 +97,7 @@ BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000, or_none=True), whole(0,
 
 
 def checked(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Check options of a function before it is called.
+    """Check options of a function before it is called; what it has by default is allowed, given by name too.
 
     Raises
     ------
@@ -111,7 +111,8 @@ def checked(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
         @functools.wraps(function)
         def called(*args: P.args, **kwargs: P.kwargs) -> R:
             given = signature.bind(*args, **kwargs).arguments
-            found = [(name, given[name], rule(given[name])) for name, rule in rules.items() if name in given]
+            told = {n: v for n, v in given.items() if n in rules and v is not signature.parameters[n].default}
+            found = [(name, value, rules[name](value)) for name, value in told.items()]
             problems = [
                 Problem(name, f"got {came(value)}; allowed: {allowed}") for name, value, allowed in found if allowed
             ]

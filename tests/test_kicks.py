@@ -353,6 +353,7 @@ def test_all_kicks_of_a_threshold_share_their_steps(monkeypatch):
 def test_what_takes_too_long_is_undecided(monkeypatch):
     """An unstable rig whose cycle nobody may look for: nothing is said of it."""
     monkeypatch.setattr(outcomes_module, "_alike", lambda now, before: np.zeros(len(now), dtype=bool))
+    monkeypatch.setattr(outcomes_module, "LONG", np.inf)
     monkeypatch.setattr(outcomes_module, "MOST_TURNS", 20.0)
     monkeypatch.setattr(outcomes_module, "MOST_LOADING", 50.0)
     assert outcomes(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["undecided"]

@@ -15,7 +15,7 @@ from dimensionless import MU, A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
 from steadyslip.files.specifications import read_rig
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.continuation import Curve, Failure
+from steadyslip.nonlinear.continuation import Failure, Track
 from steadyslip.nonlinear.kicks.outcomes import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module
 from steadyslip.nonlinear.orbits.branch import SpecialCycle
@@ -55,7 +55,7 @@ def test_continuation_follows_a_circle_all_the_way_round():
     def circle(u):
         return np.array([u @ u - 1]), 2 * u[None]
 
-    curve = Curve(circle)
+    curve = Track(circle)
     start = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     angles = []
     for point in curve.follow(start, 0.05, 1e-6, 0.2):
@@ -70,7 +70,7 @@ def test_continuation_locates_a_fold():
     def parabola(u):
         return np.array([u[0] ** 2 + u[1] - 0.3]), np.array([[2 * u[0], 1.0]])
 
-    curve = Curve(parabola)
+    curve = Track(parabola)
     here = curve.start(np.array([-1.0, -0.7]), np.array([1.0, 1.0]) / np.sqrt(2))
     for ahead in curve.follow(here, 0.1, 1e-6, 0.3):
         if here.tangent[1] * ahead.tangent[1] < 0:
@@ -86,7 +86,7 @@ def test_continuation_says_when_it_cannot_go_on():
             raise Failure("a wall")
         return np.array([u[0] - u[1]]), np.array([[1.0, -1.0]])
 
-    curve = Curve(ends)
+    curve = Track(ends)
     start = curve.start(np.zeros(2), np.ones(2) / np.sqrt(2))
     with pytest.raises(Failure, match="a wall"):
         list(curve.follow(start, 0.1, 1e-4, 0.2))
@@ -101,7 +101,7 @@ def test_continuation_does_not_jump_to_another_curve():
         slope = np.pi * np.cos(np.pi * y)
         return np.array([np.sin(np.pi * y)]), np.array([[slope, -slope * bend]])
 
-    curve = Curve(two_lines)
+    curve = Track(two_lines)
     start = curve.start(np.array([-0.3, 0.0]), np.array([0.0, 1.0]))
     for point in curve.follow(start, 0.4, 1e-6, 0.4):
         assert point.u[0] == pytest.approx(0.3 * np.tanh(20 * (point.u[1] - 0.5)), abs=1e-9)

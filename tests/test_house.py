@@ -25,14 +25,7 @@ def test_a_class_has_its_name_to_itself():
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 owners[node.name].append(str(path))
     twice = {name for name, paths in owners.items() if len(paths) > 1}
-    assert twice == {
-        "Curve",
-        "Event",
-        "Program",
-        "Record",
-        "Runs",
-        "Setting",
-    }  # still to be told apart: kernels, nonlinear
+    assert twice <= {"Event", "Program", "Record", "Setting"}  # of kernels, beside public names and its own folder
 
 
 def module_of(path: Path) -> str:

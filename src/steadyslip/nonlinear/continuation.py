@@ -32,7 +32,7 @@ class Point:
     iterations: int
 
 
-class Curve:
+class Track:
     """A curve of solutions.
 
     Parameters

@@ -20,7 +20,7 @@ from steadyslip.motion import History, simulate
 from steadyslip.motion.jobs import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED, OUTCOMES, Budget, Runs, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED, OUTCOMES, Budget, Judged, outcomes_of
 from steadyslip.nonlinear.kicks.rest import rest_of
 from steadyslip.nonlinear.orbits.branch import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
@@ -131,7 +131,7 @@ def basin(
     count = width.size
     near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
     near.computed()
-    runs = Runs(
+    runs = Judged(
         replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every, budget=Budget(STEPS)
     )
     with progress_bar(count, progress, "starting points") as advanced:

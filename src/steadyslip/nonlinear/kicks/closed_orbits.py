@@ -15,7 +15,7 @@ import numpy as np
 
 from steadyslip.kernels.program import STATUSES
 from steadyslip.nonlinear.kicks.neighbourhood import rates_at
-from steadyslip.nonlinear.kicks.outcomes import Runs, advanced_runs, constant_inputs
+from steadyslip.nonlinear.kicks.outcomes import Judged, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.flow import Runs as ConstantInputs
 from steadyslip.nonlinear.orbits.verify import cycle_near
 
@@ -32,7 +32,7 @@ AWAY = 1e-3  # distance from steady sliding below which a closed orbit is not to
 DONE = STATUSES.index("done")
 
 
-def on_long_cycle(runs: Runs, one: int, state: Array) -> bool:
+def on_long_cycle(runs: Judged, one: int, state: Array) -> bool:
     """Whether one run, now at `state` (n,), is on an attracting cycle of several slip events, or turns."""
     which, rest = np.array([one]), runs.rest
     inputs = constant_inputs(np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which])
@@ -50,7 +50,7 @@ class _Turn:
     good: Array
 
 
-def attracted(runs: Runs, which: Array, states: Array, period: Array, threads: int | None = None) -> Array:
+def attracted(runs: Judged, which: Array, states: Array, period: Array, threads: int | None = None) -> Array:
     """Whether runs `which` (k,), now at `states` (k, n), are on an attracting closed orbit of about `period` (k,)."""
     rest = runs.rest.part(which)
     scale, n = rest.scales, states.shape[1]
@@ -100,7 +100,7 @@ def attracted(runs: Runs, which: Array, states: Array, period: Array, threads: i
     return found
 
 
-def _turned(runs: Runs, which: Array, states: Array, scale: Array, period: Array, threads: int | None) -> _Turn:
+def _turned(runs: Judged, which: Array, states: Array, scale: Array, period: Array, threads: int | None) -> _Turn:
     """One period from k states, and its derivative by central differences."""
     count, n = states.shape
     beside = BESIDE * np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)])  # (2n+1, n)

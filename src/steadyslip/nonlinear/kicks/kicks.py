@@ -18,7 +18,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import Budget, Runs, continuous_at, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import Budget, Judged, continuous_at, outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
 
 Array = np.ndarray
@@ -181,7 +181,7 @@ class Kicked:
         rest = self.rest_after(which, sizes)
         return np.asarray(rest.exists & (rest.stable | rest.neutral))
 
-    def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> Runs:
+    def runs(self, which: Array, sizes: Array, effort: float = 1.0) -> Judged:
         """Motions of rigs `which` (n,) after kicks of `sizes` (n,)."""
         jobs, amount = self._jobs(which), self.amount(sizes, which)
         if self.moves_rest:
@@ -197,13 +197,13 @@ class Kicked:
         if self.kick.name == "impulse":
             jobs = self._struck(jobs, amount / self.mass[which], which)
         jump = amount if self.kick.name == "displacement" else np.zeros(len(which))
-        return Runs(jobs, rest, near, jump, group, effort, self.budget)
+        return Judged(jobs, rest, near, jump, group, effort, self.budget)
 
     def outcomes(
         self, which: Array, sizes: Array, threads: int | None = None,
         advanced: Callable[[int], None] | None = None, effort: float = PATIENCE,
     ) -> Array:  # fmt: skip
-        """What comes of kicks: indices into `OUTCOMES`, (n,); see `Runs` for `effort`."""
+        """What comes of kicks: indices into `OUTCOMES`, (n,); see `Judged` for `effort`."""
         return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
 
     def _jobs(self, which: Array) -> Jobs:

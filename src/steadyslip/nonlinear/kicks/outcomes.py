@@ -49,7 +49,7 @@ class Budget:
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class Judged:
     """Motions under constant inputs, about to be run.
 
     Attributes
@@ -78,13 +78,13 @@ class Runs:
     effort: float = 1.0
     budget: Budget = field(default_factory=Budget)
 
-    def repeated(self, one: int, count: int) -> Runs:
+    def repeated(self, one: int, count: int) -> Judged:
         """So many motions of one rig, to be started anywhere."""
         which = np.full(count, one)
         rest, near = self.rest.part(which), self.near.part(which)
         nothing = np.zeros(count)
         jobs = replace(self.jobs, point=self.jobs.point.part(which), size=count)
-        return Runs(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
+        return Judged(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
 
     def times(self) -> tuple[Array, Array]:
         """Length of the first span, and the time after which a motion is undecided, s."""
@@ -125,7 +125,7 @@ class Spans:
 
 
 def advanced_runs(
-    runs: Runs, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None
+    runs: Judged, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None
 ) -> Spans:
     """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning."""
     jobs, rest = runs.jobs, runs.rest
@@ -171,7 +171,7 @@ def continuous_at(
 
 
 def outcomes_of(
-    runs: Runs, threads: int | None = None, advanced: Callable[[int], None] | None = None, start: Array | None = None
+    runs: Judged, threads: int | None = None, advanced: Callable[[int], None] | None = None, start: Array | None = None
 ) -> Array:
     """Run motions and say what comes of them: indices into `OUTCOMES`, (m,); from states `start` (m, n) if given.
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from steadyslip.kernels.program import STATUSES
 from steadyslip.nonlinear.kicks.neighbourhood import LARGEST, rates_at
-from steadyslip.nonlinear.kicks.outcomes import CERTAIN, OPEN, RETURNS, Runs, advanced_runs, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import CERTAIN, OPEN, RETURNS, Judged, advanced_runs, outcomes_of
 
 Array = np.ndarray
 DONE = STATUSES.index("done")
@@ -42,7 +42,7 @@ class Shells:
     threads : int, optional
     """
 
-    def __init__(self, runs: Runs, threads: int | None) -> None:
+    def __init__(self, runs: Judged, threads: int | None) -> None:
         self.runs, self.threads = runs, threads
         count = len(runs.rest.velocity)
         roots = runs.rest.roots

@@ -23,7 +23,7 @@ from steadyslip.linear.search import Search
 from steadyslip.linear.stiffness import characteristic
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.nonlinear.continuation import Curve, Failure, Point, turned_round
+from steadyslip.nonlinear.continuation import Failure, Point, Track, turned_round
 from steadyslip.nonlinear.onset.hopf import coefficients, kinds, parameter_along
 
 Array = np.ndarray
@@ -152,7 +152,7 @@ def hopf_curve(
     edge = min(edges, key=lambda e: abs(e.value - own))
     plane.reference = edge.angular_frequency
     guess = plane.coordinates(float(rig.parameters()[names[0]].value), edge.value, edge.angular_frequency)  # type: ignore[arg-type]
-    curve = Curve(plane.equations, tolerance=1e-12)
+    curve = Track(plane.equations, tolerance=1e-12)
     try:
         start = curve.start(guess, np.array([1.0, 0.0, 0.0]))
     except Failure:
@@ -250,7 +250,7 @@ class _Plane:
         return ""
 
 
-def _followed(curve: Curve, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
+def _followed(curve: Track, start: Point, plane: _Plane, spacing: float) -> tuple[list[Point], str]:
     """Points one way, and why they end; the last lies on the limit of a range to within rounding."""
     found: list[Point] = []
     here = start
@@ -271,7 +271,7 @@ def _followed(curve: Curve, start: Point, plane: _Plane, spacing: float) -> tupl
     raise AssertionError("unreachable")
 
 
-def _on_the_limit(curve: Curve, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
+def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) -> list[Point]:
     """The point where the curve leaves the range of a parameter."""
     values = [plane.parameters(p.u) for p in (inside, outside)]
     for i, (low, high) in enumerate(plane.limits):
@@ -287,7 +287,7 @@ def _on_the_limit(curve: Curve, inside: Point, outside: Point, plane: _Plane) ->
     return []
 
 
-def _described(rig: Slider, plane: _Plane, curve: Curve, points: list[Point], ends: tuple[str, str]) -> HopfCurve:
+def _described(rig: Slider, plane: _Plane, curve: Track, points: list[Point], ends: tuple[str, str]) -> HopfCurve:
     u = np.array([point.u for point in points])
     values = plane.values(u)
     first, second, omega = plane.parameters(u)

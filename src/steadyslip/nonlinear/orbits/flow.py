@@ -49,7 +49,7 @@ def _with_sensitivities(reduction: Reduction, method: str) -> Program:
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class FlowSetting:
     """A rig at one value of the free parameter, as kernels take it.
 
     Attributes
@@ -129,14 +129,14 @@ class Runs:
 
     # -- one rig
 
-    def setting(self, value: float) -> Setting:
+    def setting(self, value: float) -> FlowSetting:
         """The rig as it is: there is no parameter."""
         return self.own
 
     def _set(
         self, point: OperatingPoint, inputs: Array, value: float = 0.0, unit: float = 1.0,
         rates: tuple[Array, Mapping[sp.Symbol, Array]] | None = None,
-    ) -> Setting:  # fmt: skip
+    ) -> FlowSetting:  # fmt: skip
         """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
         constants = self.machine.constants(point)
         settings = self._settings_at(point, value)
@@ -145,7 +145,7 @@ class Runs:
         varied = np.concatenate([settings[0], ratio, scales])[None]
         found = self.sensitive.constants(point)
         varying = self.sensitive.kernel.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
-        return Setting(value, unit, point, inputs, (constants, settings), (varying, varied))
+        return FlowSetting(value, unit, point, inputs, (constants, settings), (varying, varied))
 
     def _settings_at(self, point: OperatingPoint, value: float) -> Array:
         """What kernels are told beside constants: sizes mostly, which hold in the neighbourhood of a parameter."""
@@ -158,7 +158,9 @@ class Runs:
 
     # -- runs
 
-    def run(self, setting: Setting, states: Array, times: Array, amplitude: float = 1.0) -> tuple[Array, Array, Array]:
+    def run(
+        self, setting: FlowSetting, states: Array, times: Array, amplitude: float = 1.0
+    ) -> tuple[Array, Array, Array]:
         """Runs from `states` (m, n) over `times` (m,).
 
         Returns
@@ -188,7 +190,7 @@ class Runs:
         finer[:, SETTINGS.index("watch")] = finer[:, SETTINGS.index("record")] = 0.0
         return finer
 
-    def _continuous(self, setting: Setting, states: Array) -> Array:
+    def _continuous(self, setting: FlowSetting, states: Array) -> Array:
         found = setting.point.evaluate(restored_of(self.reduction), *states.T, *setting.inputs, 0.0)
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
@@ -202,7 +204,7 @@ class Runs:
             raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
         return call.final[:, 4:]
 
-    def field(self, setting: Setting, states: Array) -> tuple[Array, Array, Array]:
+    def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:
         """Rates (m, n), their Jacobian (m, n, n) and their slopes in the parameter (m, n) at given states."""
         count, n = len(states), self.size
         full = np.hstack([states, self._unit(count)])
@@ -215,7 +217,7 @@ class Runs:
         return values[:, :n], matrix, values[:, n + n * n :]
 
     def watched(
-        self, setting: Setting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER
+        self, setting: FlowSetting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER
     ) -> Outcome:
         """One run with its events and steps, and samples at given times.
 
@@ -237,7 +239,7 @@ class Runs:
             raise FlowFailure(WORDS[int(outcome.status[0])])
         return outcome
 
-    def observed(self, setting: Setting, times: Array, states: Array) -> dict[str, Array]:
+    def observed(self, setting: FlowSetting, times: Array, states: Array) -> dict[str, Array]:
         """All observables at given states."""
         rows = _rows(setting.inputs, np.array([float(times[-1]) or 1.0]))[0]
         waves = np.zeros((1, 1, 3, 0))
@@ -268,11 +270,11 @@ class Flow(Runs):
         address = rig.parameters()[name]
         self.present = (name,) if address.role.structural else ()
         self.domain = address.role.domain
-        self._settings: dict[float, Setting] = {}
+        self._settings: dict[float, FlowSetting] = {}
         own = float(address.value)  # type: ignore[arg-type]
         super().__init__(prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch), rtol=rtol)
 
-    def setting(self, value: float) -> Setting:
+    def setting(self, value: float) -> FlowSetting:
         """The rig with the free parameter at a value.
 
         Raises
@@ -286,7 +288,7 @@ class Flow(Runs):
             self._settings[value] = self._made(value)
         return self._settings[value]
 
-    def _made(self, value: float) -> Setting:
+    def _made(self, value: float) -> FlowSetting:
         if not self.domain.contains(value):
             raise Failure(f"{self.name} leaves its domain")
         point = self._varied(np.array([value]))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.core.results import ReadOnly
-from steadyslip.nonlinear.continuation import Curve, Failure
+from steadyslip.nonlinear.continuation import Failure, Track
 from steadyslip.nonlinear.orbits.flow import Runs
 
 Array = np.ndarray
@@ -31,7 +31,7 @@ class Orbit(ReadOnly):
 
 
 class Shooting:
-    """The equations of a cycle for `continuation.Curve`.
+    """The equations of a cycle for `continuation.Track`.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ class Shooting:
         self.amplitude = 1.0
         self._last: tuple[bytes, Array, Array] | None = None
 
-    def curve(self) -> Curve:
+    def curve(self) -> Track:
         """The curve of these cycles, for continuation.
 
         Its lengths and angles count the first state, period and parameter only: further segments are the same cycle.
         """
         weights = np.ones(self.segments * self.flow.size + 2)
         weights[self.flow.size : -2] = 0.0
-        return Curve(self.equations, max(1e-9, 100 * self.flow.noise / self.amplitude), most_turn=0.8, weights=weights)
+        return Track(self.equations, max(1e-9, 100 * self.flow.noise / self.amplitude), most_turn=0.8, weights=weights)
 
     @property
     def segments(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
-from steadyslip.nonlinear.continuation import Curve, Failure, Point
+from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.branch import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
@@ -249,7 +249,7 @@ class Tracer:
             if finer is not None:
                 here = finer
 
-    def _curve(self, known: Known) -> Curve:
+    def _curve(self, known: Known) -> Track:
         curve = known.shooting.curve()
         curve.tolerance = max(curve.tolerance, min(1e-6, 0.01 * abs(known.cycle.trivial - 1)))
         return curve

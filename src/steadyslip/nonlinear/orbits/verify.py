@@ -16,7 +16,7 @@ import numpy as np
 from steadyslip.kernels.program import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.branch import Cycle
-from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, Setting
+from steadyslip.nonlinear.orbits.flow import FlowFailure, FlowSetting, Runs
 from steadyslip.nonlinear.orbits.measure import amplitude, measured
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
@@ -73,7 +73,7 @@ class _Stretch:
     amplitude: float
 
 
-def _stretches(runs: Runs, setting: Setting, state: Array, patience: int) -> Iterator[_Stretch]:
+def _stretches(runs: Runs, setting: FlowSetting, state: Array, patience: int) -> Iterator[_Stretch]:
     """The motion, some returns at a time."""
     span, spent = FIRST_SPAN * runs.time, 0
     for _ in range(patience):
@@ -100,7 +100,7 @@ def _stretches(runs: Runs, setting: Setting, state: Array, patience: int) -> Ite
         yield _Stretch(np.array(times), np.array(states), extent, amplitude(np.concatenate(speeds)))
 
 
-def _between(runs: Runs, setting: Setting, record: Array, at: Array) -> Array:
+def _between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
     """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
     time, states = record[:, 0], record[:, 2:]
     i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)

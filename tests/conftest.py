@@ -54,7 +54,10 @@ class _Measured:
         return done
 
     def pytest_sessionfinish(self):
-        SLOW.write_text("\n".join([*slow_ones(self.seconds), ""]), encoding="utf-8")
+        """Tests that did not run keep their line."""
+        ran = {name.partition("[")[0] for name in self.seconds}
+        others = [line for line in SLOW.read_text(encoding="utf-8").splitlines() if line.rsplit(" ", 1)[0] not in ran]
+        SLOW.write_text("\n".join([*sorted([*others, *slow_ones(self.seconds)]), ""]), encoding="utf-8")
 
     def pytest_terminal_summary(self, terminalreporter):
         terminalreporter.section(f"{sum(self.seconds.values()):.0f} CPU seconds, the largest")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.questions import Keeper, question
 from steadyslip.core.records import (
     Address,
     Condition,
@@ -25,7 +26,7 @@ from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
 
 
-class Slider(FrozenRecord, section="slider"):
+class Slider(FrozenRecord, Keeper, section="slider"):
     """A block pushed through a spring: m v̇ = T − τ(v, σ, memory) − ηv + q (theory 1).
 
     All stresses, stiffnesses, dampings and the mass are per unit nominal contact area; with area 1 the
@@ -73,7 +74,7 @@ class Slider(FrozenRecord, section="slider"):
 
     def parameters(self) -> dict[str, Address]:
         """Every parameter of the rig by dotted name: declaration and present value."""
-        return parameters(self)
+        return dict(_parameters(self))
 
     def resolve(self, name: str) -> str:
         """The full dotted name of a parameter.
@@ -120,3 +121,8 @@ class Slider(FrozenRecord, section="slider"):
         if problems:
             raise ParameterError(problems)
         return replaced(self, full)
+
+
+@question
+def _parameters(rig: Slider) -> dict[str, Address]:
+    return parameters(rig)

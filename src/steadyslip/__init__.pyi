@@ -18,6 +18,7 @@ from .core.records import (
     samples as samples,
 )
 from .experiments import (
+    CrossValidation as CrossValidation,
     Draws as Draws,
     Estimate as Estimate,
     Fit as Fit,
@@ -31,6 +32,7 @@ from .experiments import (
     bootstrap as bootstrap,
     compare as compare,
     compare_laws as compare_laws,
+    cross_validate as cross_validate,
     fit as fit,
     fit_files as fit_files,
     lab_rig as lab_rig,

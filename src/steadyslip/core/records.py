@@ -91,6 +91,9 @@ class Parameter:
         Its symbol in equations; its name unless given.
     standing : float or None
         Stands for the parameter where it is yet to be fitted.
+    idle : float or None
+        Value at which the parameter, with the others of its own member of a list, does nothing: without it the law is
+        a simpler one.
     """
 
     unit: str
@@ -103,6 +106,7 @@ class Parameter:
     size: float | None = None
     standing: float | None = None
     letter: str = ""
+    idle: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind and self.kind not in KINDS:
@@ -196,11 +200,12 @@ def parameter(
     adds_state: bool = False,
     kind: str = "",
     size: float | None = None,
+    idle: float | None = None,
     standing: float | None = None,
     letter: str = "",
 ) -> Any:
     """Declare a numeric parameter; ``default=None`` makes it optional, the rest is as in `Parameter`."""
-    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter)
+    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle)
     return field(default=default, metadata={_ROLE: role})
 
 

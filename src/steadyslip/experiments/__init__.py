@@ -4,6 +4,7 @@ from steadyslip.experiments.answers.laws import LawComparison, compare, compare_
 from steadyslip.experiments.answers.precision import Precision, best_protocol, precision
 from steadyslip.experiments.answers.predict import Prediction, predict
 from steadyslip.experiments.answers.uncertainty import Draws, Profile, bootstrap, normal_draws, posterior, profile
+from steadyslip.experiments.answers.validation import CrossValidation, cross_validate
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit, load_fit
@@ -12,6 +13,7 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.spec import Spec, fit_files, lab_rig, read_spec
 
 __all__ = [
+    "CrossValidation",
     "Draws",
     "Estimate",
     "Fit",
@@ -25,6 +27,7 @@ __all__ = [
     "bootstrap",
     "compare",
     "compare_laws",
+    "cross_validate",
     "fit",
     "fit_files",
     "lab_rig",

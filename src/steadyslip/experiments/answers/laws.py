@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.pictures import draw
-from steadyslip.experiments.fitting.fit import fit
+from steadyslip.experiments.answers.validation import cross_validate
+from steadyslip.experiments.fitting.fit import fit, started_from
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.machine.slider import Slider
 
@@ -27,11 +28,14 @@ class LawComparison:
         AIC and BIC, with the same number of independent samples for all.
     left_out : tuple of str
         Models that were not fitted before Ctrl-C.
+    predicted : dict of str to float
+        Root mean square error of predicting samples that were left out, see `cross_validate`; empty unless asked for.
     """
 
     fits: dict[str, Fit]
     criteria: dict[str, tuple[float, float]]
     left_out: tuple[str, ...] = ()
+    predicted: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def interrupted(self) -> bool:
@@ -52,13 +56,15 @@ class LawComparison:
 
     def __str__(self) -> str:
         wide = max(map(len, self.fits))
-        lines = [f"{'model':<{wide}}  parameters  sum of squares   AIC    BIC  weight"]
+        unseen = "  left out, predicted to" if self.predicted else ""
+        lines = [f"{'model':<{wide}}  parameters  sum of squares   AIC    BIC  weight{unseen}"]
         aic, bic = (min(pair[i] for pair in self.criteria.values()) for i in (0, 1))
         for label, one in self.fits.items():
             mine = self.criteria[label]
             lines.append(
                 f"{label:<{wide}}  {len(one.space):>10}  {one.ssq:>14.6g}  {mine[0] - aic:>4.1f}  "
                 f"{mine[1] - bic:>5.1f}  {self.weights[label]:>6.3f}"
+                + (f"  {self.predicted[label]:>22.4g}" if self.predicted else "")
             )
         if self.left_out:
             lines.append(f"stopped before these were fitted: {'; '.join(self.left_out)}")
@@ -128,10 +134,14 @@ def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, *
     try:
         for label, one in rigs.items():
             fits[label] = fit(one, records, **options)
+        fits = {label: started_from(own, [f for f in fits.values() if f is not own]) for label, own in fits.items()}
+        predicted = {label: cross_validate(own).rms for label, own in fits.items()}
     except KeyboardInterrupt:
         if len(fits) < 2:
             raise
-    return replace(compare(fits), left_out=tuple(label for label in rigs if label not in fits))
+        predicted = {}
+    left_out = tuple(label for label in rigs if label not in fits)
+    return replace(compare(fits), left_out=left_out, predicted=predicted)
 
 
 def with_law(rig: Slider, label: str) -> Slider:

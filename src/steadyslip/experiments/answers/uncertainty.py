@@ -170,7 +170,7 @@ def bootstrap(
         raise ParameterError([Problem("count", f"got {count!r}; allowed: a whole number >= 2")])
     generator = np.random.default_rng(seed)
     comparison = fit.plan.comparison(threads)
-    lengths = [_block(fit, i, kind, block) for i in range(len(comparison.parts))]
+    lengths = [block_length(fit, i, kind, block) for i in range(len(comparison.parts))]
     ends, converged, done = [], [], 0
 
     def refitted(many: int) -> Minima:
@@ -199,7 +199,8 @@ def bootstrap(
     return _draws(fit, "bootstrap", np.concatenate(ends), details, interrupted=done < count)
 
 
-def _block(fit: Fit, record: int, kind: str, block: int | None) -> int:
+def block_length(fit: Fit, record: int, kind: str = "block", block: int | None = None) -> int:
+    """Samples of a record to be taken together so that what lies further apart is independent."""
     noise = fit.noise[record]
     size = len(fit.part(fit.residuals, record))
     if kind == "residual" or (kind == "auto" and not noise.correlated):

@@ -12,6 +12,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import THREADS, checked
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
+from steadyslip.experiments.fitting.nested import from_simpler, simpler
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan
 from steadyslip.experiments.fitting.result import Fit
@@ -26,7 +27,8 @@ from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
-HOPE = 2.0  # times the best rough sum of squares: finalists beyond have no chance
+MOST = 300  # iterations on all samples
+BETTER = 1e-6  # reduction of the sum of squares, as a share, that makes another minimum of it
 ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
@@ -129,13 +131,36 @@ def fit(
     return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
 
 
+def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
+    """The fit, or a better one of the same model that the values of fits of other models lead to.
+
+    Parameters they have in common take the others' values, the rest keep their own.
+    """
+    plan, space = result.plan, result.space
+    own = np.array([result.values[name] for name in result.names])
+    begin = np.array([[other.values.get(name, value) for name, value in result.values.items()] for other in others])
+    begin = begin.reshape(-1, len(own))
+    if not len(begin):
+        return result
+    comparison = plan.comparison()
+    z = space.coordinates(np.clip(begin, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
+    ends = minimise(lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST).sorted()
+    if not ends.ssq[0] < result.ssq * (1 - BETTER):
+        return result
+    found = _ordered(ends.coordinates, space)[0]
+    errors = "correlated" if result.correlated else "independent"
+    search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
+    return finished(plan, comparison, found, search, errors, result.bounds)
+
+
 def _searched(
     plan: Plan, starts: int, threads: int | None, progress: Told | None
 ) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
     """The best minimum: from several starts on few samples, the best of those on all.
 
     A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
-    then more, as long as hardly any lead to the best minimum.
+    then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
+    from where these end.
     """
     space, whole = plan.space(), plan.comparison(threads)
     quick = replace(_thinned(plan), rtol=1e-5).comparison(threads)
@@ -170,6 +195,11 @@ def _searched(
                 "the model cannot follow these records from any start; are law and drive those of the experiment?"
             )
         found = _polished(whole, rough, low, high, told("refining", whole))
+    models = simpler(space, plan.rig.parameters())
+    if models:
+        begin = from_simpler(models, quick, whole, rough.sorted().coordinates, low, high, told("refining", whole))
+        ends = minimise(lambda z, _: whole.residuals(z), begin, low, high, most=MOST, told=told("refining", whole))
+        found = (found + ends).sorted()
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     worse = np.concatenate([found.ssq / found.ssq[0], rough.ssq[rough.converged] / np.min(rough.ssq)])
@@ -181,13 +211,12 @@ def _searched(
 
 def _polished(whole: Comparison, rough: Minima, low: Array, high: Array, told: Callable[[Minima], None]) -> Minima:
     """The best of rough minima brought to their end, the best first."""
-    chosen = _distinct(rough, FINALISTS)
-    found = minimise(lambda z, _: whole.residuals(z), rough.coordinates[chosen], low, high, most=300, race=1, told=told)
+    begin = rough.distinct(FINALISTS)
+    found = minimise(lambda z, _: whole.residuals(z), begin, low, high, most=MOST, race=1, told=told)
     begin = _released(whole.space, found.coordinates[int(np.argmin(found.ssq))], low, high)
     if len(begin):
-        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=300, told=told)
-    order = np.argsort(found.ssq, kind="stable")
-    return Minima(found.coordinates[order], found.ssq[order], found.converged[order], found.iterations[order])
+        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=MOST, told=told)
+    return found.sorted()
 
 
 def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
@@ -239,19 +268,6 @@ def _thinned(plan: Plan) -> Plan:
     thin = tuple(r.taken(k, "thinned") for r, k in zip(plan.records, rows, strict=True))
     weights = None if plan.weights is None else tuple(w[k] for w, k in zip(plan.weights, rows, strict=True))
     return replace(plan, records=thin, weights=weights)
-
-
-def _distinct(rough: Minima, most: int) -> Array:
-    """The best of many ends, each once; repeated best ones if there are few."""
-    order = [i for i in np.argsort(rough.ssq, kind="stable") if np.isfinite(rough.ssq[i])]
-    chosen: list[int] = []
-    for i in order:
-        near = [np.max(np.abs(rough.coordinates[i] - rough.coordinates[k])) < 0.02 for k in chosen]
-        if not any(near):
-            chosen.append(int(i))
-        if len(chosen) == most or rough.ssq[i] > HOPE * rough.ssq[order[0]]:
-            break
-    return np.array(chosen)
 
 
 def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:

@@ -17,6 +17,8 @@ Residuals = Callable[[Array, Array], tuple[Array, Array]]
 CONVERGED = 1e-10  # reduction of the sum of squares that is still to be had, as a share of it
 STALLED = 1e-7  # the same, where no step succeeds any more: below this the sum is at its rounding
 STEEPEST = 1e10  # of the damping
+HOPE = 2.0  # times the best sum of squares: rough minima beyond have no chance
+NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
@@ -47,6 +49,22 @@ class Minima:
             np.concatenate([self.converged, other.converged]),
             np.concatenate([self.iterations, other.iterations]),
         )
+
+    def sorted(self) -> Minima:
+        """The same, the best first."""
+        order = np.argsort(self.ssq, kind="stable")
+        return Minima(self.coordinates[order], self.ssq[order], self.converged[order], self.iterations[order])
+
+    def distinct(self, most: int) -> Array:
+        """Coordinates of the best, each place once, as far as there is hope for them."""
+        ranked = self.sorted()
+        chosen: list[Array] = []
+        for z, ssq in zip(ranked.coordinates, ranked.ssq, strict=True):
+            if not np.isfinite(ssq) or len(chosen) == most or ssq > HOPE * ranked.ssq[0]:
+                break
+            if not any(np.max(np.abs(z - other)) < NEAR for other in chosen):
+                chosen.append(z)
+        return np.array(chosen).reshape(-1, self.coordinates.shape[1])
 
 
 def minimise(

@@ -90,7 +90,7 @@ class Nagata(Aging, name="nagata"):
     The extra term is integrated exactly by the memory variable Ψ = bΘ + c_N τ/σ; `rate` is the aging part.
     """
 
-    c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N")
+    c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N", idle=0.0)
 
     def offset(self, sigma: Expression, tau: Expression) -> Expression:
         return self.c_nagata * tau / sigma

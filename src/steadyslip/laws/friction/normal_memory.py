@@ -98,7 +98,7 @@ class LinkerDieterich(NormalMemory, name="linker-dieterich"):
 
     alpha: float | None = parameter(
         "1", nonnegative, "evolutionary share of the response to normal stress, α", default=None,
-        kind="stress share", size=0.2, standing=0.3,
+        kind="stress share", size=0.2, standing=0.3, idle=0.0,
     )  # fmt: skip
     sigma_ref: float = parameter(
         "Pa", positive, "reference in ln(σ/σ_ref); shifts the memory variable only", default=1e6, gauge=True
@@ -134,7 +134,9 @@ class PrakashClifton(NormalMemory, name="prakash-clifton"):
     instantaneous response.
     """
 
-    direct_share: float = parameter("1", share, "instantaneous share g of the response", default=0.0, size=0.2)
+    direct_share: float = parameter(
+        "1", share, "instantaneous share g of the response", default=0.0, size=0.2, idle=1.0
+    )
     slip_distance: float | None = parameter(
         "m", positive, "slip distance d_σ of the lag; d_c unless given", default=None, kind="slip distance"
     )

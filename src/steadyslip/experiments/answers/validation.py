@@ -1,0 +1,100 @@
+"""How well does a fit predict samples that it has not seen?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.answers.uncertainty import block_length
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.numerics.least_squares import minimise
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation(ReadOnly):
+    """Predictions of samples that were left out.
+
+    Attributes
+    ----------
+    residuals : ndarray (n,)
+        Data less prediction, each sample predicted by the fit that did not see it; weighted as the fit is.
+    fold : ndarray of int (n,)
+        Which samples were left out together.
+    block : int
+        Samples that follow each other in a fold.
+    seen : float
+        Root mean square of the residuals of the fit itself, which has seen all.
+    """
+
+    residuals: Array = field(repr=False)
+    fold: Array = field(repr=False)
+    block: int
+    seen: float
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the prediction errors."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def by_fold(self) -> Array:
+        """The same for each fold."""
+        squares = np.bincount(self.fold, self.residuals**2) / np.bincount(self.fold)
+        return np.asarray(np.sqrt(squares))
+
+    def __str__(self) -> str:
+        return (
+            f"samples left out, {int(self.fold.max()) + 1} folds of blocks of {self.block}: predicted to "
+            f"{self.rms:.4g}, against {self.seen:.4g} where all were seen"
+        )
+
+
+def cross_validate(
+    fit: Fit, folds: int = 8, *, block: int | None = None, threads: int | None = None
+) -> CrossValidation:
+    """Fit anew without a part of the samples, predict these, and so with every part.
+
+    A part is every so-many-th block of all records. Blocks are longer than the noise lasts, so that a neighbour that
+    was seen does not tell what was not; and short enough that every step of the loading is seen from several sides.
+
+    Parameters
+    ----------
+    fit : Fit
+    folds : int
+        Parts.
+    block : int, optional
+        Samples in a block; three times as many as are worth one independent sample unless given.
+    threads : int, optional
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than two folds, or blocks so long that a fold is empty.
+    NotAvailable
+        If a fold cannot be fitted.
+    """
+    if not (isinstance(folds, int) and not isinstance(folds, bool) and 2 <= folds <= 100):
+        raise ParameterError([Problem("folds", f"got {folds!r}; allowed: a whole number from 2 to 100")])
+    most = fit.samples // folds
+    if block is not None and not (isinstance(block, int) and not isinstance(block, bool) and 1 <= block <= most):
+        raise ParameterError([Problem("block", f"got {block!r}; allowed: a whole number from 1 to {most}")])
+    comparison = fit.plan.comparison(threads)
+    length = block or min(max(block_length(fit, i) for i in range(len(comparison.parts))), most)
+    fold = np.arange(fit.samples) // length % folds
+    seen = (fold != np.arange(folds)[:, None]).astype(float)
+
+    def without(z: Array, lanes: Array) -> tuple[Array, Array]:
+        r, jacobian = comparison.residuals(z)
+        return r * seen[lanes], jacobian * seen[lanes][:, None, :]
+
+    found = minimise(without, np.tile(fit.coordinates, (folds, 1)), *fit.bounds)
+    if not np.all(np.isfinite(found.ssq)):
+        raise NotAvailable("the model cannot be fitted without some of the samples; are there enough of them?")
+    residuals = comparison.residuals(found.coordinates)[0]
+    own = residuals[fold, np.arange(fit.samples)]
+    return CrossValidation(own, fold, length, float(np.sqrt(fit.ssq / fit.samples)))

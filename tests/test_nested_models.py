@@ -1,0 +1,73 @@
+"""A richer model never fits worse than a simpler one that it contains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+from steadyslip.experiments.fitting.nested import simpler
+from steadyslip.experiments.fitting.plan import make_plan
+
+ALLOWED = 1 + 1e-7  # what a converged search may leave
+
+
+def made(protocol, seed=0, rig=None):
+    return lab.record(rig or lab.rig(), protocol, seed, count=400)
+
+
+def two():
+    rig = ss.lab_rig()
+    states = tuple(ss.State(b=b, d_c=d) for b, d in ((0.006, 1e-5), (0.004, 1e-4)))
+    law = ss.RateState(a=0.01, states=states, mu_ref=0.6, v_ref=1e-6, evolution=ss.Slip())
+    return ss.Slider(friction=law, contact=rig.contact, stiffness=1e10, drive=rig.drive)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_states_and_one(seed):
+    """A record of one state: the second is worth nothing, which a search from outside need not find."""
+    record = made(lab.STEP, seed)
+    assert ss.fit(two(), record, starts=8).ssq <= ss.fit(ss.lab_rig(), record).ssq * ALLOWED
+
+
+def test_alpha_and_none():
+    record = made(lab.PRESSED)
+    with_alpha = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), record)
+    assert with_alpha.ssq <= ss.fit(ss.lab_rig(), record).ssq * ALLOWED
+
+
+def test_orders_of_a_trend():
+    record = made(lab.HOLD, rig=lab.two_states())
+    found = [ss.fit(ss.lab_rig(), record, trend=order).ssq for order in range(3)]
+    assert found[1] <= found[0] * ALLOWED
+    assert found[2] <= found[1] * ALLOWED
+
+
+def test_fits_of_other_laws_are_tried_as_starts():
+    record = made(lab.STEP, 2, lab.two_states())
+    compared = ss.compare_laws(ss.lab_rig(), record, ("slip", "slip, two states"), starts=4)
+    assert compared.fits["slip, two states"].ssq <= compared.fits["slip"].ssq * ALLOWED
+
+
+def test_what_is_simpler_is_told_by_the_records():
+    """Every law says itself at which value a parameter does nothing; the general code knows no names."""
+    record = made(lab.STEP)
+
+    def held(rig, **options):
+        plan = make_plan(rig, record, **options)
+        names = [one.name for one in plan.space().unknowns]
+        return [{names[i] for i in np.flatnonzero(model.held)} for model in simpler(plan.space(), rig.parameters())]
+
+    assert held(ss.lab_rig()) == []
+    assert held(two()) == [{"friction.states.2.b", "friction.states.2.d_c"}]
+    assert held(ss.lab_rig(normal_memory="linker-dieterich")) == [{"friction.normal_memory.alpha"}]
+    assert held(ss.lab_rig(), trend=2, offset=True) == [{"offset"}, {"trend.2"}]
+
+
+@pytest.mark.slow
+def test_the_valley_that_catches_most_starts():
+    """Half a minute of basalt, two states: nearly all starts end in a degenerate valley at 1.8755e-3."""
+    spec = ss.read_spec("examples/fits/basalt.toml")
+    record = spec.read("examples/data/basalt_b819_velocity_step.txt").between(11650, 11700)
+    assert ss.fit(two(), record, trend=1).ssq == pytest.approx(1.85867e-3, rel=1e-4)

@@ -7,6 +7,7 @@ import os
 import time
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def test_whatever_is_written_is_a_unit_or_refused(text):
         return
     assert 0 < factor < math.inf
     assert all(math.isfinite(power) for power in dimension)
-    if not text.strip().startswith("1"):
+    if not text.replace("·", " ").strip().startswith("1"):  # a leading one is a number's, not a unit's
         assert unit(f"m/m*({text})") == (pytest.approx(factor), dimension)
 
 
@@ -243,7 +244,7 @@ def test_what_is_no_regular_file_of_bounded_size_is_refused_at_once(no_file, end
 
 def test_texts_of_too_many_or_too_long_lines_are_refused(tmp_path):
     path = tmp_path / "long.txt"
-    for text in ("1\n" * 2_100_000, "1 " * 200_000, "1\r" * 2_100_000):
+    for text in ("1\n" * 2_100_000 + "x\n", "1 " * 200_000, "1\r" * 2_100_000):
         path.write_text("time friction\n" + text)
         with pytest.raises(SteadyslipError, match="HDF5 or Parquet"):
             read_record(path)
@@ -390,13 +391,13 @@ def test_interrupted_thresholds_keep_those_found(monkeypatch, tmp_path):
     def threshold(rig, kick, **options):
         if kick == "displacement":
             raise KeyboardInterrupt
-        return f"threshold of {kick}"
+        return SimpleNamespace(kick=kick, interrupted=False)
 
     monkeypatch.setattr(commands, "threshold", threshold)
     path = tmp_path / "rig.toml"
     path.write_text(RIG)
     found = commands.thresholds_of_file(path, (), ("velocity", "displacement", "impulse"), False, "before")
-    assert found.found == ("threshold of velocity",)
+    assert [one.kick for one in found.found] == ["velocity"]
     assert found.interrupted
     with pytest.raises(KeyboardInterrupt):  # nothing to keep
         commands.thresholds_of_file(path, (), ("displacement",), False, "before")

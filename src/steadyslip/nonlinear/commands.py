@@ -88,7 +88,12 @@ def thresholds_shown(rig: Slider, kicks: Sequence[str], **options: Any) -> Thres
                 said(f"{which}: {tried} run, {bracket}; Ctrl-C keeps what there is")
 
             told(0, 0.0, math.inf)
-            found.append(threshold(rig, kick, **options, progress=told))
+            try:
+                found.append(threshold(rig, kick, **options, progress=told))
+            except KeyboardInterrupt:  # before this kick had an answer; those before it keep theirs
+                if not found:
+                    raise
+                return Thresholds(rig, tuple(found), True)
             if found[-1].interrupted:
                 break
     return Thresholds(rig, tuple(found), found[-1].interrupted)

@@ -18,8 +18,11 @@ MOST_DATASETS = 10_000
 def read(path: Path, table: str | None) -> Table:
     """Numeric datasets of a file, or below one of its groups."""
     with h5py.File(path, "r") as file:
-        part = chosen_part(path, "group", table, _groups(file)) if table not in file else table
-        return from_vectors(path, dict(_datasets(path, file if part is None else file[part])))
+        if table is None:
+            return from_vectors(path, dict(_datasets(path, file)))
+        if table not in file:
+            chosen_part(path, "group", table, _groups(file))
+        return from_vectors(path, dict(_datasets(path, file[table])))
 
 
 def _groups(file: Any) -> list[str]:

@@ -112,7 +112,10 @@ def _plain(path: Path, raw: bytes) -> Table | None:
     head, notes = _decoded(raw[: raw.rfind(b"\n", 0, LOOKED_AT) + 1])
     if not head or head.count("\n") != len(head.splitlines()):
         return None
-    layout = _layout(path, head)
+    try:
+        layout = _layout(path, head)
+    except NotAvailable:  # no numbers so far
+        return None
     first = layout.body[0][0]
     if layout.comma or layout.moments:
         return None

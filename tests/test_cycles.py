@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from dimensionless import MU, A, unit_rig
 from rigs_of_theory import CONTACTS, rate_state, rig
 from steadyslip.files.specifications import read_rig
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.continuation import Failure, Track
+from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.kicks.outcomes import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module
 from steadyslip.nonlinear.orbits.branch import SpecialCycle
@@ -23,7 +24,8 @@ from steadyslip.nonlinear.orbits.flow import Flow, Runs
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import _cuts
 from steadyslip.nonlinear.orbits.shooting import Shooting, multipliers
-from steadyslip.nonlinear.orbits.tracer import ENDS, Tracer, _winds
+from steadyslip.nonlinear.orbits.special import Known, changes
+from steadyslip.nonlinear.orbits.tracer import ENDS, STANDING, Tracer, _stands, _winds
 from steadyslip.nonlinear.orbits.verify import cycle_near
 from test_motion_oracle import LAWS
 
@@ -305,6 +307,37 @@ def test_windings_that_close_in_on_a_value_are_an_end(damped):
     assert not _winds(folds(closing, np.ones(8)))
     assert not _winds(folds(closing[:4], np.arange(1.0, 5.0)))
     assert not _winds(folds(1.0 + 0.1 * (-1.0) ** np.arange(8.0), np.arange(1.0, 9.0)))
+
+
+def test_parameter_that_stands_still_is_an_end(damped):
+    base = damped.cycles[0]
+
+    def along(values, periods):
+        return [replace(base, value=v, period=p) for v, p in zip(values, periods, strict=True)]
+
+    rounding = 1.0 + 1e-12 * (-1.0) ** np.arange(STANDING)
+    assert _stands(along(rounding, np.geomspace(1.0, 1.04, STANDING)))
+    assert not _stands(along(rounding, np.geomspace(1.0, 1.2, STANDING)))  # a canard that goes on
+    assert not _stands(along(1.0 + 1e-9 * np.arange(STANDING), np.ones(STANDING)))
+    assert not _stands(along(rounding[1:], np.ones(STANDING - 1)))
+
+
+def test_multipliers_are_not_read_where_the_parameter_stands_still(damped):
+    looked = []
+
+    def read(u):
+        looked.append(u)
+        raise Failure("enough")
+
+    def known(value, multiplier):
+        cycle = replace(damped.cycles[-1], value=value, multipliers=(multiplier, 0.01))
+        shooting = SimpleNamespace(flow=SimpleNamespace(size=3), multipliers=read)
+        return Known(Point(np.zeros(2), np.ones(2), 0.0, 1), shooting, cycle, np.zeros(2))
+
+    changes(known(1.0, -0.9), known(1.0 + 1e-13, -1.1), None, 1)
+    assert not looked
+    changes(known(1.0, -0.9), known(1.001, -1.1), None, 1)
+    assert looked
 
 
 def test_cycle_is_counted_once_round(damped):

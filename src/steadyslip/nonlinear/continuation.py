@@ -15,6 +15,8 @@ Array = np.ndarray
 Equations = Callable[[Array], tuple[Array, Array]]
 """u (n+1,) to residuals (n,) and their Jacobian (n, n+1). May raise `Failure`."""
 MOST_ITERATIONS = 10
+ASIDE = 10.0  # so many times farther than the end of Newton's method its way there may lead
+NEARLY = 1e-5  # size of a Newton step below which a larger one may follow once
 GROW, FASTER, SHRINK = 1.4, 2.0, 0.4
 
 
@@ -84,15 +86,16 @@ class Track:
             if not np.all(np.isfinite(step)):
                 raise Failure("not finite")
             u = u - step
-            if self.size(u - guess) > (2 * reach if iteration == 0 else reach):
-                raise Failure("the equations lead elsewhere")
             size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
-            if size <= self.tolerance or (size < 10 * self.tolerance and size > 0.3 * before):
+            converged = size <= self.tolerance or (size < 10 * self.tolerance and size > 0.3 * before)
+            if self.size(u - guess) > (reach if converged else ASIDE * reach):
+                raise Failure("the equations lead elsewhere")
+            if converged:
                 along = np.zeros(len(u))
                 along[-1] = 1.0
                 direction = np.linalg.solve(matrix, along)
                 return Point(u, direction / self.size(direction), length, iteration + 1)
-            if size > 2.0 * before and iteration > 2:
+            if size > 2.0 * max(before, NEARLY) and iteration > 2:
                 break
             before = size
         raise Failure("no convergence")

@@ -13,6 +13,7 @@ from steadyslip.nonlinear.orbits.shooting import Shooting
 
 Array = np.ndarray
 NOISE = 3e-9  # relative differences of the parameter that cannot be told from rounding near the onset
+ROUNDING = 1e-11  # such differences that are rounding anywhere
 SMALL = 1e-2  # amplitude below which multipliers within rounding of one are judged by the kind of onset
 
 
@@ -35,6 +36,9 @@ Made = Callable[[Shooting, Point], Known]
 def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCycle]:
     """Folds, doublings and tori between two neighbouring points with the same unknowns.
 
+    Where both have the same value of the parameter but for rounding, as in a canard, multipliers are rounding too; they
+    change by factors from one point to the next, and no doublings or tori are read from them.
+
     Parameters
     ----------
     made : callable
@@ -46,10 +50,11 @@ def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCy
     kinds: list[tuple[str, Callable[[Point], float]]] = []
     if before.point.tangent[-1] * now.point.tangent[-1] < 0:
         kinds.append(("fold", lambda point: float(point.tangent[-1])))
+    apart = abs(before.cycle.value - now.cycle.value) > ROUNDING * abs(now.cycle.value)
     flips, turns = [doubling(m) for m in pair], [torus(m) for m in pair]
-    if now.shooting.flow.size > 2 and flips[0] * flips[1] < 0:
+    if apart and now.shooting.flow.size > 2 and flips[0] * flips[1] < 0:
         kinds.append(("period doubling", lambda point: doubling(now.shooting.multipliers(point.u)[1])))
-    if min(turns) > -1 and turns[0] * turns[1] < 0:
+    if apart and min(turns) > -1 and turns[0] * turns[1] < 0:
         kinds.append(("torus", lambda point: torus(now.shooting.multipliers(point.u)[1])))
     found = (_located(kind, before, now, measure, made, index) for kind, measure in kinds)
     return [one for one in found if one is not None]

@@ -16,7 +16,7 @@ from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
-from steadyslip.nonlinear.orbits.special import SMALL, Known, changes
+from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes
 from steadyslip.nonlinear.orbits.verify import IMPRECISE
 
 Array = np.ndarray
@@ -24,8 +24,10 @@ LARGEST_STEP = 0.5
 SMALLEST_STEP = 1e-9
 WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
 CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
+STANDING = 12  # so many cycles within a twentieth of each other, at one value but for rounding, are no progress
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
 TOO_UNSTABLE = 1e8
+LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
 LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
 INTERRUPTED = "interrupted by the user"
 ENDS = {
@@ -42,6 +44,7 @@ ENDS = {
     "doubling": "back at a period doubling, where it joins the branch of half the period",
     "winds": "folds close in on one value of the parameter while the period grows (a connection of a steady state with "
     "itself, through ever longer spirals)",
+    "stands": "the parameter stands still in its last digits while the cycles hardly change, as in a canard",
     "runs away": "the period runs away while the parameter stands still (a connection to another steady state)",
 }
 
@@ -191,12 +194,14 @@ class Tracer:
                     self._add(sheet, here)
                 if not sheet.end and _winds(sheet.special):
                     sheet.end = ENDS["winds"]
+                if not sheet.end and _stands([known.cycle for known in sheet.known[-STANDING:]]):
+                    sheet.end = ENDS["stands"]
                 if sheet.end:
                     break
                 if len(sheet.known) >= self.most:
                     sheet.end = f"most_points = {self.most} reached"
                     break
-            lost = {ENDS["growth"], ENDS["runs away"], ENDS["winds"]}
+            lost = {ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
             lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}
             sheet.whole = sheet.end not in lost
         except KeyboardInterrupt:
@@ -216,9 +221,10 @@ class Tracer:
     def _points(self, here: Known, step: float) -> Iterator[tuple[Known, Known]]:
         """Each point with the one before it, in the same unknowns.
 
-        Cycles are cut into segments anew where they are too unstable, or cannot be followed any further.
+        Cycles are cut into segments anew where they are too unstable, where deviations grow and shrink again so much
+        within a segment that the trivial multiplier is lost, or where they cannot be followed any further.
         """
-        limit, again, idle = MOST_GROWTH, True, 0
+        limit, error, again, idle = MOST_GROWTH, LOST, True, 0
         while True:
             made: dict[int, Known] = {}
             curve = self._curve(here)
@@ -236,11 +242,13 @@ class Tracer:
                     before, here, step, again = here, made[0], taken, True
                     curve.tolerance = self._curve(here).tolerance
                     yield before, here
-                    if here.cycle.growth > limit**here.shooting.segments:
+                    unstable = here.cycle.growth > limit**here.shooting.segments
+                    lost = abs(here.cycle.trivial - 1) > error
+                    if unstable or lost:
                         finer = self._finer(here)
                         if finer is not None:
                             break
-                        limit *= 10.0
+                        limit, error = limit * (10.0 if unstable else 1.0), error * (10.0 if lost else 1.0)
             except Failure:
                 finer = self._finer(here) if again else None
                 if finer is None:
@@ -370,3 +378,12 @@ def _winds(special: list[SpecialCycle]) -> bool:
         return False
     apart = np.abs(np.diff([cycle.value for cycle in folds]))
     return bool(np.all(apart[1:] < 0.8 * apart[:-1]) and np.all(np.diff([cycle.period for cycle in folds]) > 0))
+
+
+def _stands(last: list[Cycle]) -> bool:
+    """Whether the parameter stands still but for rounding while cycles hardly change."""
+    if len(last) < STANDING:
+        return False
+    value = np.array([cycle.value for cycle in last])
+    looks = [(cycle.period, cycle.peak_velocity, min(cycle.amplitude, LARGE)) for cycle in last]
+    return bool(np.ptp(value) <= ROUNDING * np.abs(value).max() and np.ptp(np.log(looks), axis=0).max() < 0.05)

@@ -131,3 +131,18 @@ def test_a_rate_that_is_lost_in_rounding_is_said_to_be():
     assert found.stable is False
     assert "grows too slowly for a rate to be told from rounding" in str(found)
     assert "neither grows nor dies" not in str(found)
+
+
+def test_a_coefficient_of_either_sign_has_an_edge_at_zero():
+    """A little normal stress by acceleration makes this rig ill-posed with one sign and not with the other: B0 = 0."""
+    friction = ss.RateState(
+        a=0.02, b=0.03, d_c=1e-5, mu_ref=0.25, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.6)
+    )
+    contact = ss.Linear(steady_normal_stress=2.6e5, b0=1e11)
+    rig = ss.Slider(friction=friction, contact=contact, stiffness=1e10, radiation_damping=2e9, drive=ss.Steady(1e-6))
+    near = [ss.analyze(rig.with_values({"contact.b0": b0})).stable for b0 in (1e6, 0.0, -1e6)]
+    assert near == [False, True, True]
+    edges = ss.boundary(rig, "contact.b0")
+    assert 0.0 in [edge.value for edge in edges]
+    (zero,) = [edge for edge in edges if edge.value == 0.0]
+    assert (zero.kind, zero.stable) == ("ill-posed", "below")

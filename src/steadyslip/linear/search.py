@@ -153,8 +153,9 @@ class Search:
             known = (status[1:] != UNKNOWN) & (status[:-1] != UNKNOWN)
             at = np.flatnonzero((status[1:] != status[:-1]) & known)
             low, high = self._narrowed(grid[at], grid[at + 1], status[at])
-            inside = ~((low == 0) & (high < 1e-9 * np.abs(grid[at + 1])))  # zero itself is the end of the domain
-            low, high = low[inside], high[inside]
+            if self.role.domain.low == 0:  # then zero itself is the end of the domain, no edge
+                inside = ~((low == 0) & (high < 1e-9 * np.abs(grid[at + 1])))
+                low, high = low[inside], high[inside]
             return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
 
     def _with_hidden_windows(self, grid: Array) -> Array:

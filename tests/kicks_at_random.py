@@ -411,6 +411,9 @@ class Reference:
         return 1e-9 * np.array(size if self.p[1] else size[::2])
 
 
+SEEN_TO_DIE_OUT = 3.0  # decay times that a run must last to tell an oscillation from ringing, next to an edge
+
+
 def judged(away: np.ndarray) -> str:
     """What distances from steady sliding, evenly spread in time, say of the end."""
     away = np.where(np.isfinite(away), away, 700.0)
@@ -440,12 +443,18 @@ def simulated(case: Drawn, size: float | None = None, turns: float = 150.0) -> s
         initial = {"v": drive + amount / rig.mass}
     unit = 1.0 if reference.p[0] == LUGRE else D_C / V_REF
     end = (turns * reference.period + reference.reload) * unit
-    run = ss.simulate(rig, piece, until=end, initial=initial, times=np.linspace(0, end, 8001), rtol=1e-9, events=False,
-                      most_steps=3_000_000)  # fmt: skip
+    try:
+        run = ss.simulate(rig, piece, until=end, initial=initial, times=np.linspace(0, end, 8001), rtol=1e-9,
+                          events=False, most_steps=3_000_000)  # fmt: skip
+    except ss.NoSteadySliding:  # at the velocity that a step starts from
+        return "?"
     if run.status != "done":
         return run.status if run.status in ("blow-up", "contact lost") else "?"
     begin = int(len(run["v"]) * reference.reload * unit / end)
-    return judged(reference.from_load(run["v"][begin:] / load))
+    found = judged(reference.from_load(run["v"][begin:] / load))
+    decay = -kicked.rest_after(np.zeros(1, dtype=int), np.array([case.size])).leading[0].real
+    dies_out_too_slowly = 0 < decay * end < SEEN_TO_DIE_OUT
+    return "?" if found == "oscillation" and dies_out_too_slowly else found
 
 
 def outcome_of(case: Drawn, size: float | None = None) -> str:

@@ -213,7 +213,8 @@ def outcomes_of(
             closed = attracted(runs, open_[tried], state[open_[tried]], apart[tried], threads)
             found[open_[tried[closed]]] = OSCILLATION
         long = np.where(runs.rest.stable[going], LATE, LONG) * most[going]
-        waiting = going[(found[going] == OPEN) & ~neutral & (elapsed[going] > long)]
+        several = ~_alike(apart[running], between[going])  # slip events that follow each other in various times
+        waiting = going[(found[going] == OPEN) & ~neutral & several & (elapsed[going] > long)]
         found[[one for one in waiting if on_long_cycle(runs, one, state[one])]] = OSCILLATION
         between[open_] = apart
         late = (elapsed[open_] >= most[open_]) | (steps[open_] >= MOST_STEPS * runs.effort) | (runs.budget.steps <= 0)

@@ -123,7 +123,10 @@ def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None
     """The cycle next to the last of some returns, with so many returns in its period."""
     shooting = Shooting(runs, np.ones(1), False, abs(value) or 1.0)
     shooting.amplitude = min(1.0, seen.extent)
-    guess = shooting.packed(Orbit(seen.states[-1:], seen.times[-1] - seen.times[-1 - back], value))
+    period = seen.times[-1] - seen.times[-1 - back]
+    if not period > 0:  # returns within rounding of each other
+        return None
+    guess = shooting.packed(Orbit(seen.states[-1:], period, value))
     still = np.eye(len(guess))[-1]  # the parameter stays
     try:
         point = shooting.curve().corrected(guess, still, 0.0, NEAR * shooting.amplitude)

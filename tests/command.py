@@ -24,9 +24,7 @@ def run(*arguments: object, folder: Path | None = None, together: bool = False) 
     with contextlib.ExitStack() as stack:
         stack.enter_context(patch.object(sys, "argv", words))
         stack.enter_context(patch.dict(os.environ, {"COLUMNS": "80"}))
-        for family in families(FrozenRecord):
-            own = {name: law for name, law in family.registry.items() if law.__module__.startswith("steadyslip.")}
-            stack.enter_context(patch.object(family, "registry", own))
+        stack.enter_context(without_laws_of_tests())
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(err))
         if folder is not None:
@@ -37,6 +35,16 @@ def run(*arguments: object, folder: Path | None = None, together: bool = False) 
             status = stop.code
     texts = [stream.buffer.getvalue().decode("utf-8") for stream in (out, err)]
     return subprocess.CompletedProcess(words, status or 0, texts[0], "" if together else texts[1])
+
+
+@contextlib.contextmanager
+def without_laws_of_tests():
+    """Only the laws that come with the package are registered, whatever ran before."""
+    with contextlib.ExitStack() as stack:
+        for family in families(FrozenRecord):
+            own = {name: law for name, law in family.registry.items() if law.__module__.startswith("steadyslip.")}
+            stack.enter_context(patch.object(family, "registry", own))
+        yield
 
 
 def families(base: type[FrozenRecord]) -> list[type[FrozenRecord]]:

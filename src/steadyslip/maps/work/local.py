@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
@@ -62,7 +63,8 @@ def _flow(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
     ahead: set[Future[Done]] = set()
     while True:
         while len(ahead) < 2 * pool._max_workers and (number := next(waiting, None)) is not None:
-            ahead.add(pool.submit(do_chunk, job, number))
+            with _deaf_to_interrupts():
+                ahead.add(pool.submit(do_chunk, job, number))
         if not ahead:
             return
         finished, ahead = wait(ahead, return_when=FIRST_COMPLETED)
@@ -80,14 +82,35 @@ def _flow(pool: Any, job: Job, chunks: Sequence[int]) -> Iterator[Done]:
 def _workers(count: int) -> Iterator[Any]:
     """Processes that need no guard in the caller's script, and take functions typed at a prompt."""
     from loky import ProcessPoolExecutor
+    from loky.backend import resource_tracker as loky_tracker
 
-    pool = ProcessPoolExecutor(count, initializer=_prepared, initargs=(os.getpid(),))
+    if hasattr(signal, "pthread_sigmask"):
+        for tracker in (resource_tracker, loky_tracker):  # started later, they would let signals through again
+            tracker.ensure_running()
+    with _deaf_to_interrupts():
+        pool = ProcessPoolExecutor(count, initializer=_prepared, initargs=(os.getpid(),))
     try:
         yield pool
     except BaseException:
         pool.shutdown(wait=True, kill_workers=True)
         raise
     pool.shutdown(wait=True)
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Processes and threads that begin meanwhile never see Ctrl-C; this one sees it afterwards.
+
+    A worker that it ended while it was starting would leave the pool waiting for it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: `_prepared` alone
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepared(driver: int) -> None:

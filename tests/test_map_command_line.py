@@ -139,8 +139,9 @@ def test_ctrl_c_says_how_to_go_on(tmp_path):
     ]
     command = [sys.executable, "-m", "steadyslip", *words, "--workers", "2"]
     process = subprocess.Popen(
-        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
-    )
+        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # tests may run where Ctrl-C is ignored
+    )  # fmt: skip
     end = time.monotonic() + 60
     while time.monotonic() < end and not (store.exists() and ss.open_map(store).finished[0]):
         time.sleep(0.02)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -116,6 +117,9 @@ def _deaf_to_interrupts() -> Iterator[None]:
 def _prepared(driver: int) -> None:
     """Set up a worker. Ctrl-C is for the driver, which ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if "fork" in multiprocessing.get_all_start_methods():
+        # The lock of the compressor has then no name that a worker ended by force would leave behind.
+        multiprocessing.set_start_method("fork", force=True)
     keep_memory()
     threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
 

@@ -1,5 +1,6 @@
 """The compiled core: primitives, tableaus, convergence, the cache, and that machine code is what the text says."""
 
+import ast
 import ctypes
 import os
 import pickle
@@ -8,6 +9,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -17,7 +19,8 @@ from hypothesis import given, strategies as st
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.files.sealed import write_sealed
-from steadyslip.kernels import build, driver, primitives
+from steadyslip.kernels import build, primitives
+from steadyslip.kernels.driver.jobs import start_job
 from steadyslip.kernels.layout import Cursor, Out, Routines, Row, make_layout
 from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
@@ -129,7 +132,7 @@ def fixed_step(machine, jobs, until, steps):
     y = np.empty(layout.size + Out.COUNT + layout.events)
     arrays = (constants, start, settings, segments, np.empty(0))
     with np.errstate(all="ignore"):
-        driver.start_job(work, layout, routines, 0, cursor, np.zeros((0, 8)), arrays, y)
+        start_job(work, layout, routines, 0, cursor, np.zeros((0, 8)), arrays, y)
         work[Row.RTOL] = 1e30
         for _ in range(steps):
             work[Row.H] = until / steps
@@ -446,7 +449,7 @@ def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
             patch.setenv("NUMBA_OPT", "0")
             keys.append(key())
         real = build.files
-        for changed in ("driver.py", "layout.py", "jump.py"):
+        for changed in ("lanes.py", "balance.py", "layout.py", "jump.py"):
             with monkeypatch.context() as patch:
                 patch.setattr(build, "files", lambda package, changed=changed: _Changed(real(package), changed))
                 keys.append(key())
@@ -496,7 +499,8 @@ def test_cache_that_cannot_be_written(tmp_path, monkeypatch):
 def test_concurrent_writers(folder):
     """Several processes compile the same kernel at once; all are right, and one sound file remains."""
     script = "from test_compiled import ask; print(ask(11), ask(12))"
-    environment = os.environ | {"PYTHONPATH": os.path.dirname(__file__)}
+    paths = [os.path.dirname(__file__), os.environ.get("PYTHONPATH", "")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
     def process(_):
         done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
@@ -507,3 +511,18 @@ def test_concurrent_writers(folder):
     assert all(out == "11.0 12.0" for out, _ in results), results
     assert len(list(folder.iterdir())) == 4
     assert ask(11) == 11
+
+
+def test_functions_of_the_driver_can_stand_side_by_side():
+    """Compiled, those of all modules share one namespace; and nothing else of the package is needed there."""
+    import steadyslip.kernels.driver as folder
+
+    owners = {}
+    for path in sorted(Path(folder.__file__).parent.glob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.Assign):
+                name = node.name if isinstance(node, ast.FunctionDef) else node.targets[0].id
+                assert owners.setdefault(name, path.stem) == path.stem
+            elif isinstance(node, ast.ImportFrom):
+                assert node.module in ("__future__", "steadyslip.kernels.layout") or build._is_driver(node.module)
+    assert all(owners[name] == module.__name__.rpartition(".")[2] for name, (module, _) in build.ENTRIES.items())

@@ -34,23 +34,24 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
-from steadyslip.kernels import driver, lockstep_driver
+from steadyslip.kernels.driver import lanes, states, table
 from steadyslip.kernels.layout import Cursor, Event, Final, Kind, Layout, Out, Routines, Row, Setting, Status
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.printers import python
 
+DRIVER = "steadyslip.kernels.driver"
 _RIGS = "float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1]"
 ENTRIES: dict[str, tuple[ModuleType, str]] = {
     "advance": (
-        driver,
+        lanes,
         "int64(float64[::1], int64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], "
         "float64[:,:,::1], float64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,:,::1], "
         "float64[:,::1], float64[:,::1], int64)",
     ),
-    "observe": (driver, f"void({_RIGS})"),
-    "field": (driver, f"void({_RIGS})"),
+    "observe": (states, f"void({_RIGS})"),
+    "field": (states, f"void({_RIGS})"),
     "through_table": (
-        lockstep_driver,
+        table,
         "void(int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], int64[:,::1], "
         "float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
     ),
@@ -71,7 +72,7 @@ _loaded: dict[str, tuple[Any, dict[str, int]]] = {}
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """A model's routines and the drivers that call them, ready to run.
+    """A model's routines and the driver that calls them, ready to run.
 
     Attributes
     ----------
@@ -94,22 +95,22 @@ class Code:
 
     @cached_property
     def advance(self) -> Callable[..., int]:
-        """`steadyslip.kernels.driver.advance` of this model."""
+        """`steadyslip.kernels.driver.lanes.advance` of this model."""
         return self._bound("advance")
 
     @cached_property
     def observe(self) -> Callable[..., None]:
-        """`steadyslip.kernels.driver.observe` of this model."""
+        """`steadyslip.kernels.driver.states.observe` of this model."""
         return self._bound("observe")
 
     @cached_property
     def field(self) -> Callable[..., None]:
-        """`steadyslip.kernels.driver.field` of this model."""
+        """`steadyslip.kernels.driver.states.field` of this model."""
         return self._bound("field")
 
     @cached_property
     def through_table(self) -> Callable[..., None]:
-        """`steadyslip.kernels.lockstep_driver.through_table` of this model."""
+        """`steadyslip.kernels.driver.table.through_table` of this model."""
         return self._bound("through_table")
 
 
@@ -280,12 +281,27 @@ def compiled_driver(name: str) -> Callable[..., Any]:
 def driver_key(name: str) -> str:
     """The hash of everything that the machine code of an entry depends on."""
     module, signature = ENTRIES[name]
-    texts = [_text(part) for part in (module.__name__.rpartition(".")[2], "layout", "jump", "build")]
-    return _key("\n".join([name, signature, *texts]))
+    others = [_text(f"steadyslip.kernels.{part}") for part in ("layout", "jump", "build")]
+    return _key("\n".join([name, signature, *_texts(module.__name__, {}).values(), *others]))
 
 
 def _text(module: str) -> str:
-    return files("steadyslip.kernels").joinpath(f"{module}.py").read_text(encoding="utf-8")
+    package, _, name = module.rpartition(".")
+    return files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
+
+
+def _texts(module: str, found: dict[str, str]) -> dict[str, str]:
+    """The text of a driver's module, and of those that it needs before it."""
+    text = _text(module)
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ImportFrom) and _is_driver(node.module) and node.module not in found:
+            _texts(str(node.module), found)
+    found[module] = text
+    return found
+
+
+def _is_driver(module: str | None) -> bool:
+    return (module or "").startswith(f"{DRIVER}.")
 
 
 _ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Final, Out)}
@@ -293,7 +309,13 @@ _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 
 class _Numbered(ast.NodeTransformer):
-    """Names of places become their numbers, and `Layout` and `Routines` arrays, which numba compiles twice as fast."""
+    """Names of places become their numbers, and `Layout` and `Routines` arrays, which numba compiles twice as fast.
+
+    Imports from the driver's own modules go: these are put into one.
+    """
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.ImportFrom | None:
+        return None if _is_driver(node.module) else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         if not isinstance(node.value, ast.Name):
@@ -308,7 +330,7 @@ class _Numbered(ast.NodeTransformer):
 
 
 def _compiled_entry(name: str, source: ModuleType, signature: str, key: str) -> Callable[..., Any]:
-    """A module's functions anew, for numba, calling each other and, instead of routines, their addresses."""
+    """The functions of a module and of those it needs, for numba, calling addresses instead of routines."""
     import numba
     from numba.core.sigutils import normalize_signature
 
@@ -316,8 +338,9 @@ def _compiled_entry(name: str, source: ModuleType, signature: str, key: str) -> 
 
     module = ModuleType(f"steadyslip_driver_{key}")
     sys.modules[module.__name__] = module  # numba finds a cached function's globals by module name
-    tree = _Numbered().visit(ast.parse(_text(source.__name__.rpartition(".")[2])))
-    exec(compile(ast.fix_missing_locations(tree), str(source.__file__), "exec"), module.__dict__)
+    for part, text in _texts(source.__name__, {}).items():
+        tree = _Numbered().visit(ast.parse(text))
+        exec(compile(ast.fix_missing_locations(tree), f"<{part}>", "exec"), module.__dict__)
     for own, function in list(vars(module).items()):
         if isinstance(function, FunctionType) and function.__module__ == module.__name__:
             module.__dict__[own] = numba.njit(**OPTIONS["entry" if own in ENTRIES else "inner"])(function)

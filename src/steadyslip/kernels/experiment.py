@@ -52,7 +52,7 @@ class ExperimentProgram:
 
     @cached_property
     def through_table(self) -> Callable[..., None]:
-        """`steadyslip.kernels.lockstep_driver.through_table` of this model."""
+        """`steadyslip.kernels.driver.table.through_table` of this model."""
         return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
 
     @cached_property

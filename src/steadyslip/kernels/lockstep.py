@@ -68,7 +68,7 @@ class LockstepKernel(Kernel):
 
     @cached_property
     def programs(self) -> tuple[Program, ...]:
-        """What `steadyslip.kernels.lockstep_driver` calls."""
+        """What `steadyslip.kernels.driver.table` calls."""
         return self._step(), self._lanes_program("rates_lanes"), self._lanes_program("see_lanes")
 
     def _step(self) -> Program:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.kernels import driver
+from steadyslip.kernels.driver.segments import clock
 from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Row, Setting
 from steadyslip.kernels.program import STATUSES, TALLY, Program
 from steadyslip.motion.jobs import Jobs
@@ -66,7 +66,7 @@ class Call:
 
     def time(self) -> float:
         """Time that the job of the only lane has reached, s."""
-        return driver.clock(self.work, float(self.work[Row.TAU]))
+        return clock(self.work, float(self.work[Row.TAU]))
 
     def cut_off(self) -> None:
         """Where the job of the only lane is, as its end: it will not go on."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.kernels.experiment import LANES, experiment_program
+from steadyslip.kernels.layout import Setting
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.scales import natural_scales
@@ -191,17 +192,18 @@ class Forward:
         return seen
 
     def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
-        """rtol, guess of the unknown and its scale, limit of steps, absolute tolerances."""
+        """Rows of settings, absolute tolerances of state and sensitivities last."""
         reduction = self.program.reduction
         scales, unknown = natural_scales(values, reduction)
         size = len(reduction.names)
-        settings = np.empty((jobs, 4 + size * (1 + self.size)))
-        settings[:, 0] = self.rtol
-        settings[:, 1] = 0.0
-        settings[:, 2] = unknown
-        settings[:, 3] = MOST_STEPS * table.samples.shape[1] + 1000
+        settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
+        settings[:, Setting.RTOL] = self.rtol
+        settings[:, Setting.Z_SCALE] = unknown
+        settings[:, Setting.MOST_STEPS] = MOST_STEPS * table.samples.shape[1] + 1000
+        settings[:, Setting.FIRST_STEP] = np.inf
         for i, name in enumerate(reduction.names):
-            settings[:, 4 + i] = self.rtol * scales[name]
+            settings[:, Setting.ATOL + i] = self.rtol * scales[name]
             if self.size:
-                settings[:, 4 + size + i :: size] = (LOOSE * np.asarray(scales[name]) * np.ones(jobs))[:, None]
+                loose = LOOSE * np.asarray(scales[name]) * np.ones(jobs)
+                settings[:, Setting.ATOL + size + i :: size] = loose[:, None]
         return settings

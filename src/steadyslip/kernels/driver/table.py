@@ -1,4 +1,4 @@
-"""What `steadyslip.kernels.lockstep` kernels do between steps. The same code for every model; see `driver`.
+"""The loop of fits: all lanes go through one table of inputs together, with sensitivities (`kernels/lockstep.py`).
 
 A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs.
 """
@@ -9,47 +9,18 @@ import math
 
 import numpy as np
 
-from steadyslip.kernels.layout import INPUTS, MOST_FAILURES, Array, Layout, Routines, Row, call
-
-RTOL, GUESS, SCALE, MOST, ATOL = 0, 1, 2, 3, 4
-"""Columns of the settings: error per step, guess of the unknown and its scale, limit of steps, absolute tolerances."""
-
-
-def load(S: Array, layout: Layout, group: int, jobs: int, constants: Array, initial: Array, settings: Array) -> None:
-    """Put the next jobs into the lanes; lanes without one repeat the last."""
-    W = layout.lanes
-    for lane in range(W):
-        j = min(group + lane, jobs - 1)
-        c, i, s = min(j, constants.shape[0] - 1), min(j, initial.shape[0] - 1), min(j, settings.shape[0] - 1)
-        for k in range(layout.constants):
-            S[(layout.constant + k) * W + lane] = constants[c, k]
-        for k in range(layout.size):
-            S[(layout.state + k) * W + lane] = initial[i, k]
-            S[(layout.atol + k) * W + lane] = settings[s, ATOL + k]
-        S[Row.RTOL * W + lane] = settings[s, RTOL]
-        S[Row.Z * W + lane] = settings[s, GUESS]
-        S[Row.Z_SCALE * W + lane] = settings[s, SCALE]
-        S[Row.MOST * W + lane] = settings[s, MOST]
-        S[Row.H * W + lane] = 1e300
-        S[Row.FAILURES * W + lane] = 0.0
-        S[Row.ACCEPTED * W + lane] = 0.0
-        S[Row.REJECTED * W + lane] = 0.0
-        S[Row.ERROR * W + lane] = 0.0
-        S[Row.ACTIVE * W + lane] = 1.0
+from steadyslip.kernels.driver.jobs import exhausted, load_job
+from steadyslip.kernels.driver.segments import begin_segment
+from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, Status, call
 
 
-def enter(S: Array, layout: Layout, group: int, k: int, segments: Array, input_rates: Array, places: Array) -> None:
+def enter_row(S: Array, layout: Layout, group: int, k: int, segments: Array, input_rates: Array, places: Array) -> None:
     """Start row k of the table: new inputs, jump of the load point."""
     W = layout.lanes
     for lane in range(W):
         row = segments[min(group + lane, segments.shape[0] - 1), k]
-        S[Row.TAU * W + lane] = 0.0
-        S[Row.START * W + lane] = row[0]
-        S[Row.END * W + lane] = row[1] - row[0]
+        begin_segment(S, W, lane, row)
         S[(layout.state + layout.x) * W + lane] -= row[2]
-        for i in range(INPUTS):
-            S[(Row.INPUT + i) * W + lane] = row[3 + i]
-            S[(Row.SLOPE + i) * W + lane] = row[6 + i]
         if input_rates.shape[1] > 0:
             own = min(group + lane, input_rates.shape[0] - 1)
             for d in range(layout.directions):
@@ -82,9 +53,7 @@ def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
         waiting = 0
         for lane in range(W):
             if S[Row.TAU * W + lane] < S[Row.END * W + lane]:
-                steps = S[Row.ACCEPTED * W + lane] + S[Row.REJECTED * W + lane]
-                dead = S[Row.ACTIVE * W + lane] == 0.0 or S[Row.FAILURES * W + lane] >= MOST_FAILURES
-                if dead or steps >= S[Row.MOST * W + lane]:
+                if S[Row.ACTIVE * W + lane] == 0.0 or exhausted(S, W, lane) != Status.RUNNING:
                     S[Row.ACTIVE * W + lane] = 0.0
                     S[Row.TAU * W + lane] = S[Row.END * W + lane]
                 else:
@@ -94,7 +63,7 @@ def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
         call(routines.step, S, 0.0, y)
 
 
-def keep(
+def keep_seen(
     S: Array, layout: Layout, routines: Routines, group: int, k: int, samples: Array, seen: Array, y: Array
 ) -> None:  # fmt: skip
     """Write down what is observed in every lane that has a sample here."""
@@ -119,28 +88,28 @@ def through_table(
 ) -> None:  # fmt: skip
     """Take all jobs through the table.
 
-    One row per job, or one shared row: `constants`, `initial` (states), `settings` (rtol, guess, its scale, limit of
-    steps, absolute tolerances), `segments` (jobs, k, 9), `samples` (jobs, k + 1), the place in `seen` (jobs,
-    1 + directions, samples) of what is observed at the start of each row and at the end, -1 for none. `node_rates`
-    (jobs, directions, k) and `input_rates` (jobs, directions, k, 3) have no directions where none moves the table;
-    `places` says where among the constants the rates of the inputs belong.
+    One row per job, or one shared row: `constants`, `initial` (states), `settings`, `segments` (jobs, k, 9), `samples`
+    (jobs, k + 1), the place in `seen` (jobs, 1 + directions, samples) of what is observed at the start of each row and
+    at the end, -1 for none. `node_rates` (jobs, directions, k) and `input_rates` (jobs, directions, k, 3) have no
+    directions where none moves the table; `places` says where among the constants the rates of the inputs belong.
     """
     W = layout.lanes
     S, y = np.zeros(layout.rows * W), np.empty(2)
     rows = segments.shape[1]
     jobs = seen.shape[0]
     for group in range(0, jobs, W):
-        load(S, layout, group, jobs, constants, initial, settings)
+        for lane in range(W):  # lanes without a job repeat the last
+            load_job(S, layout, W, lane, min(group + lane, jobs - 1), layout.state, constants, initial, settings)
         for k in range(rows):
             for i in range(layout.own * W):
                 S[layout.before * W + i] = S[layout.rate * W + i]
-            enter(S, layout, group, k, segments, input_rates, places)
+            enter_row(S, layout, group, k, segments, input_rates, places)
             call(routines.rates_lanes, S, 0.0, y)
             if k > 0 and node_rates.shape[1] > 0 and move_nodes(S, layout, group, k, node_rates):
                 call(routines.rates_lanes, S, 0.0, y)
-            keep(S, layout, routines, group, k, samples, seen, y)
+            keep_seen(S, layout, routines, group, k, samples, seen, y)
             cross(S, layout, routines, y)
-        keep(S, layout, routines, group, rows, samples, seen, y)
+        keep_seen(S, layout, routines, group, rows, samples, seen, y)
         for lane in range(W):
             if group + lane < jobs:
                 steps[group + lane, 0] = S[Row.ACCEPTED * W + lane]

@@ -1,0 +1,196 @@
+"""Jobs: how one begins in a lane, goes on when its lane asks for attention, and ends."""
+
+from __future__ import annotations
+
+import math
+
+from steadyslip.kernels.driver.crossings import crossed, follow
+from steadyslip.kernels.driver.looking import look_now
+from steadyslip.kernels.driver.samples import await_sample, record, record_step, take_samples
+from steadyslip.kernels.driver.segments import clock, enter_segment
+from steadyslip.kernels.driver.slip import note
+from steadyslip.kernels.layout import (
+    MOST_FAILURES,
+    Array,
+    Cursor,
+    Event,
+    Final,
+    Kind,
+    Layout,
+    Routines,
+    Row,
+    Setting,
+    Status,
+)
+
+Arrays = tuple[Array, Array, Array, Array, Array]
+Results = tuple[Array, Array, Array, Array, Array, Array]
+
+
+def first_step(R: Array, layout: Layout) -> float:
+    """A cautious first step: a hundredth of the time in which the fastest variable changes by its scale."""
+    rtol = R[Row.RTOL]
+    fastest = 0.0
+    for i in range(layout.size):
+        scale = R[layout.atol + i] / rtol + abs(R[layout.state + i])
+        fastest = max(fastest, abs(R[layout.rate + i]) / scale)
+    most = R[Row.H]
+    return float(min(most, 0.01 * rtol**0.2 / fastest)) if fastest > 0.0 else float(most)
+
+
+def load_job(
+    S: Array, layout: Layout, lanes: int, lane: int, j: int, first: int, constants: Array, initial: Array,
+    settings: Array,
+) -> None:  # fmt: skip
+    """A job's numbers for one lane; those it starts with go where `first` says."""
+    for i in range(layout.rows):
+        S[i * lanes + lane] = 0.0
+    for i in range(layout.constants):
+        S[(layout.constant + i) * lanes + lane] = constants[j if constants.shape[0] > 1 else 0, i]
+    for i in range(initial.shape[1]):
+        S[(first + i) * lanes + lane] = initial[j if initial.shape[0] > 1 else 0, i]
+    own = settings[j if settings.shape[0] > 1 else 0]
+    S[Row.RTOL * lanes + lane] = own[Setting.RTOL]
+    S[Row.MOST * lanes + lane] = own[Setting.MOST_STEPS]
+    S[Row.V_HIGH * lanes + lane] = own[Setting.V_HIGH]
+    S[Row.V_LOW * lanes + lane] = own[Setting.V_LOW]
+    S[Row.SIGMA_LOW * lanes + lane] = own[Setting.SIGMA_LOW]
+    S[Row.WATCH * lanes + lane] = own[Setting.WATCH]
+    S[Row.RECORD * lanes + lane] = own[Setting.RECORD]
+    S[Row.Z * lanes + lane] = own[Setting.GUESS]
+    S[Row.Z_SCALE * lanes + lane] = own[Setting.Z_SCALE]
+    S[Row.V_DRIVE * lanes + lane] = own[Setting.V_DRIVE]
+    S[Row.H * lanes + lane] = own[Setting.FIRST_STEP]
+    for i in range(layout.size):
+        S[(layout.atol + i) * lanes + lane] = own[Setting.ATOL + i]
+    S[Row.ACTIVE * lanes + lane] = 1.0
+
+
+def exhausted(S: Array, lanes: int, lane: int) -> int:
+    """The status of a lane that may not go on: too many steps refused in a row, or taken at all; else RUNNING."""
+    if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
+        return Status.STUCK
+    if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST * lanes + lane]:
+        return Status.TOO_MANY_STEPS
+    return Status.RUNNING
+
+
+def start_job(
+    R: Array, layout: Layout, routines: Routines, j: int, cursor: Array, log: Array, arrays: Arrays, y: Array
+) -> bool:
+    """Load a job into a lane. False if there is no velocity to start with."""
+    constants, initial, settings, segments, times = arrays
+    load_job(R, layout, 1, 0, j, layout.continuous, constants, initial, settings)
+    if not enter_segment(R, layout, routines, j, 0, segments, y):
+        return False
+    await_sample(R, times)
+    R[Row.H] = first_step(R, layout)
+    v = R[Row.V]
+    R[Row.PEAK_VELOCITY] = v
+    R[Row.LOWEST_VELOCITY] = v
+    for i in (Row.EVENT_BEGIN, Row.EVENT_PEAK_VELOCITY, Row.RECURRENCE, Row.LAST_PEAK_TIME):  # there is none so far
+        R[i] = math.nan
+    R[Row.PEAK_PERIOD] = math.nan
+    R[Row.PEAK_GROWTH] = math.nan
+    R[Row.NOW_BEGIN] = math.nan
+    R[Row.LOG] = 1.0 if log.shape[0] > 0 else 0.0
+    R[Row.NOW_FROM] = math.inf
+    if R[Row.WATCH] > 0.0 and R[layout.mark + Event.SLIP] > 0.0:
+        look_now(R, layout, routines, 0.0, y)
+        note(R, layout, Kind.SLIP_BEGINS, 0.0, y, log, cursor)
+    return True
+
+
+def finish(R: Array, layout: Layout, row: int, status: int, results: Results) -> None:
+    """Write a job's results."""
+    statuses, final, tally = results[0], results[1], results[2]
+    statuses[row] = status
+    final[row, Final.TIME] = clock(R, R[Row.TAU])
+    final[row, Final.SEGMENT] = R[Row.SEGMENT]
+    final[row, Final.ACCEPTED] = R[Row.ACCEPTED]
+    final[row, Final.REJECTED] = R[Row.REJECTED]
+    for i in range(layout.size):
+        final[row, Final.STATE + i] = R[layout.state + i]
+    first = Row.PEAK_SIZE - Row.EVENTS
+    for i in range(first):
+        tally[row, i] = R[Row.EVENTS + i]
+    for i in range(2 * layout.events):
+        tally[row, first + i] = R[layout.counted + i]
+    R[Row.ACTIVE] = 0.0
+    R[Row.FLAG] = 0.0
+
+
+def go_on(
+    R: Array, layout: Layout, routines: Routines, j: int, cursor: Array, arrays: Arrays, results: Results, y: Array,
+    order: Array,
+) -> int:  # fmt: skip
+    """Look after a job that has raised its flag. Returns its status."""
+    j0 = cursor[Cursor.FIRST_JOB]
+    segments, times = arrays[3], arrays[4]
+    samples, log, recorded = results[3], results[4], results[5]
+    good = R[Row.GOOD] > 0.0
+    if layout.massless and layout.w >= 0:
+        R[Row.Z] = R[layout.state + layout.w]  # a guess for after the next jump
+    if layout.stages > 0 and good:
+        lost = R[Row.WATCH] > 0.0 and follow(R, layout, routines, cursor, log, y, order)
+        take_samples(R, layout, routines, j - j0, times, samples, False, y)
+        if R[Row.RECORD] > 0.0 and lost:
+            record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
+        elif R[Row.RECORD] > 0.0:
+            record_step(R, layout, routines, cursor, recorded, y)
+        if lost:
+            return Status.CONTACT_LOST
+    if abs(R[Row.V]) >= R[Row.V_HIGH]:
+        return Status.BLOW_UP
+    if R[Row.SIGMA] <= R[Row.SIGMA_LOW]:
+        return Status.CONTACT_LOST
+    status = exhausted(R, 1, 0)
+    if status != Status.RUNNING:
+        return status
+    while R[Row.TAU] >= R[Row.END]:
+        k = int(R[Row.SEGMENT]) + 1
+        s = j if segments.shape[0] > 1 else 0
+        if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
+            return Status.DONE
+        h, before, slipping = R[Row.H], R[Row.V], R[layout.mark + Event.SLIP]
+        if not enter_segment(R, layout, routines, j, k, segments, y):
+            return Status.NO_VELOCITY
+        await_sample(R, times)
+        R[Row.H] = h
+        if R[Row.RECORD] > 0.0:
+            record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
+        if R[Row.WATCH] > 0.0:
+            crossed(R, layout, routines, before, slipping > 0.0, cursor, log, y)
+    return Status.RUNNING
+
+
+def attend(
+    R: Array, layout: Layout, routines: Routines, lane: int, ids: Array, cursor: Array, arrays: Arrays,
+    results: Results, y: Array, order: Array,
+) -> None:  # fmt: skip
+    """Whatever a flagged lane needs: go on with its job, or finish it and take the next one."""
+    j = ids[lane]
+    if j >= 0:
+        status = go_on(R, layout, routines, j, cursor, arrays, results, y, order)
+        R[Row.FLAG] = 0.0
+        if status == Status.RUNNING:
+            return
+        if status != Status.NO_VELOCITY:  # there is no state after that jump
+            take_samples(R, layout, routines, j - cursor[Cursor.FIRST_JOB], arrays[4], results[3], True, y)
+        finish(R, layout, j - cursor[Cursor.FIRST_JOB], status, results)
+    while cursor[Cursor.NEXT_JOB] < cursor[Cursor.LAST_JOB]:
+        j = cursor[Cursor.NEXT_JOB]
+        cursor[Cursor.NEXT_JOB] = j + 1
+        ids[lane] = j
+        if start_job(R, layout, routines, j, cursor, results[4], arrays, y):
+            if R[Row.RECORD] > 0.0:
+                record(R, layout, R[Row.TAU], R, layout.state, cursor, results[5])
+            return
+        finish(R, layout, j - cursor[Cursor.FIRST_JOB], Status.NO_VELOCITY, results)
+    ids[lane] = -1
+    cursor[Cursor.BUSY] -= 1
+    for i in range(layout.rows):
+        R[i] = 0.0
+    R[Row.RTOL] = 1.0
+    R[Row.H] = 1e-3
+    R[Row.END] = 1e300

@@ -1,0 +1,70 @@
+"""The loop of single runs and ensembles: each lane has a job of its own and looks after its own breakpoints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steadyslip.kernels.driver.jobs import attend
+from steadyslip.kernels.driver.samples import BETWEEN
+from steadyslip.kernels.layout import Array, Cursor, Layout, Out, Routines, Row, Setting, call
+
+
+def flagged(S: Array, lanes: int) -> int:
+    """How many lanes need attention."""
+    count = 0
+    for lane in range(lanes):
+        count += 1 if S[Row.FLAG * lanes + lane] != 0.0 else 0
+    return count
+
+
+def advance(
+    layout: Layout, routines: Routines, S: Array, ids: Array, cursor: Array, constants: Array, initial: Array,
+    settings: Array, segments: Array, times: Array, statuses: Array, final: Array, tally: Array, samples: Array,
+    log: Array, recorded: Array, quota: int,
+) -> int:  # fmt: skip
+    """Advance all jobs of `cursor`.
+
+    Returns
+    -------
+    int
+        0 when they are done, 1 if a buffer is full, 2 if `quota` steps are taken.
+    """
+    arrays = (constants, initial, settings, segments, times)
+    results = (statuses, final, tally, samples, log, recorded)
+    lanes = layout.lanes
+    y, order = np.empty(layout.size + Out.COUNT + layout.events), np.empty((layout.events, 2))
+    R = S if lanes == 1 else np.zeros(layout.rows)
+    together = layout.watched > 0 and log.shape[0] == 0 and settings[0, Setting.WATCH] > 0.0
+    steps = 0
+    if cursor[Cursor.PAUSED] < 0:
+        for lane in range(lanes):
+            ids[lane] = -1
+            S[Row.FLAG * lanes + lane] = 1.0
+        cursor[Cursor.PAUSED] = 1
+    while cursor[Cursor.BUSY] > 0:
+        if cursor[Cursor.PAUSED] == 0:
+            call(routines.step, S, 0.0, y)
+            steps += 1
+        cursor[Cursor.PAUSED] = 0
+        attention = flagged(S, lanes)
+        if attention > 0 and together:
+            call(routines.watch_lanes, S, 0.0, y)
+            attention = flagged(S, lanes)
+        if attention > 0:
+            if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes > log.shape[0]) or (
+                recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + (4 + BETWEEN) * lanes > recorded.shape[0]
+            ):
+                cursor[Cursor.PAUSED] = 1
+                return 1
+            for lane in range(lanes):
+                if S[Row.FLAG * lanes + lane] != 0.0:
+                    if lanes > 1:
+                        for i in range(layout.rows):
+                            R[i] = S[i * lanes + lane]
+                    attend(R, layout, routines, lane, ids, cursor, arrays, results, y, order)
+                    if lanes > 1:
+                        for i in range(layout.rows):
+                            S[i * lanes + lane] = R[i]
+        if steps >= quota:
+            return 2
+    return 0

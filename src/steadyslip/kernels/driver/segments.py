@@ -1,0 +1,56 @@
+"""Segments of a protocol: the time within them, their inputs, and the jump at the start of each."""
+
+from __future__ import annotations
+
+import math
+
+from steadyslip.kernels.driver.balance import solve_balance
+from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, call
+
+
+def clock(R: Array, tau: float) -> float:
+    """Time since the start of the run, at tau into the segment: at its end that of the breakpoint, to the last bit."""
+    return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.END] else R[Row.STOP])
+
+
+def set_inputs(S: Array, lanes: int, lane: int, row: Array, first: int) -> None:
+    """Values and slopes of the inputs, for one lane, from where they begin in a row."""
+    for i in range(INPUTS):
+        S[(Row.INPUT + i) * lanes + lane] = row[first + i]
+        S[(Row.SLOPE + i) * lanes + lane] = row[first + INPUTS + i]
+
+
+def begin_segment(S: Array, lanes: int, lane: int, row: Array) -> None:
+    """Times and inputs of a segment, for one lane."""
+    S[Row.TAU * lanes + lane] = 0.0
+    S[Row.START * lanes + lane] = row[0]
+    S[Row.STOP * lanes + lane] = row[1]
+    S[Row.END * lanes + lane] = row[1] - row[0]
+    set_inputs(S, lanes, lane, row, 3)
+
+
+def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, segments: Array, y: Array) -> bool:
+    """Start segment k: jump of the load point, new inputs, velocity from the balance. False if there is none."""
+    s = j if segments.shape[0] > 1 else 0
+    if k > 0:
+        call(routines.restore, R, 0.0, y)
+    row = segments[s, k]
+    R[Row.SEGMENT] = k
+    begin_segment(R, 1, 0, row)
+    R[layout.continuous] -= row[2]
+    R[Row.LOAD_MOVED] += row[2]
+    waves = INPUTS * layout.harmonics
+    for i in range(waves):
+        R[layout.amplitude + i] = row[9 + i]
+        R[layout.omega + i] = row[9 + waves + i]
+        R[layout.phase + i] = row[9 + 2 * waves + i]
+    w = R[Row.Z]  # the velocity variable before the jump, as a guess
+    if layout.massless:
+        w = solve_balance(R, routines, w, y)
+        R[Row.Z] = w
+    call(routines.place, R, w, y)
+    call(routines.rates, R, 0.0, y)
+    good = math.isfinite(R[Row.V])
+    for i in range(layout.size):
+        good = good and math.isfinite(R[layout.rate + i])
+    return good

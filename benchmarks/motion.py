@@ -34,8 +34,8 @@ from problems import Problem, problems
 import steadyslip as ss
 from steadyslip.kernels.build import machine_code
 from steadyslip.kernels.jump import jump
-from steadyslip.kernels.kernel import Record
 from steadyslip.kernels.nodes import Program
+from steadyslip.kernels.record import Record
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.jobs import Options, prepare
 

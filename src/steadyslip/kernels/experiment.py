@@ -12,7 +12,7 @@ import sympy as sp
 
 from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted
-from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
 from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.reduction import Reduction, W, reduce_model

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import sympy as sp
 
-from steadyslip.kernels.kernel import Choice, Kernel
+from steadyslip.kernels.formulation import Choice, Formulation
 from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
 from steadyslip.kernels.record import Record
@@ -20,7 +20,7 @@ from steadyslip.kernels.step import Step
 from steadyslip.model.reduction import V_LP, P, Q, Reduction
 
 
-class LockstepKernel(Kernel):
+class LockstepKernel(Formulation):
     """Writes the programs of one such kernel.
 
     Parameters

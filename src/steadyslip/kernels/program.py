@@ -12,7 +12,8 @@ import numpy as np
 from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted
 from steadyslip.kernels.events import LOG_KINDS, TALLY
-from steadyslip.kernels.kernel import Choice, Kernel
+from steadyslip.kernels.formulation import Choice
+from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import SETTINGS, Status
 from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.reduction import Reduction, reduce_model

@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from steadyslip.kernels.events import EVENTS
+from steadyslip.kernels.formulation import CHANNELS, Formulation
 from steadyslip.kernels.layout import Row
 from steadyslip.kernels.nodes import Loop, Node, Program, Value, larger, primitive, select, smaller, weighted
 from steadyslip.kernels.source import Formulas
 from steadyslip.protocol.inputs import integral_to, level_at, slope_at
 
-if TYPE_CHECKING:
-    from steadyslip.kernels.kernel import Kernel
-
-CHANNELS = ("v", "q", "p")
 NEWTON_STEPS = 6
 Point = dict[str, Value]
 
@@ -82,7 +79,7 @@ class Moment:
 class Record:
     """What every evaluation within one program reads: constants, inputs, the unknown."""
 
-    def __init__(self, kernel: Kernel, program: Program) -> None:
+    def __init__(self, kernel: Formulation, program: Program) -> None:
         self.kernel, self.program = kernel, program
         layout, load = kernel.layout, program.load
         self.constants: Point = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}

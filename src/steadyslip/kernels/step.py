@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from steadyslip.kernels.events import COUNTED, EVENTS
+from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import MOST_FAILURES, Event, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, exp, larger, log, select, smaller, weighted
 from steadyslip.kernels.record import Point, Record, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
-
-if TYPE_CHECKING:
-    from steadyslip.kernels.kernel import Kernel
 
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
 # hardly any rejections, and an end error near rtol after tens of cycles
@@ -22,7 +19,7 @@ PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the saf
 class Step(Record):
     """Writes one step."""
 
-    def __init__(self, kernel: Kernel, name: str = "step") -> None:
+    def __init__(self, kernel: Formulation, name: str = "step") -> None:
         super().__init__(kernel, Program(name))
         load, layout, n = self.program.load, kernel.layout, kernel.size
         self.old = self.state()

@@ -8,15 +8,12 @@ several events within a step, slip that begins or ends while inputs change, a ro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import SLIP_EVENT, Event, Out, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, larger, log, select, smaller
 from steadyslip.kernels.record import Record, horner, slope_of
 from steadyslip.kernels.source import Formulas
-
-if TYPE_CHECKING:
-    from steadyslip.kernels.kernel import Kernel
 
 ROUNDS = 2  # of Halley's method, from the root of a straight line
 FOUND = 3e-4  # last change, as a share of the step, of a root that is found to the cube of that
@@ -25,7 +22,7 @@ FOUND = 3e-4  # last change, as a share of the step, of a root that is found to 
 class Watch(Record):
     """Writes it."""
 
-    def __init__(self, kernel: Kernel, speed: Formulas) -> None:
+    def __init__(self, kernel: Formulation, speed: Formulas) -> None:
         super().__init__(kernel, Program("watch_lanes"))
         self.speed = speed
         load, layout = self.program.load, kernel.layout

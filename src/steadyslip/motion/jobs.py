@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.questions import question
 from steadyslip.core.records import twin
-from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.program import Program, program

@@ -14,7 +14,7 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.questions import question
-from steadyslip.kernels.kernel import Choice
+from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.program import SETTINGS, Program, program
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point

@@ -1,0 +1,185 @@
+"""One reduced Model for one method, as formulas: what the programs of a kernel evaluate, and where it all lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from steadyslip.kernels.events import EVENTS
+from steadyslip.kernels.layout import Layout, make_layout
+from steadyslip.kernels.methods import METHODS, Method
+from steadyslip.kernels.rosenbrock import Pattern
+from steadyslip.kernels.source import Constants, Formulas
+from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction, W
+
+CHANNELS = ("v", "q", "p")
+LEVELS = ("constant", "linear", "harmonic")
+OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
+_SLOPE_NAMES = {s: f"slope_{c}" for s, c in zip(SLOPES[:3], CHANNELS, strict=True)}
+_INPUT_NAMES = {s: f"in_{c}" for s, c in zip(INPUTS[:3], CHANNELS, strict=True)} | {TIME: "time"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a kernel is compiled for, beside the equations.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    level : str
+        The most that the inputs do within a segment: ``constant``, ``linear`` or ``harmonic``.
+    harmonics : int
+        Harmonic terms per input (level ``harmonic``).
+    lanes : int
+        Trajectories side by side.
+    dense : bool
+        Whether stages are kept for dense output (events, samples).
+    """
+
+    method: str
+    level: str = "constant"
+    harmonics: int = 0
+    lanes: int = 1
+    dense: bool = True
+
+
+class Formulation:
+    """Formulas of the equations, and the layout of a record.
+
+    Attributes
+    ----------
+    layout : Layout
+    constants : Constants
+    size : int
+        Length of the state.
+    """
+
+    varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # the steady drive is a constant too
+
+    def __init__(self, reduction: Reduction, choice: Choice) -> None:
+        self.reduction, self.choice = reduction, choice
+        self.method: Method = METHODS[choice.method]()
+        self.size = self.counted = len(reduction.state)  # how many errors are averaged
+        self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | _INPUT_NAMES | _SLOPE_NAMES
+        variables = {*reduction.state, *reduction.continuous, *INPUTS, *SLOPES[:3], sp.Symbol("w", real=True)}
+        if reduction.unknown is not None:
+            self.names[reduction.unknown] = "z"
+            variables.add(reduction.unknown)
+        self.constants = Constants(variables)
+        self._rates = [self._fixed(rate) for rate in reduction.rates]
+        self.driven = self._answers_to_constants()
+        self.timed = choice.level != "constant" or any(rate.has(TIME) for rate in self._rates)
+        self._write()
+        self.layout = self._made_layout()
+
+    def _fixed(self, expression: sp.Expr) -> sp.Expr:
+        """Lifted; slopes vanish where inputs are constant."""
+        if self.choice.level == "constant":
+            expression = expression.xreplace(dict.fromkeys(SLOPES[:3], sp.Integer(0)))
+        return self.constants.lifted(expression)
+
+    def _answers_to_constants(self) -> dict[int, sp.Expr]:
+        """By position in the state: what a change of the constants adds to the rates of `Reduction.direction`."""
+        reduction = self.reduction
+        found = {
+            reduction.state.index(symbol): self._change(self._rates[i], direction)
+            for direction, symbols in enumerate(reduction.directions)
+            for i, symbol in enumerate(symbols)
+        }
+        self._rates = [rate + found.get(k, 0) for k, rate in enumerate(self._rates)]
+        return found
+
+    def _change(self, expression: sp.Expr, direction: int) -> sp.Expr:
+        """How fast an expression in constants and state changes with the constants, at a given state."""
+
+        def explicit(e: sp.Expr) -> sp.Expr:
+            known = [*self.constants.symbols.values(), *self.varied_inputs]
+            return sp.Add(*(sp.diff(e, c) * self.constants.rate_of(c, direction) for c in known if e.has(c)))
+
+        added = explicit(expression)
+        if self.reduction.residual is not None and self.reduction.unknown is not None:
+            residual, unknown = self._fixed(self.reduction.residual), self.reduction.unknown
+            added -= sp.diff(expression, unknown) * explicit(residual) / sp.diff(residual, unknown)
+        return added
+
+    def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
+        """An entry of the Jacobian, with what changing constants add."""
+        entry = self._fixed(matrix[i][k])
+        if i not in self.driven:
+            return entry
+        variable, unknown = self.reduction.state[k], self.reduction.unknown
+        entry += sp.diff(self.driven[i], variable)
+        if self.reduction.residual is not None and unknown is not None:
+            residual = self._fixed(self.reduction.residual)
+            entry -= sp.diff(self.driven[i], unknown) * sp.diff(residual, variable) / sp.diff(residual, unknown)
+        return entry
+
+    # -- the equations
+
+    def _formulas(self, expressions: Sequence[sp.Expr]) -> Formulas:
+        return Formulas(expressions, self.names)
+
+    def _write(self) -> None:
+        """All formulas; in this order their constants are numbered."""
+        reduction, n = self.reduction, self.size
+        outputs = [self._fixed(reduction.outputs[name]) for name in OUTPUTS]
+        self.residual: Formulas | None = None
+        if reduction.unknown is not None and reduction.residual is not None:
+            pair = (reduction.residual, sp.diff(reduction.residual, reduction.unknown))
+            self.residual = self._formulas([self._fixed(e) for e in pair])
+        self.rates = self._formulas(self._rates)
+        self.full = self._formulas(self._rates + outputs[:3])
+        self.outputs = self._formulas(outputs)
+        self.restored = self._formulas([self._fixed(e) for e in reduction.restored])
+        self.pattern: Pattern = set()
+        if self.method.implicit:
+            matrix = reduction.jacobian()
+            found = {(i, k): self._entry(matrix, i, k) for i in range(n) for k in range(n)}
+            self.pattern = {place for place, entry in found.items() if entry != 0}
+            entries = [found[place] for place in sorted(self.pattern)]
+            if self.timed:
+                entries += [self._fixed(e) for e in reduction.time_derivative()]
+            self.jacobian = self._formulas(entries)
+        self._write_velocity()
+        self.restart: Formulas | None = None
+        if reduction.restart is not None:
+            w = sp.Symbol("w", real=True)
+            known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | {w: "w"} | _INPUT_NAMES | _SLOPE_NAMES
+            pair = (reduction.restart, sp.diff(reduction.restart, w))
+            self.restart = Formulas([self._fixed(e) for e in pair], known)
+
+    def _write_velocity(self) -> None:
+        """Velocity as a function of w alone, and w of velocity, where w is integrated and memory is not needed."""
+        reduction, v = self.reduction, self.reduction.model.contact.velocity
+        speed, inverse = reduction.outputs["v"], reduction.w_of_v
+        variables = {*reduction.state, *reduction.continuous, *INPUTS}
+        if reduction.unknown is not None:
+            variables.add(reduction.unknown)
+        self.speed: Formulas | None = None
+        self.limit: Formulas | None = None
+        alone = speed.free_symbols & variables == {W} and not inverse.free_symbols & variables and W in reduction.state
+        if self.choice.dense and alone:
+            self.speed = self._formulas([self._fixed(speed)])
+            self.limit = Formulas([self._fixed(inverse.xreplace({v: W}))], {W: "v"})
+
+    def _made_layout(self) -> Layout:
+        reduction, choice = self.reduction, self.choice
+        massless = reduction.restart is not None
+        return make_layout(
+            lanes=choice.lanes,
+            size=self.size,
+            kept=len(reduction.continuous),
+            constants=len(self.constants.all),
+            harmonics=choice.harmonics,
+            stages=self.method.all_stages if choice.dense else 0,
+            extra=choice.dense and self.method.all_stages > self.method.stages,
+            massless=massless,
+            solved=massless and reduction.unknown is not None,
+            w=reduction.names.index("w") if "w" in reduction.names else -1,
+            x=reduction.names.index("x"),
+            events=len(EVENTS) if choice.dense else 0,
+            watched=choice.lanes > 1 and self.speed is not None and reduction.unknown is None,
+        )

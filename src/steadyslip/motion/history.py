@@ -16,7 +16,7 @@ from steadyslip.protocol import Protocol
 
 @dataclass(frozen=True, eq=False)
 class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
-    """What a rig does under a protocol: observables by name.
+    """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
 
     Attributes
     ----------

@@ -18,30 +18,8 @@ from steadyslip.motion.status import remedy
 
 
 @dataclass(frozen=True, eq=False)
-class History(HistoryData):
-    """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
-
-    Attributes
-    ----------
-    rig : Slider
-    protocol : Protocol
-        With its end.
-    data : dict of str to ndarray
-        Time ``t`` (s) and every observable, SI units. Where a jump happens, its time occurs twice if the
-        solver's own steps are kept.
-    units : dict of str to str
-    events : tuple of Event
-        In the order of time.
-    status : str
-        ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
-        ``out of range`` (of floating point: the samples end before) or ``interrupted``.
-    end : float
-        Time reached, s: of the blow-up, of the loss of contact, or the end of the protocol.
-    method : str
-        Integration method used.
-    rtol : float
-    steps, rejected : int
-    """
+class History(HistoryData):  # noqa: D101 -- its base has it
+    __doc__ = HistoryData.__doc__
 
     @property
     def interrupted(self) -> bool:

@@ -35,53 +35,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Analysis(Findings):
-    """Verdict on one rig; printing it gives the verdict in words.
-
-    Attributes
-    ----------
-    rig : Slider
-    stable : bool or None
-        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
-    reason : str
-        Why, in one sentence.
-    steady : SteadySliding or None
-    critical_stiffness : float or None
-        Edge of the stable set nearest to the rig's own stiffness (Pa/m along the sliding direction).
-    critical_side : str or None
-        ``above`` or ``below``: where, next to that edge, sliding is stable.
-    critical_angular_frequency : float or None
-        Of the oscillation at the critical stiffness (rad/s), 0 if it does not oscillate.
-    critical_axial_stiffness : float or None
-        The same edge as stiffness along the axis of spring, rod or press, where the rig gives one (Pa/m).
-    stable_stiffness : tuple of (float, float)
-        All stable stiffnesses k > 0 as open intervals (Pa/m); the upper end may be inf.
-    eigenvalues : tuple of complex
-        1/s, by falling real part.
-    characteristic_polynomial : tuple of float
-        Coefficients, lowest power first (theory 3: a0, a1, ...).
-    routh : tuple of float
-        First column of the Routh array; stable if all are positive.
-    growth_rate : float or None
-        Largest real part (1/s), inf if ill-posed.
-    period : float or None
-        Of the least damped oscillation (s).
-    damping_ratio : float or None
-        Of that oscillation; negative if it grows.
-    time_to_halve, time_to_double : float or None
-        Of the slowest decay, or of the fastest growth (s).
-    on_edge : bool
-        Whether the rig is on the edge of stability to within rounding: then neither verdict should be relied on.
-    onset : Onset or None
-        Kind of onset at the oscillatory edge in stiffness nearest to the rig, None where there is none.
-    kicks : tuple of Threshold
-        Smallest kicks that are not survived, where asked for.
-    margins : tuple of Margin
-        Distance of each parameter to its nearest edge, the most critical first.
-    branch : int
-        Which steady sliding is judged.
-    warnings : tuple of str
-    """
+class Analysis(Findings):  # noqa: D101 -- its base has it
+    __doc__ = Findings.__doc__
 
     def formula(self) -> sp.Eq:
         """Critical stiffness of this kind of rig as a SymPy equation; see `steadyslip.formula`."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Findings:
-    """What was found about one rig.
+    """Verdict on one rig; printing it gives the verdict in words.
 
     Attributes
     ----------

@@ -13,28 +13,8 @@ from steadyslip.experiments.fitting.words import as_dict, words
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit(FitNumbers):
-    """A rig fitted to records.
-
-    Attributes
-    ----------
-    plan : Plan
-        What was compared.
-    coordinates : ndarray (p,)
-        Where the sum of squares is least, in the coordinates of ``plan.space()``.
-    ssq : float
-        Sum of squared residuals (weighted, or as the loss has them).
-    search : SearchStory
-    noise : tuple of Noise
-        Of the residuals of every record.
-    covariance : ndarray (p, p)
-        Of the coordinates; infinite where a parameter is not determined.
-    unidentified : tuple of Combination
-        What the records cannot tell.
-    bounds : tuple of two ndarray (p,)
-        Where the coordinates were searched.
-    version : str
-    """
+class Fit(FitNumbers):  # noqa: D101 -- its base has it
+    __doc__ = FitNumbers.__doc__
 
     def __str__(self) -> str:
         return words(self)

@@ -12,7 +12,7 @@ from scipy.special import lambertw
 import steadyslip as ss
 from dimensionless import MU, A, phi_of, unit_rig, y_of
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.core.records import positive, real
+from steadyslip.core.roles import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single

@@ -7,7 +7,7 @@ import lab_records as lab
 import steadyslip as ss
 from fuzz_rigs import judged
 from rigs_of_theory import rig
-from steadyslip.core.options import checked, real_numbers
+from steadyslip.core.options import Numbers, checked
 
 VALUES = {
     "none": None, "text": "abc", "empty": "", "nan": float("nan"), "inf": float("inf"), "minus inf": -float("inf"),
@@ -94,7 +94,7 @@ def test_any_value_of_any_option(fitted):
 def test_a_default_given_by_name_is_allowed():
     """`until=None` means what leaving it out means: the end of the protocol."""
 
-    @checked(until=real_numbers())
+    @checked(until=Numbers())
     def end_of(until: float | None = None) -> float | None:
         return until
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from file_schema import file_schema
-from steadyslip.core.records import Option, Parameter, Role
+from steadyslip.core.roles import Option, Parameter, Role
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import own_fields, sections
 from steadyslip.files.specifications.lines import key_lines, line_of

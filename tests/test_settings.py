@@ -9,8 +9,8 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from file_schema import file_schema
-from steadyslip.core.records import Named, Option, Parameter, Part, Settings, is_required, role_of
-from steadyslip.core.settings import Label, Names, Quantity, Span, Text, Whole
+from steadyslip.core.records import Named, Part, Settings, is_required, role_of
+from steadyslip.core.roles import Label, Names, Option, Parameter, Quantity, Span, Text, Whole
 from steadyslip.experiments.fitting.settings import FitSettings
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.settings import RecordSettings
@@ -95,7 +95,7 @@ def plain(value):
 FAULTS = {
     "fit": {
         "trend = 9": "allowed: a whole number from 0 to 6",
-        "trend = true": "allowed: a whole number >= 0",
+        "trend = true": "allowed: a whole number from 0 to 6",
         "loss = 'soft'": "did you mean 'soft-l1'?",
         "drive = 'protocol'": "allowed: commanded, smoothed, measured",
         "width = 0": "allowed: a finite number above 0",

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import steadyslip as ss
-from steadyslip.core.records import positive
+from steadyslip.core.roles import positive
 
 LOW, HIGH = 5e6, 15e6
 

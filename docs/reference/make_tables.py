@@ -11,8 +11,8 @@ from pathlib import Path
 import steadyslip
 from steadyslip import figures
 from steadyslip.core.quantities import is_per_area, total_unit
-from steadyslip.core.records import FrozenRecord, Named, Option, Parameter, Part, Series, Settings, key_of
-from steadyslip.core.settings import Setting
+from steadyslip.core.records import FrozenRecord, Named, Part, Settings, key_of
+from steadyslip.core.roles import Option, Parameter, Series, Value
 from steadyslip.experiments.spec import TABLES as FIT_TABLES
 from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
@@ -73,9 +73,7 @@ def unit_of(role, totals: bool) -> str:
 
 
 def row(item, role, totals: bool) -> str:
-    if isinstance(role, Setting):
-        unit, allowed = getattr(role, "unit", ""), role.allowed()
-    elif isinstance(role, Named):
+    if isinstance(role, Named):
         unit, allowed = "", "table of names"
     elif isinstance(role, Part) and not has_choice(role.family) and not role.many:
         short = role.family.short
@@ -86,6 +84,8 @@ def row(item, role, totals: bool) -> str:
         unit, allowed = unit_of(role, totals), "list of finite numbers"
     elif isinstance(role, Option):
         unit, allowed = "", ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)
+    elif isinstance(role, Value):
+        unit, allowed = getattr(role, "unit", ""), role.allowed()
     else:
         words = ", ".join(f"`{name}`" for name in role.family.registry)
         unit, allowed = "", "list of tables" if role.many else f"one of {words}"

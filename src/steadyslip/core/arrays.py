@@ -10,7 +10,8 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, QuantityError
 from steadyslip.core.quantities import parse
-from steadyslip.core.records import FrozenRecord, Parameter, conditions, twin
+from steadyslip.core.records import FrozenRecord, conditions, twin
+from steadyslip.core.roles import Parameter
 
 
 def checked_array(name: str, role: Parameter, value: Any) -> Any:

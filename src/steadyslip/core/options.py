@@ -1,4 +1,4 @@
-"""Options of public functions, checked in one place: a rule says what is allowed, the message also what came."""
+"""Options of public functions: what each may hold is a role, as of the fields of records; checked before the call."""
 
 from __future__ import annotations
 
@@ -6,97 +6,91 @@ import functools
 import inspect
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, came
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.roles import Names, Option, Role, Text, Whole
 
 LARGEST = 1.7e308  # integers may be larger than any float
 P = ParamSpec("P")
 R = TypeVar("R")
-Rule = Callable[[Any], str]
-"""What is allowed, where a value is not; else nothing."""
 
 
-def whole(least: int, most: int = 2**31, or_none: bool = False) -> Rule:
-    """Whole numbers from `least` to `most`; truth values are none."""
+@dataclass(frozen=True)
+class Number(Role):
+    """A finite number above one and up to another."""
 
-    def rule(value: Any) -> str:
-        if or_none and value is None:
-            return ""
-        if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and least <= value <= most:
-            return ""
-        return f"a whole number from {least} to {most}" + (", or None" if or_none else "")
+    above: float
+    most: float = math.inf
 
-    return rule
-
-
-def real_number(above: float, most: float = math.inf, or_none: bool = False) -> Rule:
-    """Finite numbers above `above`, up to `most`."""
-
-    def rule(value: Any) -> str:
-        if or_none and value is None:
-            return ""
+    def checked(self, value: Any) -> Any:
         plain = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        if plain and above < value <= most and value <= LARGEST:
-            return ""
-        upto = f", up to {most:g}" if math.isfinite(most) else ""
-        return f"a finite number above {above:g}{upto}" + (", or None" if or_none else "")
+        if plain and self.above < value <= self.most and value <= LARGEST:
+            return value
+        raise self.refused(value)
 
-    return rule
+    def allowed(self) -> str:
+        return f"a finite number above {self.above:g}" + (f", up to {self.most:g}" if math.isfinite(self.most) else "")
 
 
-def real_numbers(or_none: bool = False, most: float = 1e150) -> Rule:
-    """Numbers or arrays of them, of any size but none, up to `most` in size, so that their squares are finite."""
+@dataclass(frozen=True)
+class Numbers(Role):
+    """Numbers or arrays of them, at least one, up to `most` in size, so that their squares are finite."""
 
-    def rule(value: Any) -> str:
+    most: float = 1e150
+
+    def checked(self, value: Any) -> Any:
         try:
             found = np.asarray(value)
-            good = found.dtype.kind in "iuf" and found.size > 0 and bool(np.all(np.abs(found) <= most))
+            good = found.dtype.kind in "iuf" and found.size > 0 and bool(np.all(np.abs(found) <= self.most))
         except (TypeError, ValueError, OverflowError):
             good = False
-        return (
-            ""
-            if good or (or_none and value is None)
-            else f"numbers, up to {most:g} in size" + (", or None" if or_none else "")
-        )
+        if not good:
+            raise self.refused(value)
+        return value
 
-    return rule
-
-
-def low_and_high(value: Any) -> str:
-    """Two values, low and high, or None."""
-    if value is None or (isinstance(value, (tuple, list, np.ndarray)) and len(value) == 2):
-        return ""
-    return "two values, low and high, or None"
+    def allowed(self) -> str:
+        return f"numbers, up to {self.most:g} in size"
 
 
-def some_names(value: Any) -> str:
-    """A name or several."""
-    several = isinstance(value, (tuple, list)) and all(isinstance(one, str) for one in value)
-    return "" if isinstance(value, str) or several else "a name, or a list of names"
+class LowAndHigh(Role):
+    """Two values."""
+
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, (tuple, list, np.ndarray)) and len(value) == 2:
+            return value
+        raise self.refused(value)
+
+    def allowed(self) -> str:
+        return "two values, low and high"
 
 
-def one_name(value: Any) -> str:
-    """A name."""
-    return "" if isinstance(value, str) else "a name"
+class ByName(Role):
+    """Values by name."""
+
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return value
+        raise self.refused(value)
+
+    def allowed(self) -> str:
+        return "a mapping of names to values"
 
 
-def by_name(value: Any) -> str:
-    """Values by name, or None."""
-    return "" if value is None or isinstance(value, Mapping) else "a mapping of names to values, or None"
+def whole(least: int, most: int = 2**31) -> Whole:
+    """Whole numbers from `least` to `most`; truth values are none."""
+    return Whole("", least, most)
 
 
-def sign(value: Any) -> str:
-    """1 or -1."""
-    return "" if isinstance(value, int) and not isinstance(value, bool) and value in (1, -1) else "1 or -1"
+BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000), whole(0, 2**63)
+NAME, NAMES, SIGN = Text(""), Names(""), Option((1, -1), "")
+LOW_AND_HIGH, BY_NAME = LowAndHigh(), ByName()
 
 
-BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000, or_none=True), whole(0, 2**63)
-
-
-def checked(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Check options of a function before it is called; what it has by default is allowed, given by name too.
 
     Raises
@@ -110,12 +104,16 @@ def checked(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
         @functools.wraps(function)
         def called(*args: P.args, **kwargs: P.kwargs) -> R:
-            given = signature.bind(*args, **kwargs).arguments
-            told = {n: v for n, v in given.items() if n in rules and v is not signature.parameters[n].default}
-            found = [(name, value, rules[name](value)) for name, value in told.items()]
-            problems = [
-                Problem(name, f"got {came(value)}; allowed: {allowed}") for name, value, allowed in found if allowed
-            ]
+            problems = []
+            for name, value in signature.bind(*args, **kwargs).arguments.items():
+                default = signature.parameters[name].default
+                if name not in roles or value is default:
+                    continue
+                try:
+                    roles[name].checked(value)
+                except ParameterError as error:
+                    other = ", or None" if default is None else ""
+                    problems += [Problem(name, one.message + other) for one in error.problems]
             if problems:
                 raise ParameterError(problems)
             return function(*args, **kwargs)

@@ -11,126 +11,18 @@ schema, the reference page, the symbol in the equations and the range searched f
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, QuantityError, UnknownNameError, came, unknown_name
-from steadyslip.core.quantities import example, numbers, parse
-from steadyslip.core.settings import Setting
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
+from steadyslip.core.roles import Domain, Option, Parameter, Role, Series, Value, fault
 
 
 @dataclass(frozen=True)
-class Domain:
-    """The values that a parameter may take: an interval, open or closed at each end."""
-
-    low: float
-    high: float
-    low_allowed: bool
-    high_allowed: bool
-    text: str
-    whole: bool = False
-
-    def contains(self, value: Any) -> Any:
-        """Elementwise test, false for NaN and infinity."""
-        above = value >= self.low if self.low_allowed else value > self.low
-        below = value <= self.high if self.high_allowed else value < self.high
-        return above & below & np.isfinite(value) & (not self.whole or np.floor(value) == value)
-
-
-_INF = math.inf
-positive = Domain(0, _INF, False, True, "a finite number > 0")
-nonnegative = Domain(0, _INF, True, True, "a finite number >= 0")
-real = Domain(-_INF, _INF, True, True, "a finite number")
-share = Domain(0, 1, True, True, "a number from 0 to 1")
-angle = Domain(-math.pi / 2, math.pi / 2, False, False, "an angle between -90 deg and 90 deg, both excluded")
-acute = Domain(0, math.pi / 2, False, False, "an angle between 0 and 90 deg, both excluded")
-turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 360 deg")
-count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)
-
-
-KINDS = {
-    "friction level": "friction coefficient in steady sliding at the reference rate",
-    "direct effect": "rise of friction per e-fold of velocity, at once",
-    "evolution effect": "fall of friction per e-fold of velocity, as the state follows",
-    "slip distance": "slip over which a memory fades",
-    "reference rate": "velocity at which other parameters hold",
-    "stress share": "share of the response to normal stress that is not immediate",
-    "normal stress": "of the contact, in steady sliding or without coupling to the motion",
-    "stiffness": "of the spring, or of what acts as one",
-}
-"""What a parameter can be to the stages that look for meaning, not for names."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """What a numeric field of a record means.
-
-    Attributes
-    ----------
-    unit : str
-        SI unit; ``"1"`` if dimensionless.
-    domain : Domain
-        Allowed values.
-    doc : str
-        Meaning, a phrase.
-    structural : bool
-        Zero means that the term is absent from the equations (mass, B0, ...), not merely small.
-    adds_state : bool
-        Structural, and its presence adds a variable to the model, so that zero is no limit of small values.
-    gauge : bool
-        Changes no observable result (a reference that only shifts a state), so has no edge.
-    kind : str
-        What it is to those who scale motions or fit records without knowing the law: one of `KINDS`, or nothing.
-    size : float or None
-        Change that matters, of a parameter that may be zero or of either sign; a positive one has its own size.
-    letter : str
-        Its symbol in equations; its name unless given.
-    standing : float or None
-        Stands for the parameter where it is yet to be fitted.
-    idle : float or None
-        Value at which the parameter, with the others of its own member of a list, does nothing: without it the law is
-        a simpler one.
-    """
-
-    unit: str
-    domain: Domain
-    doc: str
-    structural: bool = False
-    gauge: bool = False
-    adds_state: bool = False
-    kind: str = ""
-    size: float | None = None
-    standing: float | None = None
-    letter: str = ""
-    idle: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind and self.kind not in KINDS:
-            raise TypeError(unknown_name("kind of parameter", self.kind, KINDS))
-
-
-@dataclass(frozen=True)
-class Option:
-    """A field that selects one of a few words, or true or false."""
-
-    choices: tuple[Any, ...]
-    doc: str
-
-
-@dataclass(frozen=True)
-class Series:
-    """A field that holds a measured column: a tuple of finite numbers in the SI unit."""
-
-    unit: str
-    doc: str
-
-
-@dataclass(frozen=True)
-class Part:
+class Part(Role):
     """A field that holds another record; ``inline`` puts its parameters beside the owner's.
 
     With ``many`` it holds a tuple of them: a list of tables, or with ``by_name`` tables named after their laws.
@@ -142,14 +34,41 @@ class Part:
     many: bool = False
     by_name: bool = False
 
+    def checked(self, value: Any) -> Any:
+        if not self.many:
+            return self._member(value, "")
+        if not isinstance(value, (list, tuple)):
+            raise fault(f"got {came(value)}; allowed: a list of {self.family.__name__}")
+        return tuple(self._member(one, f"{i}") for i, one in enumerate(value, start=1))
+
+    def _member(self, value: Any, index: str) -> FrozenRecord:
+        if isinstance(value, self.family):
+            return value
+        raise ParameterError([Problem(index, f"got {came(value)}; allowed: {self.allowed()}")])
+
+    def allowed(self) -> str:
+        known = ", ".join(law.__name__ for law in self.family.registry.values())
+        return f"a {self.family.__name__}" + (f" ({known})" if known else "")
+
 
 @dataclass(frozen=True)
-class Named:
+class Named(Role):
     """A field that holds a record for each of some dotted names; ``listed`` lets a list of values stand for one."""
 
     family: type[FrozenRecord]
     doc: str
     listed: bool = False
+
+    def checked(self, value: Any) -> Mapping[str, Any]:
+        if not isinstance(value, Mapping):
+            raise self.refused(value)
+        for name, one in value.items():
+            if not (isinstance(one, self.family) or (self.listed and isinstance(one, (list, tuple)))):
+                raise ParameterError([Problem(name, f"got {came(one)}; allowed: a {self.family.__name__}")])
+        return dict(value)
+
+    def allowed(self) -> str:
+        return "names and their values"
 
 
 @dataclass(frozen=True)
@@ -184,7 +103,8 @@ class Condition:
         return Problem(name or self.name, self.message.format(*(repr(float(a[where])) for a in arrays[1:])) + place)
 
 
-Role = Parameter | Option | Part | Named | Series | Setting
+Declared = Value | Part | Named
+"""What a field of a record may be."""
 _ROLE, _KEY = "steadyslip", "key"
 R = TypeVar("R", bound="FrozenRecord")
 
@@ -234,7 +154,7 @@ def named(family: type[FrozenRecord], doc: str, *, listed: bool = False) -> Any:
     return field(default=None, metadata={_ROLE: Named(family, doc, listed)})
 
 
-def setting(role: Setting, *, default: Any = MISSING, key: str = "") -> Any:
+def setting(role: Value, *, default: Any = MISSING, key: str = "") -> Any:
     """Declare a field of another kind; ``key`` is its name in files where Python keeps that word for itself."""
     return field(default=default, metadata={_ROLE: role, _KEY: key})
 
@@ -324,9 +244,9 @@ def given(record: FrozenRecord) -> dict[str, Any]:
     return {item.name: found[item.name] for item in fields(record) if found[item.name] != item.default}  # type: ignore[arg-type]
 
 
-def role_of(item: Field[Any]) -> Role:
+def role_of(item: Field[Any]) -> Declared:
     """The declaration behind a dataclass field."""
-    role: Role | None = item.metadata.get(_ROLE)
+    role: Declared | None = item.metadata.get(_ROLE)
     if role is None:
         raise TypeError(f"field {item.name!r} has no unit or domain; declare it with parameter(), option() or part()")
     return role
@@ -344,79 +264,7 @@ def is_required(item: Field[Any]) -> bool:
 
 def checked(item: Field[Any], value: Any) -> Any:
     """The value of a field, converted and checked; ParameterError names no field, only the fault."""
-    role = role_of(item)
-    if value is None and item.default is None:
-        return None
-    if isinstance(role, Parameter):
-        return checked_number(role, value)
-    if isinstance(role, Option):
-        if not any(value == c and isinstance(value, bool) == isinstance(c, bool) for c in role.choices):
-            if role.choices == (False, True):
-                raise _fault(f"got {came(value)}; allowed: true or false")
-            raise _fault(unknown_name("choice", value, [str(c) for c in role.choices]))
-        return value
-    if isinstance(role, Series):
-        try:
-            return numbers(value, role.unit)
-        except QuantityError as error:
-            raise _fault(str(error)) from error
-    if isinstance(role, Setting):
-        return role.checked(value)
-    if isinstance(role, Named):
-        return _checked_named(role, value)
-    if role.many:
-        if not isinstance(value, (list, tuple)):
-            raise _fault(f"got {came(value)}; allowed: a list of {role.family.__name__}")
-        return tuple(_checked_part(role, v, f"{i}") for i, v in enumerate(value, start=1))
-    return _checked_part(role, value, "")
-
-
-def _checked_named(role: Named, value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise _fault(f"got {came(value)}; allowed: names and their values")
-    for name, one in value.items():
-        if not (isinstance(one, role.family) or (role.listed and isinstance(one, (list, tuple)))):
-            raise ParameterError([Problem(name, f"got {came(one)}; allowed: a {role.family.__name__}")])
-    return dict(value)
-
-
-def _checked_part(role: Part, value: Any, index: str) -> FrozenRecord:
-    if isinstance(value, role.family):
-        return value
-    message = f"got {came(value)}; allowed: a {role.family.__name__}"
-    known = ", ".join(f"{law.__name__}" for law in role.family.registry.values())
-    raise ParameterError([Problem(index, message + (f" ({known})" if known else ""))])
-
-
-def checked_number(role: Parameter, value: Any) -> float:
-    """A number or text such as ``"5 MPa"`` as an SI float inside the parameter's domain."""
-    if isinstance(value, str):
-        try:
-            number = parse(value, role.unit)
-        except QuantityError as error:
-            raise _fault(str(error)) from error
-    elif isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise _fault(f"got {came(value)}; allowed: {allowed(role)}")
-    elif np.ndim(value) != 0:
-        raise _fault("got an array; a rig holds single values, pass arrays by dotted name instead")
-    else:
-        try:
-            number = float(value)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise _fault(f"got {came(value)}; allowed: {allowed(role)}") from error
-    if not role.domain.contains(number):
-        raise _fault(f"got {came(value)}; allowed: {allowed(role)}")
-    return number
-
-
-def allowed(role: Parameter) -> str:
-    """What a parameter may be, in words for messages."""
-    unit = "" if role.unit == "1" else f" in {role.unit}, or text such as {example(role.unit)}"
-    return role.domain.text + unit
-
-
-def _fault(message: str) -> ParameterError:
-    return ParameterError([Problem("", message)])
+    return None if value is None and item.default is None else role_of(item).checked(value)
 
 
 @dataclass(frozen=True)
@@ -520,9 +368,7 @@ def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
     shape: list[Any] = [type(record)]
     for item in fields(record):  # type: ignore[arg-type]
         role, value = role_of(item), getattr(record, item.name)
-        if isinstance(role, Option):
-            shape.append(value)
-        elif isinstance(role, Parameter):
+        if isinstance(role, Parameter):
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")
         elif isinstance(role, Series):
             shape.append("samples")

@@ -11,7 +11,8 @@ from typing import Any
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.progress import progress_text
-from steadyslip.core.records import FrozenRecord, Parameter, Part, checked_number, given, positive, resolve, role_of
+from steadyslip.core.records import FrozenRecord, Part, given, resolve, role_of
+from steadyslip.core.roles import Parameter, positive
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
@@ -192,7 +193,7 @@ def lab_rig(
 
 def _checked(name: str, unit: str, value: Any) -> float:
     try:
-        return checked_number(Parameter(unit, positive, name), value)
+        return Parameter(unit, positive, name).checked(value)
     except ParameterError as error:
         raise ParameterError([problem.under(name) for problem in error.problems]) from error
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.records import Parameter
+from steadyslip.core.roles import Parameter
 from steadyslip.figures.style import display_unit, labelled
 from steadyslip.linear import boundary
 from steadyslip.machine.slider import Slider

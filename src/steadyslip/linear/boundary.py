@@ -10,8 +10,8 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.options import BRANCH, checked, low_and_high
-from steadyslip.core.records import Parameter
+from steadyslip.core.options import BRANCH, LOW_AND_HIGH, checked
+from steadyslip.core.roles import Parameter
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -48,7 +48,7 @@ class Margin:
     searched: tuple[float, float]
 
 
-@checked(branch=BRANCH, between=low_and_high)
+@checked(branch=BRANCH, between=LOW_AND_HIGH)
 def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, branch: int = 0) -> tuple[Boundary, ...]:
     """Every value of a parameter at which stability of steady sliding changes.
 

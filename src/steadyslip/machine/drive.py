@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from steadyslip.core.records import FrozenRecord, nonnegative, parameter, positive
+from steadyslip.core.records import FrozenRecord, parameter
+from steadyslip.core.roles import nonnegative, positive
 
 
 class Drive(FrozenRecord, family="drive", kw_only=False):

@@ -9,18 +9,8 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.questions import Keeper, question
-from steadyslip.core.records import (
-    Address,
-    Condition,
-    FrozenRecord,
-    nonnegative,
-    parameter,
-    parameters,
-    part,
-    positive,
-    replaced,
-    resolve,
-)
+from steadyslip.core.records import Address, Condition, FrozenRecord, parameter, parameters, part, replaced, resolve
+from steadyslip.core.roles import nonnegative, positive
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive

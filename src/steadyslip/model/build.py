@@ -8,7 +8,8 @@ from typing import Any
 
 import sympy as sp
 
-from steadyslip.core.records import Parameter, parameters, shape_of, twin
+from steadyslip.core.records import parameters, shape_of, twin
+from steadyslip.core.roles import Parameter
 from steadyslip.laws.contact import Motion
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Contact, Model, Variable

@@ -11,7 +11,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import array_function
 from steadyslip.core.questions import Keeper
-from steadyslip.core.records import Parameter
+from steadyslip.core.roles import Parameter
 
 
 @dataclass(frozen=True)

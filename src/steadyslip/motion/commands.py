@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
-from steadyslip.core.records import Parameter, checked_number, positive
+from steadyslip.core.roles import Parameter, positive
 from steadyslip.files.output import FIGURES, write_by_ending
 from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
 from steadyslip.motion.result import History
@@ -84,7 +84,7 @@ def _seconds(text: str) -> float:
     except ValueError:
         number = text
     try:
-        return checked_number(Parameter("s", positive, "end of the run"), number)
+        return Parameter("s", positive, "end of the run").checked(number)
     except ParameterError as error:
         raise ParameterError([problem.under("until") for problem in error.problems]) from error
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Together, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.core.options import THREADS, by_name, checked, one_name, real_number, real_numbers, whole
+from steadyslip.core.options import BY_NAME, NAME, THREADS, Number, Numbers, checked, whole
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
@@ -114,13 +114,13 @@ class Ensemble(ReadOnly):
 
 
 @checked(
-    until=real_numbers(),
-    times=real_numbers(or_none=True),
-    rtol=real_number(0, 0.1),
+    until=Numbers(),
+    times=Numbers(),
+    rtol=Number(0, 0.1),
     most_steps=whole(1, 10**12),
     threads=THREADS,
-    initial=by_name,
-    method=one_name,
+    initial=BY_NAME,
+    method=NAME,
 )
 def simulate_many(
     rig: Slider,

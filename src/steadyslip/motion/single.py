@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import by_name, checked, one_name, real_number, real_numbers, whole
+from steadyslip.core.options import BY_NAME, NAME, Number, Numbers, checked, whole
 from steadyslip.kernels.program import Program
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
@@ -24,12 +24,12 @@ from steadyslip.protocol.inputs import segment_of
 
 
 @checked(
-    until=real_numbers(),
-    times=real_numbers(or_none=True),
-    rtol=real_number(0, 0.1),
+    until=Numbers(),
+    times=Numbers(),
+    rtol=Number(0, 0.1),
     most_steps=whole(1, 10**12),
-    initial=by_name,
-    method=one_name,
+    initial=BY_NAME,
+    method=NAME,
 )
 def simulate(
     rig: Slider,

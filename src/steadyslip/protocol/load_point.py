@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.records import Condition, count, nonnegative, parameter, positive, real, samples
+from steadyslip.core.records import Condition, parameter, samples
+from steadyslip.core.roles import count, nonnegative, positive, real
 from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
 from steadyslip.protocol.protocol import Piece
 from steadyslip.protocol.shapes import Harmonic, table_problems

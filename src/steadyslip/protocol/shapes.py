@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, nonnegative, parameter, positive, real, samples
+from steadyslip.core.records import Condition, parameter, samples
+from steadyslip.core.roles import nonnegative, positive, real
 from steadyslip.protocol.curves import Curve, Wave, column, knots
 from steadyslip.protocol.protocol import Piece
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.core.options import SEED, THREADS, checked, one_name, real_number, whole
+from steadyslip.core.options import NAME, SEED, THREADS, Number, checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.quantities import shown
@@ -137,7 +137,7 @@ def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float], **about: An
     return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details, **about)
 
 
-@checked(count=whole(2, 10**7), block=whole(1, or_none=True), seed=SEED, threads=THREADS, kind=one_name)
+@checked(count=whole(2, 10**7), block=whole(1), seed=SEED, threads=THREADS, kind=NAME)
 def bootstrap(
     fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
     threads: int | None = None, progress: bool | None = None,
@@ -275,7 +275,7 @@ class Profile(ReadOnly):
         return draw(self, ax=ax)
 
 
-@checked(reach=real_number(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=one_name)
+@checked(reach=Number(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
     """Profile of a parameter: all others fitted anew at each value, side by side.
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.records import Domain, Settings, option, parameter, setting
-from steadyslip.core.settings import Names, Whole
+from steadyslip.core.records import Settings, option, parameter, setting
+from steadyslip.core.roles import Domain, Names, Whole
 
 STARTS = 48
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")

@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.quantities import shown
-from steadyslip.core.records import Parameter, checked_number, positive
+from steadyslip.core.roles import Parameter, positive
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen, seconds
@@ -149,7 +149,7 @@ def _cut(
 
 def _checked(name: str, unit: str, value: Any) -> float:
     try:
-        return checked_number(Parameter(unit, positive, name), value)
+        return Parameter(unit, positive, name).checked(value)
     except ParameterError as error:
         raise ParameterError([p.under(name) for p in error.problems]) from error
 

@@ -13,8 +13,8 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
-from steadyslip.core.records import Parameter, checked_number, real
 from steadyslip.core.results import read_only
+from steadyslip.core.roles import Parameter, real
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
@@ -282,7 +282,7 @@ def frozen(values: Any) -> Array:
 def seconds(name: str, value: Any) -> float:
     """A time from a number or text."""
     try:
-        return checked_number(Parameter("s", real, name), value)
+        return Parameter("s", real, name).checked(value)
     except ParameterError as error:
         raise ParameterError([p.under(name) for p in error.problems]) from error
 

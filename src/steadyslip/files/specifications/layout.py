@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
-from steadyslip.core.records import FrozenRecord, Part, Role, role_of
+from steadyslip.core.records import Declared, FrozenRecord, Part, role_of
 from steadyslip.machine.drive import Drive
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Piece, Protocol
@@ -85,7 +85,7 @@ def find_law(family: type[FrozenRecord], name: object) -> type[FrozenRecord]:
     raise ParameterError([Problem("", unknown_name(family.family, name, family.registry))])
 
 
-def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Role]]:
+def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]:
     """The fields of a record that are keys of its own table."""
     for item in fields(law):  # type: ignore[arg-type]
         role = role_of(item)

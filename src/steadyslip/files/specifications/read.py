@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from os import PathLike
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, RigFileError, came, unknown_name
-from steadyslip.core.records import FrozenRecord, Parameter, checked_number, positive
+from steadyslip.core.records import FrozenRecord
+from steadyslip.core.roles import Parameter, positive
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.files.specifications.changes import apply, full_name, split
 from steadyslip.files.specifications.layout import MAP, PROTOCOL, Section, sections, selector
@@ -228,7 +229,7 @@ class _SpecificationReader(TableReader):
         raw = own.get("area")
         if raw is not None:
             try:
-                self.area = checked_number(Parameter("m^2", positive, "contact area"), raw)
+                self.area = Parameter("m^2", positive, "contact area").checked(raw)
             except ParameterError:
                 self.area = None  # reported when the slider's own keys are read
 

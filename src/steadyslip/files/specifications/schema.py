@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
-from steadyslip.core.quantities import example
-from steadyslip.core.records import (
-    FrozenRecord,
-    Named,
-    Option,
-    Parameter,
-    Part,
-    Role,
-    Series,
-    is_required,
-    key_of,
-)
-from steadyslip.core.settings import Schema
+from steadyslip.core.records import Declared, FrozenRecord, Named, Part, is_required, key_of
+from steadyslip.core.roles import Schema
 from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -96,17 +84,12 @@ def _table(law: type[FrozenRecord], properties: Schema, description: str) -> Sch
     return schema
 
 
-def _value(role: Role) -> Schema:
-    if isinstance(role, Option):
-        return {"enum": list(role.choices), "description": role.doc}
+def _value(role: Declared) -> Schema:
     if isinstance(role, Part):
         return _part(role)
     if isinstance(role, Named):
         return {"type": "object", "description": role.doc, "additionalProperties": _by_dotted_name(role, MOST_DOTS)}
-    if isinstance(role, Series):
-        member = {"anyOf": [{"type": "number"}, _text(role.unit)]}
-        return {"type": "array", "items": member, "description": f"{role.doc}, {role.unit}"}
-    return _number(role) if isinstance(role, Parameter) else role.schema()
+    return role.schema()
 
 
 def _by_dotted_name(role: Named, depth: int) -> Schema:
@@ -131,21 +114,6 @@ def _part(role: Part) -> Schema:
     items = {key_of(item): _value(inner) for item, inner in own_fields(role.family)}
     several = {"type": "array", "prefixItems": [items[key] for key in role.family.short], "items": False}
     return {"description": role.doc, "anyOf": [items[role.family.short[0]], several, table]}
-
-
-def _number(role: Parameter) -> Schema:
-    domain = role.domain
-    number: Schema = {"type": "integer" if domain.whole else "number"}
-    if math.isfinite(domain.low):
-        number["minimum" if domain.low_allowed else "exclusiveMinimum"] = domain.low
-    if math.isfinite(domain.high):
-        number["maximum" if domain.high_allowed else "exclusiveMaximum"] = domain.high
-    unit = "" if role.unit == "1" else f", {role.unit}"
-    return {"description": role.doc + unit, "anyOf": [number, _text(role.unit)]}
-
-
-def _text(unit: str) -> Schema:
-    return {"type": "string", "description": f"text such as {example(unit)}"}
 
 
 def _summary(law: type[FrozenRecord]) -> str:

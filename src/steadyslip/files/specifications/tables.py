@@ -7,24 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields
 from typing import Any
 
-from steadyslip.core.errors import ParameterError, Problem, QuantityError, came, unknown_name
-from steadyslip.core.quantities import is_per_area, numbers, parse, total_unit
-from steadyslip.core.records import (
-    FrozenRecord,
-    Named,
-    Parameter,
-    Part,
-    Role,
-    Series,
-    Settings,
-    allowed,
-    checked,
-    checked_number,
-    is_required,
-    key_of,
-    role_of,
-)
-from steadyslip.core.settings import Setting
+from steadyslip.core.errors import ParameterError, Problem, came, unknown_name
+from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
+from steadyslip.core.roles import Parameter, Value
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
 from steadyslip.files.specifications.toml import Table
 
@@ -98,7 +83,7 @@ class TableReader:
                 if inner is not None:
                     arguments[item.name] = inner
             elif key in rest:
-                value = self._value(item, role, rest.pop(key), prefix + key)
+                value = self._value(role, rest.pop(key), prefix + key)
                 if value is not None:
                     arguments[item.name] = value
             elif is_required(item):
@@ -134,18 +119,14 @@ class TableReader:
         mine = {name: rest.pop(name) for name in names if name in rest}
         return self._complete(law, mine, prefix)
 
-    def _value(self, item: Field[Any], role: Role, raw: Any, name: str) -> Any:
+    def _value(self, role: Declared, raw: Any, name: str) -> Any:
         """One checked value, None after noting a problem."""
         if isinstance(role, Part):
             return self._part(role, raw, name)
         if isinstance(role, Named):
             return self._named(role, raw, name)
         try:
-            if isinstance(role, (Parameter, Series)) and self.area is not None and is_per_area(role.unit):
-                return (
-                    number(role, raw, self.area) if isinstance(role, Parameter) else self._totals(role, raw, self.area)
-                )
-            return checked(item, raw)
+            return role.read(raw, self.area)
         except ParameterError as error:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
@@ -182,49 +163,6 @@ class TableReader:
                     f"{name}.{inner}", f"got {came(value)}; allowed: {listed}{{{' = ..., '.join(keys)} = ...}}"
                 )
         return found
-
-    def _totals(self, role: Series, raw: Any, area: float) -> tuple[float, ...]:
-        """A column for the whole area as one per unit area; its texts may give either."""
-
-        def read(text: str, total: str) -> float:
-            try:
-                return parse(text, total) / area
-            except QuantityError as error:
-                try:
-                    return parse(text, role.unit)
-                except QuantityError:
-                    raise QuantityError(f"{error} (the rig has an area)") from error
-
-        try:
-            found = numbers(raw, total_unit(role.unit), read)
-            return tuple(v if isinstance(given, str) else v / area for given, v in zip(raw, found, strict=True))
-        except QuantityError as error:
-            raise ParameterError([Problem("", str(error))]) from error
-
-
-def number(role: Parameter, raw: Any, area: float | None) -> float:
-    """A value of a file, SI, per unit area.
-
-    Where the rig has an area, quantities per unit area are for the whole of it in a file (N, N/m, kg, ...); text may
-    give either.
-
-    Raises
-    ------
-    ParameterError
-        Without a name.
-    """
-    if area is None or not is_per_area(role.unit):
-        return checked_number(role, raw)
-    if isinstance(raw, str):
-        try:
-            return checked_number(role, parse(raw, total_unit(role.unit)) / area)
-        except QuantityError as error:
-            try:
-                return checked_number(role, parse(raw, role.unit))
-            except QuantityError:
-                raise ParameterError([Problem("", f"{error} (the rig has an area)")]) from error
-    whole = Parameter(total_unit(role.unit), role.domain, role.doc)
-    return checked_number(role, checked_number(whole, raw) / area)
 
 
 def flat(table: Table, keys: Sequence[str]) -> dict[str, Any]:
@@ -270,14 +208,8 @@ def _wanted(family: type[FrozenRecord], name: str) -> str:
     return f"a table [{name}] with {', '.join(key_of(item) for item, _ in own_fields(family))}"
 
 
-def _missing(role: Role) -> str:
-    if isinstance(role, Parameter):
-        return f"missing ({role.doc}); allowed: {allowed(role)}"
-    if isinstance(role, Series):
-        return f"missing ({role.doc}); allowed: a list of numbers in {role.unit}, or of texts with units"
-    if isinstance(role, Setting):
-        return f"missing ({role.doc}); allowed: {role.allowed()}"
-    return f"missing ({role.doc})"
+def _missing(role: Declared) -> str:
+    return f"missing ({role.doc})" + (f"; allowed: {role.allowed()}" if isinstance(role, Value) else "")
 
 
 def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping[str, Any]) -> FrozenRecord:

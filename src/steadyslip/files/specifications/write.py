@@ -6,13 +6,11 @@ import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.quantities import outside
-from steadyslip.core.records import FrozenRecord, Named, Option, Parameter, Part, Series, key_of
-from steadyslip.core.settings import Setting
+from steadyslip.core.records import FrozenRecord, Named, key_of
+from steadyslip.core.roles import Value
 from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -72,14 +70,10 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
         value, key = getattr(record, item.name), key_of(item)
         if value is None or value == item.default:
             continue
-        if isinstance(role, Series):
-            lines.append(f"{key} = {_column(role, value, area)}")
+        if isinstance(role, Value):
+            lines.append(f"{key} = {role.written(value, area)}")
         elif isinstance(role, Named):
             below.append(_named(role, value, f"{path}.{key}"))
-        elif isinstance(role, Setting):
-            lines.append(f"{key} = {role.written(value)}")
-        elif not isinstance(role, Part):
-            lines.append(f"{key} = {_scalar(role, value, area)}")
         elif role.by_name:
             below += [_table(f"[{path}.{one.name}]", one, [], f"{path}.{one.name}", area) for one in value]
         elif role.many:
@@ -111,27 +105,3 @@ def _member(family: type[FrozenRecord], member: FrozenRecord, name: str, path: s
     """One table of a list."""
     first = [f'{selector(family)[0]} = "{_law_name(member, name)}"'] if has_choice(family) else []
     return _table(f"[[{name}]]", member, first, path, area)
-
-
-def _scalar(role: Parameter | Option, value: Any, area: float | None) -> str:
-    if isinstance(role, Option):
-        return str(value).lower() if isinstance(value, bool) else f'"{value}"'
-    if role.domain.whole:
-        return f"{value:.0f}"
-    factor, unit = outside(role.unit, area)
-    if not _reads_back(value, factor):
-        return f'"{float(value)!r} {role.unit}"'
-    return repr(float(value) * factor) + (f"  # {unit}" if unit != "1" else "")
-
-
-def _column(role: Series, values: tuple[float, ...], area: float | None) -> str:
-    """A list of numbers, on as many lines as it needs."""
-    factor, unit = outside(role.unit, area)
-    each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {role.unit}"' for v in values]
-    text = wrap(", ".join(each), 100, break_on_hyphens=False)
-    return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
-
-
-def _reads_back(value: float, factor: float) -> bool:
-    """Whether a total gives the same number per unit area again; otherwise that number is written, with its unit."""
-    return float(value) * factor / factor == float(value)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from steadyslip.core.records import Condition, nonnegative, parameter, positive, real
+from steadyslip.core.records import Condition, parameter
+from steadyslip.core.roles import nonnegative, positive, real
 from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, Problem
-from steadyslip.core.records import FrozenRecord, parameter, positive
+from steadyslip.core.records import FrozenRecord, parameter
+from steadyslip.core.roles import positive
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
 

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 import sympy as sp
 
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, acute, angle, nonnegative, option, parameter, positive, real, turn
+from steadyslip.core.records import Condition, option, parameter
+from steadyslip.core.roles import acute, angle, nonnegative, positive, real, turn
 from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact
 from steadyslip.units import deg
 

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 import sympy as sp
 
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, FrozenRecord, nonnegative, parameter
+from steadyslip.core.records import Condition, FrozenRecord, parameter
+from steadyslip.core.roles import nonnegative
 from steadyslip.laws.friction.law import Expression
 from steadyslip.laws.friction.normal_memory import NormalMemory
 from steadyslip.laws.friction.state import State

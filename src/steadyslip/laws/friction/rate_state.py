@@ -11,7 +11,8 @@ import sympy as sp
 
 from steadyslip.core.errors import InternalError, Problem
 from steadyslip.core.expressions import asinh_exp
-from steadyslip.core.records import Condition, option, parameter, part, parts, positive, real
+from steadyslip.core.records import Condition, option, parameter, part, parts
+from steadyslip.core.roles import positive, real
 from steadyslip.laws.friction.evolution import Evolution, Slip
 from steadyslip.laws.friction.law import Expression, FrictionLaw
 from steadyslip.laws.friction.normal_memory import NoMemory, NormalMemory

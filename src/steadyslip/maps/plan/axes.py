@@ -12,8 +12,8 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
-from steadyslip.core.records import Parameter, checked_number
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.roles import Parameter
 
 Array = np.ndarray
 SPACINGS = ("linear", "log")
@@ -212,7 +212,7 @@ def make_axis(name: str, role: Parameter, given: Any) -> Axis:
     numbers, problems = [], []
     for place, value in enumerate(given, start=1):
         try:
-            numbers.append(checked_number(role, value))
+            numbers.append(role.checked(value))
         except ParameterError as error:
             problems += [Problem(name, f"value {place}: {p.message}") for p in error.problems]
     if not len(given):
@@ -290,7 +290,7 @@ def _ends(name: str, role: Parameter, start: Any, stop: Any, spacing: str) -> tu
     problems, ends = [], []
     for word, value in (("from", start), ("to", stop)):
         try:
-            ends.append(checked_number(role, value))
+            ends.append(role.checked(value))
         except ParameterError as error:
             problems += [Problem(f"{name}.{word}", p.message) for p in error.problems]
     if spacing not in SPACINGS:

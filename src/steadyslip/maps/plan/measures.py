@@ -17,7 +17,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
-from steadyslip.core.records import Domain, FrozenRecord, option, parameter, positive
+from steadyslip.core.records import FrozenRecord, option, parameter
+from steadyslip.core.roles import Domain, positive
 from steadyslip.linear import critical_stiffness, growth_rate, safety_factor, stable_stiffness
 from steadyslip.linear.polynomials import most_intervals
 from steadyslip.linear.response import has_closed_form

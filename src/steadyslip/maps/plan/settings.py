@@ -7,7 +7,7 @@ from typing import Any
 
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import Settings, named, option, part, parts, setting
-from steadyslip.core.settings import Names, Quantity, Text, Whole
+from steadyslip.core.roles import Names, Quantity, Text, Whole
 from steadyslip.maps.plan.axes import METHODS, MOST_POINTS, SPACINGS, Grid, Samples
 from steadyslip.maps.plan.measures import Measure
 

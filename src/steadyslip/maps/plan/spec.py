@@ -12,7 +12,6 @@ from steadyslip.core.errors import InternalError, ParameterError, Problem, Stead
 from steadyslip.core.records import parameters, resolve
 from steadyslip.files.specifications.layout import MAP, Section
 from steadyslip.files.specifications.read import Specification, read_specification, text_of
-from steadyslip.files.specifications.tables import number
 from steadyslip.maps.plan.axes import Grid
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.settings import FIT_POINTS, GridSettings, MapSettings, RangeSettings, SampleSettings
@@ -123,11 +122,11 @@ class _Plan:
                 if area is None:
                     continue
                 if isinstance(one, Grid):
-                    found[name] = replace(one, start=number(role, one.start, area), stop=number(role, one.stop, area))
+                    found[name] = replace(one, start=role.read(one.start, area), stop=role.read(one.stop, area))
                 elif isinstance(one, tuple):
-                    found[name] = (number(role, one[0], area), number(role, one[1], area), *one[2:])
+                    found[name] = (role.read(one[0], area), role.read(one[1], area), *one[2:])
                 else:
-                    found[name] = [number(role, value, area) for value in one]
+                    found[name] = [role.read(value, area) for value in one]
             except ParameterError as error:
                 del found[name]
                 self.problems += [p.under(f"{place}.{name}") for p in error.problems]

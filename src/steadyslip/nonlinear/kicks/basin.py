@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import BRANCH, THREADS, checked, one_name, real_number, real_numbers
+from steadyslip.core.options import BRANCH, NAME, THREADS, Number, Numbers, checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
@@ -70,12 +70,12 @@ class Basin(ReadOnly):
 
 
 @checked(
-    x=real_numbers(or_none=True),
-    v=real_numbers(or_none=True),
-    rtol=real_number(0, 0.1),
+    x=Numbers(),
+    v=Numbers(),
+    rtol=Number(0, 0.1),
     threads=THREADS,
     branch=BRANCH,
-    along=one_name,
+    along=NAME,
 )
 def basin(
     rig: Slider,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.options import BRANCH, THREADS, checked, one_name, real_number, sign
+from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, Number, checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -46,13 +46,13 @@ class Brackets:
 
 
 @checked(
-    precision=real_number(1e-13, 0.1),
-    rtol=real_number(0, 0.1),
+    precision=Number(1e-13, 0.1),
+    rtol=Number(0, 0.1),
     threads=THREADS,
     branch=BRANCH,
-    kick=one_name,
-    reference=one_name,
-    direction=sign,
+    kick=NAME,
+    reference=NAME,
+    direction=SIGN,
 )
 def threshold_map(
     rig: Slider,

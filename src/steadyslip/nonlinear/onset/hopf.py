@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.options import BRANCH, checked, one_name
+from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.polynomials import stable_set
@@ -125,7 +125,7 @@ MEANINGS = {
 }
 
 
-@checked(branch=BRANCH, along=one_name)
+@checked(branch=BRANCH, along=NAME)
 def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
     """Kind of onset at the oscillatory edge of stability nearest to the rig.
 

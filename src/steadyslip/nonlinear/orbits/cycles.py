@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import InternalError, ParameterError, Problem
-from steadyslip.core.options import BRANCH, checked, low_and_high, one_name, real_number, whole
+from steadyslip.core.options import BRANCH, LOW_AND_HIGH, NAME, Number, checked, whole
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure, turned_round
@@ -30,13 +30,13 @@ MOST_STEPS_BETWEEN = 40
 
 
 @checked(
-    amplitude=real_number(0, 0.1, or_none=True),
+    amplitude=Number(0, 0.1),
     most_points=whole(1),
     doublings=whole(0, 100),
-    rtol=real_number(0, 0.1, or_none=True),
-    between=low_and_high,
+    rtol=Number(0, 0.1),
+    between=LOW_AND_HIGH,
     branch=BRANCH,
-    along=one_name,
+    along=NAME,
 )
 def cycles(
     rig: Slider,

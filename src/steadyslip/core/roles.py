@@ -1,0 +1,436 @@
+"""What a field of a record, or an option of a call, may hold: each kind checks, explains, reads and writes its values.
+
+Numbers (`Parameter`), choices, measured columns, and what tables hold that say what to do with a rig: words, counts,
+names, quantities of any kind. A layer that needs another kind derives one from `Value`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from numbers import Integral, Real
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, came, unknown_name
+from steadyslip.core.quantities import example, is_per_area, numbers, outside, parse, total_unit
+
+Schema = dict[str, Any]
+
+
+class Role:
+    """What a field or an option may hold."""
+
+    def checked(self, value: Any) -> Any:
+        """The value as it is kept.
+
+        Raises
+        ------
+        ParameterError
+            Naming no field, only the fault.
+        """
+        raise NotImplementedError
+
+    def allowed(self) -> str:
+        """What may be given, in words."""
+        raise NotImplementedError
+
+    def refused(self, value: Any) -> ParameterError:
+        """The exception for a value that is not allowed."""
+        return fault(f"got {came(value)}; allowed: {self.allowed()}")
+
+
+def fault(message: str) -> ParameterError:
+    """An exception that names no field yet."""
+    return ParameterError([Problem("", message)])
+
+
+class Value(Role):
+    """One entry of a table in a file; subclasses are dataclasses that say in a phrase, `doc`, what it means."""
+
+    doc: str
+
+    def schema(self) -> Schema:
+        """The JSON schema of what a file may have."""
+        raise NotImplementedError
+
+    def read(self, raw: Any, area: float | None) -> Any:
+        """The value of a file: where the rig has an area, quantities per unit area are for the whole of it.
+
+        Raises
+        ------
+        ParameterError
+            Naming no field, only the fault.
+        """
+        return self.checked(raw)
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        """The value in TOML, of a rig with that area."""
+        return json.dumps(value, ensure_ascii=False)
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The values that a parameter may take: an interval, open or closed at each end."""
+
+    low: float
+    high: float
+    low_allowed: bool
+    high_allowed: bool
+    text: str
+    whole: bool = False
+
+    def contains(self, value: Any) -> Any:
+        """Elementwise test, false for NaN and infinity."""
+        above = value >= self.low if self.low_allowed else value > self.low
+        below = value <= self.high if self.high_allowed else value < self.high
+        return above & below & np.isfinite(value) & (not self.whole or np.floor(value) == value)
+
+
+_INF = math.inf
+positive = Domain(0, _INF, False, True, "a finite number > 0")
+nonnegative = Domain(0, _INF, True, True, "a finite number >= 0")
+real = Domain(-_INF, _INF, True, True, "a finite number")
+share = Domain(0, 1, True, True, "a number from 0 to 1")
+angle = Domain(-math.pi / 2, math.pi / 2, False, False, "an angle between -90 deg and 90 deg, both excluded")
+acute = Domain(0, math.pi / 2, False, False, "an angle between 0 and 90 deg, both excluded")
+turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 360 deg")
+count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)
+
+
+KINDS = {
+    "friction level": "friction coefficient in steady sliding at the reference rate",
+    "direct effect": "rise of friction per e-fold of velocity, at once",
+    "evolution effect": "fall of friction per e-fold of velocity, as the state follows",
+    "slip distance": "slip over which a memory fades",
+    "reference rate": "velocity at which other parameters hold",
+    "stress share": "share of the response to normal stress that is not immediate",
+    "normal stress": "of the contact, in steady sliding or without coupling to the motion",
+    "stiffness": "of the spring, or of what acts as one",
+}
+"""What a parameter can be to the stages that look for meaning, not for names."""
+
+
+@dataclass(frozen=True)
+class Parameter(Value):
+    """What a numeric field of a record means.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit; ``"1"`` if dimensionless.
+    domain : Domain
+        Allowed values.
+    doc : str
+        Meaning, a phrase.
+    structural : bool
+        Zero means that the term is absent from the equations (mass, B0, ...), not merely small.
+    adds_state : bool
+        Structural, and its presence adds a variable to the model, so that zero is no limit of small values.
+    gauge : bool
+        Changes no observable result (a reference that only shifts a state), so has no edge.
+    kind : str
+        What it is to those who scale motions or fit records without knowing the law: one of `KINDS`, or nothing.
+    size : float or None
+        Change that matters, of a parameter that may be zero or of either sign; a positive one has its own size.
+    letter : str
+        Its symbol in equations; its name unless given.
+    standing : float or None
+        Stands for the parameter where it is yet to be fitted.
+    idle : float or None
+        Value at which the parameter, with the others of its own member of a list, does nothing: without it the law is
+        a simpler one.
+    """
+
+    unit: str
+    domain: Domain
+    doc: str
+    structural: bool = False
+    gauge: bool = False
+    adds_state: bool = False
+    kind: str = ""
+    size: float | None = None
+    standing: float | None = None
+    letter: str = ""
+    idle: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind and self.kind not in KINDS:
+            raise TypeError(unknown_name("kind of parameter", self.kind, KINDS))
+
+    def checked(self, value: Any) -> float:
+        """A number or text such as ``"5 MPa"`` as an SI float inside the parameter's domain."""
+        if isinstance(value, str):
+            try:
+                number = parse(value, self.unit)
+            except QuantityError as error:
+                raise fault(str(error)) from error
+        elif isinstance(value, bool) or not hasattr(value, "__float__"):
+            raise self.refused(value)
+        elif np.ndim(value) != 0:
+            raise fault("got an array; a rig holds single values, pass arrays by dotted name instead")
+        else:
+            try:
+                number = float(value)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise self.refused(value) from error
+        if not self.domain.contains(number):
+            raise self.refused(value)
+        return number
+
+    def allowed(self) -> str:
+        unit = "" if self.unit == "1" else f" in {self.unit}, or text such as {example(self.unit)}"
+        return self.domain.text + unit
+
+    def schema(self) -> Schema:
+        domain = self.domain
+        number: Schema = {"type": "integer" if domain.whole else "number"}
+        if math.isfinite(domain.low):
+            number["minimum" if domain.low_allowed else "exclusiveMinimum"] = domain.low
+        if math.isfinite(domain.high):
+            number["maximum" if domain.high_allowed else "exclusiveMaximum"] = domain.high
+        unit = "" if self.unit == "1" else f", {self.unit}"
+        return {"description": self.doc + unit, "anyOf": [number, _text(self.unit)]}
+
+    def read(self, raw: Any, area: float | None) -> float:
+        """For the whole area a bare number; text may give either."""
+        if area is None or not is_per_area(self.unit):
+            return self.checked(raw)
+        if isinstance(raw, str):
+            try:
+                return self.checked(_per_area(raw, self.unit, area))
+            except QuantityError as error:
+                raise fault(str(error)) from error
+        whole = Parameter(total_unit(self.unit), self.domain, self.doc)
+        return self.checked(whole.checked(raw) / area)
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        if self.domain.whole:
+            return f"{value:.0f}"
+        factor, unit = outside(self.unit, area)
+        if not _reads_back(value, factor):
+            return f'"{float(value)!r} {self.unit}"'
+        return repr(float(value) * factor) + (f"  # {unit}" if unit != "1" else "")
+
+
+@dataclass(frozen=True)
+class Option(Value):
+    """One of a few words or numbers, or true or false."""
+
+    choices: tuple[Any, ...]
+    doc: str
+
+    def checked(self, value: Any) -> Any:
+        for choice in self.choices:
+            if (
+                isinstance(value, type(choice))
+                and isinstance(value, bool) == isinstance(choice, bool)
+                and value == choice
+            ):
+                return value
+        raise self.refused(value) if self._truth else fault(unknown_name("choice", value, map(str, self.choices)))
+
+    @property
+    def _truth(self) -> bool:
+        return self.choices == (False, True)
+
+    def allowed(self) -> str:
+        return "true or false" if self._truth else ", ".join(map(str, self.choices))
+
+    def schema(self) -> Schema:
+        return {"enum": list(self.choices), "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Series(Value):
+    """A measured column: a tuple of finite numbers in the SI unit."""
+
+    unit: str
+    doc: str
+
+    def checked(self, value: Any) -> tuple[float, ...]:
+        try:
+            return numbers(value, self.unit)
+        except QuantityError as error:
+            raise fault(str(error)) from error
+
+    def allowed(self) -> str:
+        return f"a list of numbers in {self.unit}, or of texts with units"
+
+    def schema(self) -> Schema:
+        member = {"anyOf": [{"type": "number"}, _text(self.unit)]}
+        return {"type": "array", "items": member, "description": f"{self.doc}, {self.unit}"}
+
+    def read(self, raw: Any, area: float | None) -> tuple[float, ...]:
+        """For the whole area bare numbers; texts may give either."""
+        if area is None or not is_per_area(self.unit):
+            return self.checked(raw)
+        try:
+            found = numbers(raw, total_unit(self.unit), lambda text, _: _per_area(text, self.unit, area))
+        except QuantityError as error:
+            raise fault(str(error)) from error
+        return tuple(v if isinstance(given, str) else v / area for given, v in zip(raw, found, strict=True))
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        """A list of numbers, on as many lines as it needs."""
+        factor, unit = outside(self.unit, area)
+        each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {self.unit}"' for v in value]
+        text = wrap(", ".join(each), 100, break_on_hyphens=False)
+        return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
+
+
+def _text(unit: str) -> Schema:
+    return {"type": "string", "description": f"text such as {example(unit)}"}
+
+
+def _per_area(text: str, unit: str, area: float) -> float:
+    """Text for the whole area, or per unit area, as the latter."""
+    try:
+        return parse(text, total_unit(unit)) / area
+    except QuantityError as error:
+        try:
+            return parse(text, unit)
+        except QuantityError:
+            raise QuantityError(f"{error} (the rig has an area)") from error
+
+
+def _reads_back(value: float, factor: float) -> bool:
+    """Whether a total gives the same number per unit area again; otherwise that number is written, with its unit."""
+    return float(value) * factor / factor == float(value)
+
+
+@dataclass(frozen=True)
+class Text(Value):
+    """A word or a name, kept as it is."""
+
+    doc: str
+
+    def checked(self, value: Any) -> str:
+        if not isinstance(value, str) or not value:
+            raise self.refused(value)
+        return value
+
+    def allowed(self) -> str:
+        return "a text"
+
+    def schema(self) -> Schema:
+        return {"type": "string", "minLength": 1, "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Label(Value):
+    """A name, or a number counted from 1."""
+
+    doc: str
+
+    def checked(self, value: Any) -> str | int:
+        if (isinstance(value, str) and value) or (isinstance(value, int) and value >= 1 and value is not True):
+            return value
+        raise self.refused(value)
+
+    def allowed(self) -> str:
+        return "a name, or a number from 1"
+
+    def schema(self) -> Schema:
+        return {
+            "anyOf": [{"type": "string", "minLength": 1}, {"type": "integer", "minimum": 1}],
+            "description": self.doc,
+        }
+
+
+@dataclass(frozen=True)
+class Names(Value):
+    """One name or a list of them, kept as a tuple."""
+
+    doc: str
+
+    def checked(self, value: Any) -> tuple[str, ...]:
+        if isinstance(value, str):
+            return (value,)
+        if not isinstance(value, (list, tuple)) or not all(isinstance(one, str) for one in value):
+            raise self.refused(value)
+        return tuple(value)
+
+    def allowed(self) -> str:
+        return "a list of names"
+
+    def schema(self) -> Schema:
+        word = {"type": "string"}
+        return {"anyOf": [word, {"type": "array", "items": word}], "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Whole(Value):
+    """A whole number between two ends, both included."""
+
+    doc: str
+    low: int
+    high: int | None = None
+
+    def checked(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, Integral):
+            raise self.refused(value)
+        number = int(value)
+        if number < self.low or (self.high is not None and number > self.high):
+            raise self.refused(value)
+        return number
+
+    def allowed(self) -> str:
+        return (
+            f"a whole number >= {self.low}" if self.high is None else f"a whole number from {self.low} to {self.high}"
+        )
+
+    def schema(self) -> Schema:
+        ends = {"minimum": self.low} | ({} if self.high is None else {"maximum": self.high})
+        return {"type": "integer", **ends, "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Span(Value):
+    """Start and end, as a pair of numbers in the SI unit."""
+
+    doc: str
+    unit: str
+
+    def checked(self, value: Any) -> tuple[float, float]:
+        if not isinstance(value, (list, tuple)) or len(value) != 2:
+            raise self.refused(value)
+        try:
+            start, end = numbers(value, self.unit)
+        except QuantityError as error:
+            raise ParameterError([Problem("", str(error))]) from error
+        return start, end
+
+    def allowed(self) -> str:
+        return f"[start, end] in {self.unit}"
+
+    def schema(self) -> Schema:
+        one = {"anyOf": [{"type": "number"}, {"type": "string", "description": f"text such as {example(self.unit)}"}]}
+        return {"type": "array", "items": one, "minItems": 2, "maxItems": 2, "description": f"{self.doc}, {self.unit}"}
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        return f"[{', '.join(repr(one) for one in value)}]  # {self.unit}"
+
+
+@dataclass(frozen=True)
+class Quantity(Value):
+    """A number in an SI unit, or text with a unit, of a dimension that another part of the file decides."""
+
+    doc: str
+
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, bool) or not isinstance(value, (str, Real)):
+            raise self.refused(value)
+        return value
+
+    def allowed(self) -> str:
+        return "a number in the SI unit, or text with a unit"
+
+    def schema(self) -> Schema:
+        return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": self.doc}
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        return json.dumps(value) if isinstance(value, str) else repr(float(value))

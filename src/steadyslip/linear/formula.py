@@ -81,9 +81,10 @@ def _in_time(work: Callable[[], sp.Expr], otherwise: sp.Expr) -> sp.Expr:
     thread = Thread(target=run, daemon=True)
     thread.start()
     thread.join(LONGEST)
-    if thread.is_alive() and thread.ident is not None:  # SymPy is Python throughout and can be interrupted so
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_TooLong))
-        thread.join(1.0)
+    for _ in range(10):  # SymPy is Python throughout and can be interrupted so; what Python ignores is raised again
+        if thread.is_alive() and thread.ident is not None:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_TooLong))
+            thread.join(0.1)
     if faults:
         raise faults[0]
     return found[0] if found else otherwise

@@ -101,7 +101,7 @@ class SearchStory:
 
 @dataclass(frozen=True, eq=False)
 class FitNumbers(ReadOnly):
-    """A rig fitted to records: a minimum, and all numbers that follow from it.
+    """A rig fitted to records.
 
     Attributes
     ----------

@@ -19,7 +19,7 @@ from hypothesis import given, strategies as st
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.files.sealed import write_sealed
-from steadyslip.kernels import build, primitives
+from steadyslip.kernels import build, driver_text, primitives
 from steadyslip.kernels.driver.jobs import start_job
 from steadyslip.kernels.layout import Cursor, Out, Routines, Row, make_layout
 from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
@@ -448,10 +448,10 @@ def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
         with monkeypatch.context() as patch:
             patch.setenv("NUMBA_OPT", "0")
             keys.append(key())
-        real = build.files
+        real = driver_text.files
         for changed in ("lanes.py", "balance.py", "layout.py", "jump.py"):
             with monkeypatch.context() as patch:
-                patch.setattr(build, "files", lambda package, changed=changed: _Changed(real(package), changed))
+                patch.setattr(driver_text, "files", lambda package, changed=changed: _Changed(real(package), changed))
                 keys.append(key())
         assert len(set(keys)) == len(keys) - 1
     finally:
@@ -524,5 +524,5 @@ def test_functions_of_the_driver_can_stand_side_by_side():
                 name = node.name if isinstance(node, ast.FunctionDef) else node.targets[0].id
                 assert owners.setdefault(name, path.stem) == path.stem
             elif isinstance(node, ast.ImportFrom):
-                assert node.module in ("__future__", "steadyslip.kernels.layout") or build._is_driver(node.module)
+                assert node.module in ("__future__", "steadyslip.kernels.layout") or driver_text.is_driver(node.module)
     assert all(owners[name] == module.__name__.rpartition(".")[2] for name, (module, _) in build.ENTRIES.items())

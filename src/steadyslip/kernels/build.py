@@ -11,7 +11,6 @@ to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty,
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import gc
 import hashlib
@@ -24,7 +23,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from importlib.resources import files
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, cast
@@ -35,11 +33,11 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 from steadyslip.kernels.driver import lanes, states, table
-from steadyslip.kernels.layout import Cursor, Event, Final, Kind, Layout, Out, Routines, Row, Setting, Status
+from steadyslip.kernels.driver_text import numbered, text_of, texts
+from steadyslip.kernels.layout import Layout, Routines
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.printers import python
 
-DRIVER = "steadyslip.kernels.driver"
 _RIGS = "float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1]"
 ENTRIES: dict[str, tuple[ModuleType, str]] = {
     "advance": (
@@ -281,52 +279,8 @@ def compiled_driver(name: str) -> Callable[..., Any]:
 def driver_key(name: str) -> str:
     """The hash of everything that the machine code of an entry depends on."""
     module, signature = ENTRIES[name]
-    others = [_text(f"steadyslip.kernels.{part}") for part in ("layout", "jump", "build")]
-    return _key("\n".join([name, signature, *_texts(module.__name__, {}).values(), *others]))
-
-
-def _text(module: str) -> str:
-    package, _, name = module.rpartition(".")
-    return files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
-
-
-def _texts(module: str, found: dict[str, str]) -> dict[str, str]:
-    """The text of a driver's module, and of those that it needs before it."""
-    text = _text(module)
-    for node in ast.parse(text).body:
-        if isinstance(node, ast.ImportFrom) and _is_driver(node.module) and node.module not in found:
-            _texts(str(node.module), found)
-    found[module] = text
-    return found
-
-
-def _is_driver(module: str | None) -> bool:
-    return (module or "").startswith(f"{DRIVER}.")
-
-
-_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Final, Out)}
-_TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
-
-
-class _Numbered(ast.NodeTransformer):
-    """Names of places become their numbers, and `Layout` and `Routines` arrays, which numba compiles twice as fast.
-
-    Imports from the driver's own modules go: these are put into one.
-    """
-
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.ImportFrom | None:
-        return None if _is_driver(node.module) else node
-
-    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        if not isinstance(node.value, ast.Name):
-            return cast(ast.expr, self.generic_visit(node))
-        owner = node.value.id
-        if owner in _ENUMS:
-            return ast.copy_location(ast.Constant(int(_ENUMS[owner][node.attr])), node)
-        if owner in _TUPLES:
-            place = ast.Constant(_TUPLES[owner]._fields.index(node.attr))
-            return ast.copy_location(ast.Subscript(node.value, place, ast.Load()), node)
-        return node
+    others = [text_of(f"steadyslip.kernels.{part}") for part in ("layout", "jump", "driver_text", "build")]
+    return _key("\n".join([name, signature, *texts(module.__name__).values(), *others]))
 
 
 def _compiled_entry(name: str, source: ModuleType, signature: str, key: str) -> Callable[..., Any]:
@@ -338,9 +292,8 @@ def _compiled_entry(name: str, source: ModuleType, signature: str, key: str) -> 
 
     module = ModuleType(f"steadyslip_driver_{key}")
     sys.modules[module.__name__] = module  # numba finds a cached function's globals by module name
-    for part, text in _texts(source.__name__, {}).items():
-        tree = _Numbered().visit(ast.parse(text))
-        exec(compile(ast.fix_missing_locations(tree), f"<{part}>", "exec"), module.__dict__)
+    for part, text in texts(source.__name__).items():
+        exec(compile(numbered(text), f"<{part}>", "exec"), module.__dict__)
     for own, function in list(vars(module).items()):
         if isinstance(function, FunctionType) and function.__module__ == module.__name__:
             module.__dict__[own] = numba.njit(**OPTIONS["entry" if own in ENTRIES else "inner"])(function)

@@ -1,0 +1,65 @@
+"""The driver's modules as text, for compilers: those that belong together, with numbers in place of names of places."""
+
+from __future__ import annotations
+
+import ast
+from importlib.resources import files
+from typing import Any, cast
+
+from steadyslip.kernels.layout import Cursor, Event, Final, Kind, Layout, Out, Routines, Row, Setting, Status
+
+DRIVER = "steadyslip.kernels.driver"
+_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Final, Out)}
+_TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
+
+
+def text_of(module: str) -> str:
+    """The text of a module of the package."""
+    package, _, name = module.rpartition(".")
+    return files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
+
+
+def texts(module: str) -> dict[str, str]:
+    """The text of a driver's module, and of those that it needs before it, by name."""
+    found: dict[str, str] = {}
+    _gather(module, found)
+    return found
+
+
+def _gather(module: str, found: dict[str, str]) -> None:
+    text = text_of(module)
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ImportFrom) and is_driver(node.module) and node.module not in found:
+            _gather(str(node.module), found)
+    found[module] = text
+
+
+def is_driver(module: str | None) -> bool:
+    """Whether a module is one of the driver's."""
+    return (module or "").startswith(f"{DRIVER}.")
+
+
+def numbered(text: str) -> ast.Module:
+    """The tree of a module with numbers for the names of places, to be put into one with the others."""
+    return cast(ast.Module, ast.fix_missing_locations(_Numbered().visit(ast.parse(text))))
+
+
+class _Numbered(ast.NodeTransformer):
+    """Names of places become their numbers, and `Layout` and `Routines` arrays, which numba compiles twice as fast.
+
+    Imports from the driver's own modules go: these are put into one.
+    """
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.ImportFrom | None:
+        return None if is_driver(node.module) else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        if not isinstance(node.value, ast.Name):
+            return cast(ast.expr, self.generic_visit(node))
+        owner = node.value.id
+        if owner in _ENUMS:
+            return ast.copy_location(ast.Constant(int(_ENUMS[owner][node.attr])), node)
+        if owner in _TUPLES:
+            place = ast.Constant(_TUPLES[owner]._fields.index(node.attr))
+            return ast.copy_location(ast.Subscript(node.value, place, ast.Load()), node)
+        return node

@@ -1,0 +1,96 @@
+"""Programs as JavaScript, for the browser; elementary functions are those of `runtime.js`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+from steadyslip.core.errors import InternalError
+from steadyslip.kernels.layout import Layout, Routines
+from steadyslip.kernels.nodes import PRIMITIVES, Node, Program
+from steadyslip.kernels.printers.text import Writer
+
+_WORDS = {"and": "&&", "or": "||"}
+_IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
+_EXPORT = re.compile(r"^export (?=const|let|class|function|async)", re.M)
+_DECLARED = re.compile(r"^(?:export )?(?:const|let|class|function\*?|async function) (\w+)", re.M)
+_OWN = {"abs": "Math.abs", "sqrt": "Math.sqrt"}
+
+
+def runtime() -> str:
+    """The text of the module whose functions programs and driver call."""
+    return files("steadyslip.kernels.printers").joinpath("runtime.js").read_text(encoding="utf-8")
+
+
+def as_script(*modules: str) -> str:
+    """Modules one behind the other in one scope: without what they import from each other, and export.
+
+    Raises
+    ------
+    InternalError
+        If two modules declare the same name at their outermost level.
+    """
+    names = [name for module in modules for name in _DECLARED.findall(module)]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise InternalError(f"several JavaScript modules declare {', '.join(sorted(twice))}")
+    return "\n".join(_EXPORT.sub("", _IMPORT.sub("", module)) for module in modules)
+
+
+def machine(programs: Sequence[Program], layout: Layout) -> str:
+    """A kernel as an expression: an object with its `layout` and `routines`, as the transpiled driver takes them."""
+    known = {program.name for program in programs}
+    routines = ", ".join(name if name in known else "absent" for name in Routines._fields)
+    functions = "".join(map(text, programs))
+    return f"(() => {{\n{functions}return {{ layout: {list(layout)}, routines: [{routines}] }};\n}})()"
+
+
+def text(program: Program) -> str:
+    """A program as a JavaScript function of a record, a number and an array."""
+    return f"function {program.name}(R, x, y) {{\n{''.join(_JavaScript(program).body())}}}\n"
+
+
+def literal(value: Any) -> str:
+    """A number, not finite ones too, or a truth."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "(-Infinity)"
+    short = int(value) if abs(value) < 1e15 and value == int(value) and math.copysign(1, value) > 0 else value
+    return repr(short) if math.copysign(1, value) > 0 else f"({short!r})"
+
+
+class _JavaScript(Writer):
+    def number(self, value: Any) -> str:
+        return literal(value)
+
+    def select(self, condition: str, value: str, other: str) -> str:
+        return f"({condition} ? {value} : {other})"
+
+    def operation(self, node: Node, arguments: Sequence[str]) -> str:
+        if node.op in _WORDS and node.kind == "bool":
+            return f"({arguments[0]} {_WORDS[node.op]} {arguments[1]})"
+        if node.op == "not":
+            return f"(!{arguments[0]})"
+        if node.op not in _OWN and node.op not in PRIMITIVES:
+            raise InternalError(f"{node.op} has no counterpart in JavaScript, which has no integers of 64 bits")
+        return f"{_OWN.get(node.op, node.op)}({', '.join(arguments)})"
+
+    def named(self, name: str, value: str) -> str:
+        return f"var {name} = {value};"
+
+    carried = named
+
+    def assigned(self, name: str, value: str) -> str:
+        return f"{name} = {value};"
+
+    def rounds(self, count: int) -> str:
+        return f"for (let i = 0; i < {count}; i++) {{"
+
+    def following(self, names: Sequence[str], values: Sequence[str]) -> str:
+        return f"[{', '.join(names)}] = [{', '.join(values)}];"
+
+    def end(self) -> str:
+        return "}"

@@ -1,0 +1,137 @@
+"""Programs as lines of text, for languages with expressions: what is used once is put where it is used."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+from steadyslip.kernels.nodes import Loop, Node, Program, reachable
+
+_SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_DEEPEST = 8  # operations in one line
+
+
+class Writer(ABC):
+    """Names what is used more than once, and puts the rest into the expressions that use it.
+
+    Attributes
+    ----------
+    lines : list of str
+        Statements so far, indented.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.lines: list[str] = []
+        self.known: dict[int, str] = {program.number.order: "x"}
+        self.depth: dict[int, int] = {}
+        self.uses: dict[int, int] = {}
+        for _, _, node in program.stores:
+            self.uses[node.order] = self.uses.get(node.order, 0) + 1
+        self._count(program.nodes())
+
+    def body(self) -> list[str]:
+        """The statements of the whole program."""
+        self.emit(self.program.nodes(), 1)
+        for array, place, node in self.program.stores:
+            self.line(1, self.assigned(f"{array}[{place}]", self.known[node.order]))
+        return self.lines
+
+    # -- what a language says in its own way
+
+    @abstractmethod
+    def number(self, value: Any) -> str:
+        """A number or a truth."""
+
+    @abstractmethod
+    def select(self, condition: str, value: str, other: str) -> str:
+        """`value` where the condition holds, else `other`."""
+
+    @abstractmethod
+    def operation(self, node: Node, arguments: Sequence[str]) -> str:
+        """Any other operation without a sign that is the same everywhere."""
+
+    @abstractmethod
+    def named(self, name: str, value: str) -> str:
+        """A new name for a value, as a statement; the name holds after a loop too."""
+
+    @abstractmethod
+    def assigned(self, name: str, value: str) -> str:
+        """A value for what has a name, as a statement."""
+
+    @abstractmethod
+    def carried(self, name: str, value: str) -> str:
+        """A name for what changes from round to round, as a statement."""
+
+    @abstractmethod
+    def rounds(self, count: int) -> str:
+        """The head of a loop."""
+
+    @abstractmethod
+    def following(self, names: Sequence[str], values: Sequence[str]) -> str:
+        """All names get their values at once, as a statement."""
+
+    def end(self) -> str:
+        """What ends a loop; empty for nothing."""
+        return ""
+
+    # -- the same for all
+
+    def _count(self, nodes: Sequence[Node]) -> None:
+        for node in nodes:
+            for operand in node.operands:
+                self.uses[operand.order] = self.uses.get(operand.order, 0) + 1
+            if node.op == "result":
+                self._count(node.args[0].nodes())
+
+    def line(self, level: int, statement: str) -> None:
+        """Add a line."""
+        self.lines.append("    " * level + statement + "\n")
+
+    def emit(self, nodes: Sequence[Node], level: int, loop: Loop | None = None) -> None:
+        """Everything that is not inside a loop, or that is inside this one."""
+        for node in nodes:
+            if node.order in self.known or node.loop is not loop:
+                continue
+            if node.op == "result":
+                self._loop(node.args[0], level)
+                self.known[node.order] = self.known[node.args[0].results[node.args[1]].order]
+                continue
+            written = self._written(node)
+            depth = 1 + max((self.depth.get(a.order, 0) for a in node.operands), default=0)
+            often = self.uses.get(node.order, 0) != 1 or depth > _DEEPEST
+            if node.op != "number" and (often or node.op == "load" or loop is not None):
+                name = f"t{len(self.lines) + 1}"
+                self.line(level, self.named(name, written))
+                written, depth = name, 0
+            self.known[node.order], self.depth[node.order] = written, depth
+
+    def _written(self, node: Node) -> str:
+        if node.op == "number":
+            return self.number(node.args[0])
+        if node.op == "load":
+            return f"{node.args[0]}[{node.args[1]}]"
+        a = [self.known[operand.order] for operand in node.operands]
+        if node.op in _SIGNS:
+            return f"({a[0]} {_SIGNS[node.op]} {a[1]})"
+        if node.op == "select":
+            return self.select(*a)
+        return f"(-{a[0]})" if node.op == "neg" else self.operation(node, a)
+
+    def _loop(self, loop: Loop, level: int) -> None:
+        if loop.results[0].order in self.known:
+            return
+        self.emit(reachable(loop.given()), level)
+        names = [f"z{len(self.lines)}_{i}" for i in range(len(loop.carried))]
+        for node, name, start in zip(loop.carried, names, loop.start, strict=True):
+            self.known[node.order] = name
+            self.line(level, self.carried(name, self.known[start.order]))
+        self.line(level, self.rounds(loop.rounds))
+        self.emit(loop.nodes(), level + 1, loop)
+        values = [self.known[node.order] for node in loop.following]
+        if {self.known[node.order] for node in loop.results} & set(names):
+            raise ValueError("a result of a loop is what it leaves, not what it began with")
+        self.line(level + 1, self.following(names, values))
+        if self.end():
+            self.line(level, self.end())

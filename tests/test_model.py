@@ -12,7 +12,12 @@ import steadyslip as ss
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model import Contact, Model, Variable, build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
+from steadyslip.model.reduction import reduce_model
+from steadyslip.model.scales import natural_scales, posed, weights
 from steadyslip.model.taylor import system
+from steadyslip.motion.engine import Call
+from steadyslip.motion.jobs import Options, prepare
+from steadyslip.nonlinear.kicks.rest import rest_of
 
 ROCK = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6)
 RIG = ss.Slider(friction=ROCK, contact=ss.Constant(preload=5e6), stiffness=2e9, drive=ss.Steady(1e-6))
@@ -144,3 +149,39 @@ def test_two_contacts_have_the_eigenvalues_of_their_modes(masses):
     assert len(terms.unknowns) == len(model.variables) + 2 + 6
     with pytest.raises(ss.NotAvailable, match="2 contacts"):
         _ = model.contact
+
+
+def test_answers_are_the_same_for_everybody():
+    """An answer that is kept cannot be changed by the one who got it: the next one would get something else."""
+    point = operating_point(RIG)
+    scales, _ = natural_scales(point, reduce_model(point.model))
+    with pytest.raises(TypeError, match="item assignment"):
+        scales["w"] = 2.0
+    for array in (posed(point), weights(point).direct, *weights(point).decay):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 2.0
+
+
+def test_kicks_leave_the_scales_of_motion_alone():
+    """Steps of a run are those of before, whatever was asked of the rig in between."""
+    friction = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
+    a_rig = replace(RIG, friction=friction, stiffness=9e9, mass=1e6)
+
+    def run():
+        return ss.simulate(a_rig, ss.VelocityStep(at=0.0, to=2e-6), until=0.05)["v"].tobytes()
+
+    before = run()
+    jobs = prepare(a_rig, (), 1.0, {}, {}, Options())
+    rest_of(jobs, np.array([1e-6, 3e-3]), np.zeros(2))
+    assert run() == before
+    scales, _ = natural_scales(jobs.point, jobs.reduction)
+    assert [np.size(scale) for scale in scales.values()] == [1] * len(scales)
+
+
+def test_tables_of_other_lengths_do_not_reach_the_kernel():
+    """Machine code reads where it is told to: too few rows would be somebody else's memory."""
+    jobs = prepare(RIG, (), 1.0, {"stiffness": np.full(4, 2e9)}, {}, Options())
+    machine = jobs.program(1, dense=False)
+    tables = jobs.tables(machine, 0, 4, False, False)
+    with pytest.raises(ValueError, match="rows for 4 jobs"):
+        Call(machine, (*tables[:2], tables[2][:3], tables[3]), 4, np.empty(0))

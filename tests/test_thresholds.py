@@ -230,7 +230,7 @@ def test_unstable_cycle_bounds_the_basin():
     ("options", "message"),
     [
         ({"kick": "veloctiy"}, "velocity"),
-        ({"direction": 2}, "1 or -1"),
+        ({"direction": 2}, "allowed: 1, -1"),
         ({"reference": "during"}, "'before' or 'after'"),
         ({"precision": 0.0}, "allowed: a finite number above 0, up to 0.1"),
         ({"kick": "impulse"}, "needs a mass"),

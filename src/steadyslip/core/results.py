@@ -17,7 +17,7 @@ class ReadOnly:
 
 
 def read_only(value: Any) -> Any:
-    """A view of an array that cannot be written to; of tuples and dictionaries with such arrays in them."""
+    """A view of an array that cannot be written to; the same for arrays in tuples and dictionaries."""
     if type(value) is np.ndarray:
         view = value.view()
         view.setflags(write=False)

@@ -51,7 +51,7 @@ class Program:
 
     def constants(self, point: OperatingPoint) -> np.ndarray:
         """Constants of every rig, (rigs, number)."""
-        return _constants(point, self) if point.size == 1 else self._table(point)
+        return _constants(point, self).copy() if point.size == 1 else self._table(point)
 
     def _table(self, point: OperatingPoint) -> np.ndarray:
         found = self._constants(*map(np.asarray, point.arguments), point.stresses)

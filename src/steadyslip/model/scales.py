@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.questions import question
+from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction, reduce_model
@@ -18,7 +19,7 @@ LEAST_WEIGHT = 1e-5  # db/da below which a memory variable is not eliminated: ro
 
 
 @dataclass(frozen=True)
-class Weights:
+class Weights(ReadOnly):
     """Derivatives in steady sliding.
 
     Attributes
@@ -27,11 +28,11 @@ class Weights:
         Of friction in ln v, Pa.
     by_slip : ndarray
         Of the balance in x, Pa/m.
-    by_memory : list of ndarray
+    by_memory : tuple of ndarray
         Of friction in each memory variable.
-    decay : list of ndarray
+    decay : tuple of ndarray
         Of each memory variable's rate in itself, 1/s.
-    memory : list of ndarray
+    memory : tuple of ndarray
         The memory variables themselves.
     by_unknown : ndarray
         Of the balance in its unknown.
@@ -39,9 +40,9 @@ class Weights:
 
     direct: np.ndarray
     by_slip: np.ndarray
-    by_memory: list[np.ndarray]
-    decay: list[np.ndarray]
-    memory: list[np.ndarray]
+    by_memory: tuple[np.ndarray, ...]
+    decay: tuple[np.ndarray, ...]
+    memory: tuple[np.ndarray, ...]
     by_unknown: np.ndarray
 
 
@@ -62,7 +63,8 @@ def weights(point: OperatingPoint) -> Weights:
     found = _weights_function(point.model)(*map(np.asarray, point.arguments), point.stresses)
     direct, by_slip, by_unknown, *rest = (np.asarray(x, dtype=float) for x in found)
     count = len(point.model.memory)
-    return Weights(direct, by_slip, rest[:count], rest[count : 2 * count], rest[2 * count :], by_unknown)
+    by_memory, decay, memory = (tuple(rest[i : i + count]) for i in (0, count, 2 * count))
+    return Weights(direct, by_slip, by_memory, decay, memory, by_unknown)
 
 
 @question
@@ -93,7 +95,7 @@ def eliminable(point: OperatingPoint) -> int | None:
 
 
 @question
-def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[dict[str, Any], Any]:
+def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], Any]:
     """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance.
 
     By name; and the size of the unknown that is left to solve for, which has no name among them.

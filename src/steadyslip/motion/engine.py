@@ -45,6 +45,8 @@ class Call:
         lanes = layout.lanes
         self.advance = machine.code.advance
         self.tables, self.times = tables, times
+        if any(len(table) not in (1, size) for table in tables):  # machine code would read what is not there
+            raise ValueError(f"tables of {', '.join(str(len(table)) for table in tables)} rows for {size} jobs")
         self.work = np.zeros(layout.rows * lanes)
         self.ids = np.zeros(lanes, dtype=np.int64)
         self.cursor = np.zeros(len(Cursor), dtype=np.int64)

@@ -189,7 +189,7 @@ def rest_of(jobs: Jobs, velocity: Array, pressure: Array) -> Rest:
         state = np.where(np.all(np.isfinite(found), axis=1)[:, None], state, np.nan)
         own, _ = natural_scales(point, reduction)
         if reduction.velocity == "linear":
-            own["w"] = velocity
+            own = {**own, "w": velocity}
         scales = _columns([own[name] for name in reduction.names], count)
         left = () if reduction.unknown is None else (unknown,)
         entries = point.evaluate(_jacobian_of(reduction), velocity, pressure, *state.T, *left)

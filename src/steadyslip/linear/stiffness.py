@@ -198,14 +198,27 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 @question
-def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
-    """Everything that `closed_form_interval` needs, compiled into one function."""
+def interval_ingredients(model: Model) -> tuple[sp.Expr, ...]:
+    """N, D, μB2, μB3, a2, a3 and the gain of a controller: what `cubic.stable_interval` takes, and what is behind it.
+
+    In the model's parameters and σss; the interval is one of the total stiffness, the gain included.
+    """
     part = response(model)
     known = part.as_dict()
     del known["k"]
     numerator, denominator = _hopf_line(known)
     _, _, a2, a3 = cubic.coefficients(**known, k=sp.Integer(0))
-    wanted = [numerator, denominator, part.mu * part.B2, part.mu * part.B3, a2, a3, model.gain]
+    mu_b2, mu_b3 = part.mu * part.B2, part.mu * part.B3
+    equation = steady_equation(model)
+    if equation.affine and mu_b2 != 0 and sp.expand(mu_b2 + equation.slope) == 0 and mu_b3 == 0:
+        mu_b2 = sp.Integer(0)  # a0 > 0 is then the condition that steady sliding exists, tested anyway
+    return numerator, denominator, mu_b2, mu_b3, a2, a3, model.gain
+
+
+@question
+def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
+    """Everything that `closed_form_interval` needs, compiled into one function."""
+    wanted = interval_ingredients(model)
     equation = steady_equation(model)
     arguments = list(model.parameters.values())
     if not equation.affine:
@@ -216,9 +229,8 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
 
         return by_search
     sigma, slope = equation.sigma, equation.slope
-    if wanted[2] != 0 and sp.expand(wanted[2] + slope) == 0 and wanted[3] == 0:
-        wanted[2] = sp.Integer(0)  # a0 > 0 is then the condition that steady sliding exists, tested anyway
-    direct = array_function(arguments, [sigma, slope, *(w.xreplace({model.contact.sigma_ss: sigma}) for w in wanted)])
+    stress = {model.contact.sigma_ss: sigma}
+    direct = array_function(arguments, [sigma, slope, *(sp.sympify(w).xreplace(stress) for w in wanted)])
 
     def in_one_go(point: OperatingPoint) -> list[Array]:
         with np.errstate(divide="ignore", invalid="ignore"):

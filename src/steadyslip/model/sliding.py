@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.core.quantities import shown, stress_name
@@ -97,11 +98,15 @@ def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
     return tuple(results)
 
 
+def observed_in_steady_sliding(model: Model) -> tuple[list[str], list[sp.Expr]]:
+    """Names and steady values of all observables but x, v and the normal stress."""
+    names = [name for name in model.observables if name not in ("x", "v", "normal_stress")]
+    return names, [model.observables[name][0].xreplace(model.steady) for name in names]
+
+
 @question
 def _observable_function(model: Model) -> tuple[list[str], Callable[..., Any]]:
-    """Steady values of all observables but x, v and the normal stress."""
-    names = [name for name in model.observables if name not in ("x", "v", "normal_stress")]
-    expressions = [model.observables[name][0].xreplace(model.steady) for name in names]
+    names, expressions = observed_in_steady_sliding(model)
     return names, model.function(expressions)
 
 

@@ -103,7 +103,7 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
         if not 0 <= branch < len(states):
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
         values = operating_point(rig, None, present_zeros(rig), branch)
-        numbers = _linear_numbers(rig, values)
+        numbers = linear_numbers(rig, values)
         on_the_edge = bool(on_edge(values))
         distances = margins(rig, branch=branch)
         found = Analysis(
@@ -144,7 +144,7 @@ def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold,
     return thresholds_shown(rig, kinds, branch=branch).found
 
 
-def _linear_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
+def linear_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
     """Everything that follows from the characteristic polynomial."""
     c = characteristic(values)
     if not np.all(np.isfinite(c)):

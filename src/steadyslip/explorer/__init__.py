@@ -1,0 +1,4 @@
+"""A rig as a page for the browser: its equations as JavaScript, its numbers as data, in one file.
+
+Knows the Model, its linearisation and kernels, and prints them; nothing physical is said in JavaScript.
+"""

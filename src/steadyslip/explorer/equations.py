@@ -1,0 +1,110 @@
+"""The linear part of a rig's Model as programs: functions of its parameters and the steady normal stress.
+
+Each program reads the record R, the parameters in the Model's order and behind them σss, and writes the array y.
+`web/linear.js` asks them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.records import conditions, twin
+from steadyslip.kernels.nodes import Program
+from steadyslip.kernels.printers import javascript
+from steadyslip.kernels.source import Formulas
+from steadyslip.linear.boundary import present_zeros
+from steadyslip.linear.response import has_closed_form
+from steadyslip.linear.stiffness import interval_ingredients
+from steadyslip.machine.slider import Slider
+from steadyslip.model.build import build_model
+from steadyslip.model.equations import Model
+from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
+from steadyslip.model.sliding import observed_in_steady_sliding
+from steadyslip.model.steady import steady_equation
+
+
+def model_of(rig: Slider) -> Model:
+    """The rig's Model with what a page can vary from zero kept in it."""
+    return build_model(rig, present_zeros(rig))
+
+
+def program(model: Model, name: str, expressions: Sequence[Any]) -> Program:
+    """Expressions in the Model's parameters and σss as a program.
+
+    Raises
+    ------
+    NotAvailable
+        If an expression contains what cannot be printed; it is named.
+    """
+    made = Program(name)
+    names = {symbol: f"p{i}" for i, symbol in enumerate(model.arguments)}
+    formulas = Formulas(expressions, names)
+    used = {s.name for e in (*formulas.results, *(e for _, e in formulas.temporaries)) for s in e.free_symbols}
+    values = {n: made.load(i) for i, n in enumerate(names.values()) if n in used}
+    for place, value in enumerate(formulas(values)):
+        made.store(place, value, "y")
+    return made
+
+
+def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
+    """The linear part as an expression of JavaScript, and what must be known about it.
+
+    Returns
+    -------
+    text : str
+        An object of functions.
+    facts : dict
+        ``parameters`` (dotted names in the order of R), ``affine`` (whether `steady` gives σss; else `residual` is to
+        be solved), ``degree`` of the characteristic polynomial, ``closed`` (whether `ingredients` of the closed form
+        exist), ``observed`` (names and units of what `observables` gives).
+    """
+    model = model_of(rig)
+    equation = steady_equation(model)
+    coefficients = characteristic_coefficients(model)
+    without, slope = stiffness_split(model)
+    names, observables = observed_in_steady_sliding(model)
+    closed = has_closed_form(model)
+    programs = [
+        _steady(model) if equation.affine else program(model, "residual", [_mismatch(model)]),
+        program(model, "allowed", [_allowed(rig, model)]),
+        program(model, "coefficients", coefficients),
+        program(model, "split", [*without, *slope]),
+        program(model, "observables", observables),
+        program(model, "stiffness", [model.axial_share or 1, model.gain]),
+    ]
+    if closed:
+        programs.append(program(model, "ingredients", interval_ingredients(model)))
+    facts = {
+        "parameters": list(model.parameters),
+        "affine": equation.affine,
+        "degree": len(coefficients) - 1,
+        "closed": closed,
+        "observed": [[name, model.observables[name][1]] for name in names],
+    }
+    text = "".join(javascript.text(one) for one in programs)
+    return f"(() => {{\n{text}return {{ {', '.join(one.name for one in programs)} }};\n}})()", facts
+
+
+def _steady(model: Model) -> Program:
+    """σss (NaN where there is none), its coupling and its load, where that is a formula."""
+    equation = steady_equation(model)
+    sigma, slope = sp.sympify(equation.sigma), sp.sympify(equation.slope)
+    exists = sp.And(slope < 1, sp.StrictGreaterThan(sigma, 0, evaluate=False))
+    load = sigma if equation.given else sigma * (1 - slope)
+    return program(model, "steady", [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, load])
+
+
+def _mismatch(model: Model) -> sp.Expr:
+    return model.contact.steady_stress - model.contact.sigma_ss
+
+
+def _allowed(rig: Slider, model: Model) -> sp.Expr:
+    """1 where the conditions that several numbers obey together hold, else 0."""
+    symbols: dict[str, Any] = dict(model.parameters)
+    relations = [condition.holds for _, condition in conditions(twin(rig, symbols))]
+    holds = [one if isinstance(one, sp.Basic) else sp.sympify(bool(np.all(one))) for one in relations]
+    return sp.Piecewise((1, sp.And(*holds)), (0, True))

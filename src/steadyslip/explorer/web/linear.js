@@ -1,0 +1,145 @@
+// What a rig's linear equations say at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
+// The equations themselves are generated (steadyslip/explorer/equations.py).
+import { dampingOfPairs, halfLines, isHurwitz, isIllPosed, roots, stableSet } from "./polynomials.js";
+
+/** @typedef {import("./polynomials.js").Complex} Complex */
+/** @typedef {import("./polynomials.js").Interval} Interval */
+/** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
+/** @typedef {{parameters: string[], affine: boolean, degree: number, closed: boolean, observed: [string, string][]}} Facts */
+
+export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
+const ON_THE_EDGE = 1e-9, SEARCHED = 6001;
+
+export class Linear {
+  /**
+   * @param {Programs} programs
+   * @param {Facts} facts
+   */
+  constructor(programs, facts) {
+    this.programs = programs;
+    this.facts = facts;
+    this.count = facts.parameters.length;
+    this.R = new Float64Array(this.count + 1);
+    this.y = new Float64Array(Math.max(8, 2 * facts.degree + 2, facts.observed.length));
+    this.c = new Float64Array(facts.degree + 1);
+  }
+
+  /** What a program gives. @param {string} name @param {number} many */
+  ask(name, many) {
+    this.programs[name](this.R, 0, this.y);
+    return Array.from(this.y.subarray(0, many));
+  }
+
+  /** Parameters in the Model's order. @param {ArrayLike<number>} values */
+  set(values) {
+    this.R.set(values);
+    return this;
+  }
+
+  /** All steady normal stresses, rising; and whether numbers left the range of floating point. */
+  stresses() {
+    if (!this.facts.affine) return { found: this.searched(), lost: false, slope: NaN, load: NaN };
+    const [sigma, slope, load] = this.ask("steady", 3);
+    return { found: sigma > 0 ? [sigma] : [], lost: !Number.isFinite(slope) || !Number.isFinite(load), slope, load };
+  }
+
+  /** Roots of the balance over thirty decades of stress, each bracketed by a change of sign. */
+  searched() {
+    const found = [], at = (sigma) => {
+      this.R[this.count] = sigma;
+      this.programs.residual(this.R, 0, this.y);
+      return this.y[0];
+    };
+    let low = 1e-12, below = at(low);
+    for (let i = 1; i < SEARCHED; i++) {
+      const high = 10 ** (-12 + (30 * i) / (SEARCHED - 1)), above = at(high);
+      if (above === 0) found.push(high);
+      else if (below * above < 0) {
+        const root = bracketed(at, low, high, below);
+        if (Math.abs(at(root)) <= 1e-6 * root) found.push(root); // a pole changes sign too
+      }
+      [low, below] = [high, above];
+    }
+    return found;
+  }
+
+  /** ABSENT, STABLE, UNSTABLE (ill-posed too) or UNKNOWN: what charts and tracks are painted with. */
+  status(branch = 0) {
+    if (this.ask("allowed", 1)[0] !== 1) return UNKNOWN;
+    const { found, lost } = this.stresses();
+    if (lost) return UNKNOWN;
+    if (!(found.length > branch)) return ABSENT;
+    this.R[this.count] = found[branch];
+    this.programs.coefficients(this.R, 0, this.c);
+    for (const value of this.c) if (!Number.isFinite(value)) return UNKNOWN;
+    return isHurwitz(this.c) ? STABLE : UNSTABLE;
+  }
+
+  /** The whole answer at the parameters that are set. */
+  assess(branch = 0) {
+    const status = this.status(branch), { found, slope, load } = this.stresses();
+    const answer = { status, sigma: found.length > branch ? found[branch] : NaN, states: found.length, slope, load };
+    if (status === ABSENT || status === UNKNOWN) return { ...answer, ...NOTHING };
+    this.R[this.count] = answer.sigma;
+    const degree = this.facts.degree, c = this.ask("coefficients", degree + 1);
+    const eigenvalues = roots(c), both = this.ask("split", 2 * degree + 2);
+    const p = both.slice(0, degree + 1), q = both.slice(degree + 1), own = this.R[this.facts.parameters.indexOf("slider.stiffness")];
+    const { intervals, ends } = this.stableStiffness(p, q);
+    const critical = ends.length ? ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a)) : null;
+    const [share, gain] = this.ask("stiffness", 2);
+    const at = critical === null ? [] : roots(p.map((v, i) => v + critical * q[i]));
+    const swing = at.filter((s) => s.im > 0).sort((a, b) => Math.abs(a.re) / a.im - Math.abs(b.re) / b.im)[0];
+    const edgewise = swing && Math.abs(swing.re) < 1e-6 * swing.im ? swing.im : 0;
+    const fixed = p[0] + own * q[0], statics = Math.abs(fixed) / (Math.abs(p[0]) + Math.abs(own * q[0]));
+    const observed = this.ask("observables", this.facts.observed.length);
+    return {
+      ...answer, eigenvalues, intervals, critical, share, gain, stiffness: own,
+      illPosed: isIllPosed(c),
+      side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
+      frequency: critical === null ? null : edgewise,
+      onEdge: Math.abs(0.5 * dampingOfPairs(eigenvalues)) <= ON_THE_EDGE || statics <= ON_THE_EDGE,
+      observed: Object.fromEntries(this.facts.observed.map(([name], i) => [name, observed[i]])),
+    };
+  }
+
+  /** Stable k > 0, and the ends where stability changes; the closed form where there is one, which keeps its digits. */
+  stableStiffness(p, q) {
+    if (!this.facts.closed) {
+      const { intervals, edges } = stableSet(p, q);
+      return { intervals, ends: edges.map((edge) => edge.k) };
+    }
+    const [numerator, denominator, muB2, muB3, a2, a3, gain] = this.ask("ingredients", 7);
+    const whole = a2 > 0 && a3 >= 0 ? halfLines([[denominator, numerator], [1 + muB2, -muB3]]) : null;
+    const intervals = whole && whole.high > gain ? [{ low: Math.max(whole.low - gain, 0), high: whole.high - gain }] : [];
+    const ends = intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k));
+    return { intervals, ends };
+  }
+}
+
+const NOTHING = {
+  eigenvalues: /** @type {Complex[]} */ ([]), intervals: /** @type {Interval[]} */ ([]), critical: null, side: null,
+  frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false,
+  observed: /** @type {Record<string, number>} */ ({}),
+};
+
+/** A root between two values of different sign: regula falsi (Illinois), then bisection while it does not narrow. */
+function bracketed(at, low, high, below) {
+  let above = at(high), side = 0;
+  for (let i = 0; i < 200 && high - low > 1e-15 * low; i++) {
+    let middle = i < 100 ? high - (above * (high - low)) / (above - below) : 0.5 * (low + high);
+    if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
+    if (middle === low || middle === high) break;
+    const value = at(middle);
+    if (value === 0) return middle;
+    if (value > 0 === below > 0) {
+      [low, below] = [middle, value];
+      if (side === 1) above *= 0.5;
+      side = 1;
+    } else {
+      [high, above] = [middle, value];
+      if (side === -1) below *= 0.5;
+      side = -1;
+    }
+  }
+  return Math.abs(at(low)) < Math.abs(at(high)) ? low : high;
+}

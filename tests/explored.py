@@ -1,0 +1,78 @@
+"""A rig's answers in JavaScript beside Python's: what the tests of the explorer and its campaign compare."""
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from types import SimpleNamespace
+
+import numpy as np
+
+from javascript import Script
+from steadyslip.explorer.equations import linear_part
+from steadyslip.kernels.printers import javascript
+from steadyslip.linear.boundary import present_zeros
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge
+from steadyslip.model.point import operating_point
+from steadyslip.verdict.analyze import linear_numbers
+
+
+@cache
+def library():
+    web = files("steadyslip.explorer.web")
+    modules = [web.joinpath(name).read_text(encoding="utf-8") for name in ("polynomials.js", "linear.js")]
+    return javascript.as_script(javascript.runtime(), *modules)
+
+
+class Explored:
+    """One kind of rig as JavaScript, which answers at the numbers of any rig of that kind."""
+
+    def __init__(self, rig):
+        self.present = present_zeros(rig)
+        text, facts = linear_part(rig)
+        self.script = Script(f"{library()}\nconst linear = new Linear({text}, {json.dumps(facts)});")
+
+    def __call__(self, rig, branch=0):
+        point = operating_point(rig, None, self.present)
+        return self.script("linear.set(values).assess(branch)", values=list(map(float, point.arguments)), branch=branch)
+
+
+@dataclass
+class Difference:
+    """How far the two are apart: verdicts in a word each, the rest relative."""
+
+    verdicts: tuple
+    critical: float
+    eigenvalues: float
+    ends: float
+
+
+def compared(explored, rig, branch=0):
+    """Python's verdict on a rig beside that of its JavaScript."""
+    point, found = operating_point(rig, None, explored.present, branch), explored(rig, branch)
+    if not point.sigma > 0 or found["status"] == ABSENT:
+        return Difference((ABSENT if not point.sigma > 0 else None, found["status"]), 0.0, 0.0, 0.0)
+    with np.errstate(all="ignore"):
+        analysis = SimpleNamespace(**{"critical_stiffness": None} | linear_numbers(rig, point))
+        verdicts = (STABLE if analysis.stable else UNSTABLE, bool(on_edge(point))), (found["status"], found["onEdge"])
+    apart = Difference(verdicts, 0.0, 0.0, 0.0)
+    ours, theirs = analysis.critical_stiffness, found["critical"]
+    if (ours is None) != (theirs is None) or len(found["intervals"]) != len(analysis.stable_stiffness):
+        return Difference(verdicts, np.inf, np.inf, np.inf)
+    if ours is not None:
+        gain = float(rig.drive.proportional())
+        apart.critical = abs(ours - theirs) / (abs(ours) + gain)
+        side = (analysis.critical_side, bool(analysis.critical_angular_frequency))
+        theirs_too = found["side"], found["frequency"] > 0
+        apart.verdicts = (*verdicts[0], *side), (*verdicts[1], *theirs_too)
+    intervals = np.array([[one["low"], one["high"]] for one in found["intervals"]]).reshape(-1, 2)
+    own = np.array(analysis.stable_stiffness).reshape(-1, 2)
+    with np.errstate(invalid="ignore"):
+        distance = np.abs(intervals - own) / (np.abs(own) + float(rig.drive.proportional()) + 1e-300)
+    apart.ends = float(np.nanmax(np.where(intervals == own, 0.0, distance), initial=0.0))
+    numbers = np.array([complex(s["re"], s["im"]) for s in found["eigenvalues"]])
+    truth = np.array(analysis.eigenvalues)
+    if len(numbers) != len(truth):
+        return Difference(apart.verdicts, apart.critical, np.inf, apart.ends)
+    apart.eigenvalues = float(np.max(np.abs(numbers - truth) / np.abs(truth), initial=0.0))
+    return apart

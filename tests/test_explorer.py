@@ -1,0 +1,178 @@
+"""The explorer: its equations say in JavaScript what they say in Python, and its page holds what it promises."""
+
+import json
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import assume, given, settings, strategies as st
+
+import steadyslip as ss
+from explored import Explored, compared, library
+from fuzz_rigs import DRIVES, FRICTION
+from javascript import Script
+from rigs_of_theory import CONTACTS, SIGMA, V0, rig
+from steadyslip.core.roles import positive
+from steadyslip.explorer.equations import linear_part
+from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
+
+FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
+BEFORE = [dict(family.registry) for family in FAMILIES]
+
+
+class Viscous(ss.FrictionLaw, name="viscous-of-tests"):
+    """A user's law: the slip law with viscous friction that saturates."""
+
+    a: float = ss.parameter("1", positive, "direct effect")
+    b: float = ss.parameter("1", positive, "evolution effect")
+    d_c: float = ss.parameter("m", positive, "slip distance")
+    level: float = ss.parameter("1", positive, "friction at 1 µm/s")
+    film: float = ss.parameter("Pa", positive, "viscous stress of a fast block")
+
+    def memory(self):
+        return ("age",)
+
+    def strength(self, v, sigma, memory, tau):
+        dry = sigma * (self.level + self.a * sp.log(v / V0) + self.b * memory[0])
+        return dry + self.film * sp.tanh(v / (1000 * V0))
+
+    def rates(self, v, sigma, memory, tau):
+        return (-v / self.d_c * (sp.log(v / V0) + memory[0]),)
+
+    def steady_memory(self, v, sigma):
+        return (-sp.log(v / V0),)
+
+
+class Asperities(ss.PreloadedContact, name="asperities-of-tests"):
+    """A user's contact, not linear in the stresses: σ = σ0 + c √(T p)."""
+
+    share: float = ss.parameter("1", positive, "share c")
+    pressure: float = ss.parameter("Pa", positive, "pressure p")
+
+    def coupling(self, motion):
+        return self.share * sp.sqrt(motion.spring * self.pressure)
+
+
+class Turning(ss.PreloadedContact, name="turning-of-tests"):
+    """A user's contact with a function that no kernel has."""
+
+    def coupling(self, motion):
+        return 1e5 * sp.atan(motion.friction / 1e6)
+
+
+for family, registry in zip(FAMILIES, BEFORE, strict=True):
+    family.registry = registry
+
+VISCOUS = Viscous(a=0.0145, b=0.016, d_c=1e-6, level=0.7, film=1e5)
+USERS = {
+    "friction law": rig(friction=VISCOUS, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5)),
+    "contact law": rig(contact=Asperities(preload=SIGMA, share=0.3, pressure=2e6)),
+}
+BAR = 1e-12
+
+
+# -- polynomials
+
+NUMBERS = st.floats(-3, 3, allow_nan=False)
+
+
+@pytest.fixture(scope="module")
+def script():
+    return Script(library())
+
+
+@settings(max_examples=60, deadline=None)
+@given(real=st.lists(NUMBERS, max_size=3), pairs=st.lists(st.tuples(NUMBERS, st.floats(0.01, 3)), max_size=2))
+def test_roots_are_those_that_a_polynomial_was_made_of(script, real, pairs):
+    """Backward stable: the coefficients of the roots found are those given, to some units of the last place."""
+    made = [*real, *(complex(a, b) for a, b in pairs), *(complex(a, -b) for a, b in pairs)]
+    assume(all(abs(a - b) > 1e-2 for i, a in enumerate(made) for b in made[:i]))
+    c = np.atleast_1d(np.poly(made)).real[::-1]
+    found = script("roots(c)", c=c)
+    assert len(found) == len(c) - 1
+    numbers = np.array([complex(s["re"], s["im"]) for s in found])
+    again = np.atleast_1d(np.poly(numbers))[::-1]
+    assert np.all(np.abs(again - c) <= 1e-12 * np.atleast_1d(np.poly(-np.abs(numbers))).real[::-1])
+    assert all(s["im"] == 0 or any(t["im"] == -s["im"] and t["re"] == s["re"] for t in found) for s in found)
+
+
+def test_polynomials_are_judged_as_in_python(script):
+    rng = np.random.default_rng(2)
+    for n in (2, 3, 4, 5):
+        for _ in range(40):
+            p, q = 10.0 ** rng.uniform(-4, 4, (2, n + 1)) * rng.choice([1, 1, 1, -1], (2, n + 1))
+            q[n] = 0.0
+            if rng.random() < 0.3:
+                p[n] = 0.0
+            assert script("isHurwitz(p)", p=p) == bool(is_hurwitz(p))
+            mine = np.array([complex(s["re"], s["im"]) for s in script("roots(p)", p=p)])
+            truth = roots(p)
+            truth = truth[np.isfinite(truth)]
+            truth = truth[np.lexsort((-truth.imag, -truth.real))]
+            assert np.all(np.abs(mine - truth) <= BAR * np.abs(truth))
+            found, expected = script("stableSet(p, q)", p=p, q=q), stable_set(p, q)
+            intervals = np.array([[one["low"], one["high"]] for one in found["intervals"]]).reshape(-1, 2)
+            kept = expected.intervals[np.isfinite(expected.intervals[:, 0])]
+            assert np.allclose(intervals, kept, rtol=1e-10, atol=0)
+
+
+@pytest.mark.parametrize("middle", [-1.0, -1e-6, 2e5])
+def test_double_roots_keep_their_digits(script, middle):
+    """Two equal roots beside a fast one: to half the digits only, were each found by itself."""
+    c = np.poly([middle, middle, -1e3 * abs(middle)])[::-1]
+    found = script("roots(c)", c=c)
+    near = [s for s in found if abs(s["re"] / middle - 1) < 0.1]
+    assert len(near) == 2
+    assert all(abs(complex(s["re"], s["im"]) / middle - 1) < 1e-7 for s in near)
+    assert abs((near[0]["re"] + near[1]["re"]) / (2 * middle) - 1) < 1e-12
+
+
+# -- the verdict
+
+ALL = [(f, c, m, d) for f in range(len(FRICTION)) for c in range(len(CONTACTS)) for m in (0.0, 1e6) for d in range(3)]
+SAMPLE = [ALL[i] for i in np.random.default_rng(16).permutation(len(ALL))[:14]]
+
+
+def agrees(apart):
+    assert apart.verdicts[0] == apart.verdicts[1]
+    assert apart.critical <= BAR
+    assert apart.ends <= BAR
+    assert apart.eigenvalues <= BAR
+
+
+@pytest.mark.parametrize(("law", "contact", "mass", "drive"), SAMPLE)
+def test_verdicts_are_those_of_python(law, contact, mass, drive):
+    own = ss.Slider(friction=FRICTION[law], contact=CONTACTS[contact], stiffness=9e9, mass=mass, drive=DRIVES[drive])
+    explored = Explored(own)
+    for factor in (1.0, 0.01, 100.0):
+        agrees(compared(explored, own.with_values({"stiffness": 9e9 * factor})))
+
+
+@pytest.mark.parametrize("who", USERS)
+def test_verdicts_on_users_laws_are_those_of_python(who):
+    explored = Explored(USERS[who])
+    for factor in (1.0, 0.01, 100.0):
+        agrees(compared(explored, USERS[who].with_values({"stiffness": 9e9 * factor})))
+
+
+def test_where_there_is_no_steady_sliding_it_says_so():
+    locked = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0))
+    found = Explored(locked)(locked)
+    assert found["status"] == 0
+    assert found["slope"] > 1
+    agrees(compared(Explored(locked), locked))
+
+
+def test_conditions_between_numbers_are_checked():
+    crank = rig(contact=ss.SliderCrank(preload=SIGMA, crank_angle=1.0, crank_radius=0.1, rod_length=0.3))
+    explored = Explored(crank)
+    place = json.loads(json.dumps(linear_part(crank)[1]))["parameters"].index("contact.rod_length")
+    explored(crank)
+    values = explored.script("Array.from(linear.R)")[:-1]
+    values[place] = 0.05
+    assert explored.script("linear.set(values).status()", values=values) == 3
+
+
+def test_what_cannot_be_printed_is_refused_in_words():
+    with pytest.raises(ss.NotAvailable, match=r"atan\(\.\.\.\)"):
+        linear_part(rig(contact=Turning(preload=SIGMA)))

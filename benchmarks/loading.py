@@ -1,21 +1,24 @@
 """How well do default fits find the truth when sensors are noisy, glitch and slip? A table by cell.
 
-    python benchmarks/loading.py [--replicates 200] [--designs steps,holds,...] [--noise 0,30,140] [--seed 1]
+    python benchmarks/loading.py replicates.csv [--replicates 200] [--minutes 60] [--noise 0,30,140] ...
 
 Records are made by an integrator of their own: the equations typed by hand, SciPy's LSODA, restarted at every change of
 the loading. Every cell is one design, noise of the displacement (nm), glitches of 2 to 5 um, slips of the sensor's
 level, noise of the normal stress. Reported, over all replicates: mean deviation in quoted errors (bias), and how often
 68 and 95 % intervals contain the truth, for a, b, d_c, stiffness and (where normal stress changes) alpha; and how often
-the loading was found with the right number of changes.
+the loading was found with the right number of changes. Every replicate has noise of its own; the file is added to, so
+that a campaign can be ended and gone on with, all cells side by side.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
-import sys
 import time as clock
+from collections import Counter
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -122,63 +125,106 @@ def spoiled(
     return found
 
 
-def cell(name: str, noise: float, glitches: int, slips: int, stress_noise: float, count: int, seed: int) -> str:
-    """One line of the table."""
+@dataclass(frozen=True)
+class Cell:
+    """One design and its sensors: noise in nm, numbers of glitches and of slips, noise of the stress as a share."""
+
+    design: str
+    noise: float
+    glitches: int
+    slips: int
+    stress_noise: float
+
+    def __str__(self) -> str:
+        return f"{self.design},{self.noise:g},{self.glitches},{self.slips},{self.stress_noise:g}"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return QUANTITIES if DESIGNS[self.design].pressed else QUANTITIES[:4]
+
+
+@cache
+def clean(name: str) -> tuple[np.ndarray, ...]:
+    """Time, friction, displacement and normal stress without noise."""
     design = DESIGNS[name]
     t = np.arange(0.0, design.until, design.spacing)
-    clean, load, stress = truth(design, t), design.load(t), design.stress(t)
-    names = QUANTITIES if design.pressed else QUANTITIES[:4]
-    deviations, right, failed, begin = [], 0, 0, clock.perf_counter()
+    return t, truth(design, t), design.load(t), design.stress(t)
+
+
+def replicate(cell: Cell, seed: int, i: int) -> str:
+    """One line: the cell, its replicate, whether the loading was found, CPU seconds, deviations in quoted errors."""
+    design = DESIGNS[cell.design]
+    t, friction, load, stress = clean(cell.design)
+    rng = np.random.default_rng([seed, i, *str(cell).encode()])
+    record = ss.record_from_arrays(
+        t, friction=friction + correlated(rng, len(t)),
+        normal=1e6 * stress * (1 + cell.stress_noise * rng.standard_normal(len(t))),
+        displacement=1e-6 * spoiled(rng, t, load, cell.noise, cell.glitches, cell.slips),
+    )  # fmt: skip
     rig = ss.lab_rig(normal_memory="linker-dieterich" if design.pressed else "none")
-    for i in range(count):
-        rng = np.random.default_rng([seed, i])
-        record = ss.record_from_arrays(
-            t, friction=clean + correlated(rng, len(t)),
-            normal=1e6 * stress * (1 + stress_noise * rng.standard_normal(len(t))),
-            displacement=1e-6 * spoiled(rng, t, load, noise, glitches, slips),
-        )  # fmt: skip
-        course = record.loading.load
-        right += course is not None and course.curve is None and len(course.changes) == len(design.rates) - 1
-        try:
-            fit = ss.fit(rig, record)
-        except (ss.NotAvailable, ss.ParameterError):
-            failed += 1
-            continue
-        z, deviation = fit.coordinates, np.sqrt(np.diag(fit.covariance))
-        own = []
-        for name_of in names:
-            k = fit.index(name_of)
-            own.append((z[k] - fit.space.unknowns[k].coordinate(TRUTH[name_of])) / deviation[k])
-        deviations.append(own)
-    z = np.array(deviations).reshape(-1, len(names))
-    with np.errstate(all="ignore"):
+    begin = clock.process_time()
+    course = record.loading.load
+    right = course is not None and course.curve is None and len(course.changes) == len(design.rates) - 1
+    own: list[float] = []
+    try:
+        fit = ss.fit(rig, record)
+    except (ss.NotAvailable, ss.ParameterError):
+        pass
+    else:
+        for name in cell.names:
+            k = fit.index(name)
+            off = fit.coordinates[k] - fit.space.unknowns[k].coordinate(TRUTH[name])
+            own.append(float(off / np.sqrt(fit.covariance[k, k])))
+    seconds = clock.process_time() - begin
+    return ",".join([str(cell), str(i), str(int(right)), f"{seconds:.3f}", *(f"{z:.4f}" for z in own)])
+
+
+def table(path: Path) -> None:
+    """What a file of replicates says, cell by cell."""
+    found: dict[Cell, list[list[float]]] = {}
+    for line in path.read_text().splitlines():
+        name, noise, glitches, slips, stress, _, *numbers = line.split(",")
+        cell = Cell(name, float(noise), int(glitches), int(slips), float(stress))
+        found.setdefault(cell, []).append([float(x) for x in numbers])
+    print("design             nm gl sl  sig %     n right fail  CPU s | quantity: bias in errors, within 68 and 95 %")
+    for cell, rows in found.items():
+        z = np.array([row[2:] for row in rows if len(row) > 2]).reshape(-1, len(cell.names))
+        right, seconds = np.mean([row[0] for row in rows]), np.median([row[1] for row in rows])
         parts = []
-        for n, column in zip(names, z.T, strict=True):
-            shares = [float(np.mean(np.abs(column) < limit)) for limit in (0.9945, 1.96)]
-            parts.append(f"{n.rpartition('.')[2]:>9} {np.nanmean(column):+5.2f} {shares[0]:4.2f} {shares[1]:4.2f}")
-    seconds = (clock.perf_counter() - begin) / max(count, 1)
-    head = f"{name:<16} {noise:>4.0f} {glitches:>2} {slips:>2} {1e2 * stress_noise:5.2f}"
-    return f"{head}  {right / count:5.2f} {failed:>3} {seconds:6.2f} |" + " |".join(parts)
+        for n, column in zip(cell.names, z.T, strict=True):
+            known = column[np.isfinite(column)]
+            shares = [float(np.mean(np.abs(known) < limit)) for limit in (0.9945, 1.96)]
+            parts.append(f"{n.rpartition('.')[2]:>9} {np.mean(known):+5.2f} {shares[0]:4.2f} {shares[1]:4.2f}")
+        head = f"{cell.design:<16} {cell.noise:>4.0f} {cell.glitches:>2} {cell.slips:>2} {1e2 * cell.stress_noise:5.2f}"
+        print(f"{head} {len(rows):>5} {right:5.2f} {len(rows) - len(z):>4} {seconds:6.2f} |" + " |".join(parts))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--replicates", type=int, default=200)
+    parser.add_argument("file", type=Path, help="of replicates, one a line; it is added to")
+    parser.add_argument("--replicates", type=int, default=200, help="up to so many a cell, counting those in the file")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="end after so long")
     parser.add_argument("--designs", default=",".join(DESIGNS))
-    parser.add_argument("--noise", default="0,30,140", help="of the displacement, nm")
-    parser.add_argument("--glitches", default="0,4")
-    parser.add_argument("--slips", default="0,3")
-    parser.add_argument("--stress-noise", default="0,0.0005", help="as a share")
+    parser.add_argument("--noise", default="140,0,30", help="of the displacement, nm")
+    parser.add_argument("--glitches", default="4,0")
+    parser.add_argument("--slips", default="3,0")
+    parser.add_argument("--stress-noise", default="0.0005,0", help="as a share")
     parser.add_argument("--seed", type=int, default=1)
     chosen = parser.parse_args()
-    print("design             nm gl sl  sig %  right fail s/fit | quantity: bias in errors, share within 68 and 95 %")
-    lists = [
-        [float(x) for x in text.split(",")]
-        for text in (chosen.noise, chosen.glitches, chosen.slips, chosen.stress_noise)
-    ]
-    for name, noise, glitches, slips, stress in itertools.product(chosen.designs.split(","), *lists):
-        print(cell(name, noise, int(glitches), int(slips), stress, chosen.replicates, chosen.seed))
-        sys.stdout.flush()
+    end = clock.monotonic() + 60 * chosen.minutes
+    lists = [[float(x) for x in text.split(",")]
+             for text in (chosen.noise, chosen.glitches, chosen.slips, chosen.stress_noise)]  # fmt: skip
+    cells = [Cell(name, noise, int(g), int(s), stress) for noise, g, s, stress, name in
+             itertools.product(*lists, chosen.designs.split(","))]  # fmt: skip
+    done = chosen.file.read_text().splitlines() if chosen.file.exists() else []
+    count = Counter(",".join(line.split(",")[:5]) for line in done)
+    with chosen.file.open("a") as file:
+        for i in range(chosen.replicates):
+            for cell in cells:
+                if count[str(cell)] <= i and clock.monotonic() < end:
+                    file.write(replicate(cell, chosen.seed, i) + "\n")
+                    file.flush()
+    table(chosen.file)
 
 
 if __name__ == "__main__":

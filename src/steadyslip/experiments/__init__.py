@@ -1,6 +1,7 @@
 """Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig."""
 
 from steadyslip.experiments.answers.laws import LawComparison, compare, compare_laws
+from steadyslip.experiments.answers.population import Population, population
 from steadyslip.experiments.answers.precision import Precision, best_protocol, precision
 from steadyslip.experiments.answers.predict import Prediction, predict
 from steadyslip.experiments.answers.uncertainty import Draws, Profile, bootstrap, normal_draws, posterior, profile
@@ -18,6 +19,7 @@ __all__ = [
     "Estimate",
     "Fit",
     "LawComparison",
+    "Population",
     "Precision",
     "Prediction",
     "Profile",
@@ -33,6 +35,7 @@ __all__ = [
     "lab_rig",
     "load_fit",
     "normal_draws",
+    "population",
     "posterior",
     "precision",
     "predict",

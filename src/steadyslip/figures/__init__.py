@@ -10,13 +10,14 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from steadyslip.core.pictures import register_figures
-from steadyslip.experiments import Draws, Fit, LawComparison, Prediction, Profile, Record
+from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction, Profile, Record
 from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
 from steadyslip.figures.experiments.answers import comparison, prediction, profile, ranking
 from steadyslip.figures.experiments.corners import corner
 from steadyslip.figures.experiments.fits import fit, steps
+from steadyslip.figures.experiments.populations import population
 from steadyslip.figures.experiments.records import record
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.map_results import refined, sensitivity
@@ -40,6 +41,7 @@ __all__ = [
     "hopf_curve",
     "map_figure",
     "phase_plane",
+    "population",
     "prediction",
     "profile",
     "ranking",
@@ -67,6 +69,7 @@ register_figures(Fit, fit=fit, steps=steps, corner=corner)
 register_figures(Draws, corner=corner)
 register_figures(Profile, profile=profile)
 register_figures(LawComparison, comparison=comparison)
+register_figures(Population, population=population)
 register_figures(Ranking, ranking=ranking)
 register_figures(Prediction, prediction=prediction)
 register_figures(MapResult, map=map_figure)

@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import THREADS, checked
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
-from steadyslip.experiments.fitting.nested import from_simpler, simpler
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.search import MOST, Told, ordered, searched
 from steadyslip.experiments.fitting.settings import STARTS
-from steadyslip.experiments.fitting.starts import search_bounds, starting_points
-from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.loading.loading import shifted
-from steadyslip.experiments.measured.record import Record, transient_rows
-from steadyslip.experiments.numerics.least_squares import SAME, Minima, minimise
-from steadyslip.experiments.numerics.noise import DETECTED, describe, lag_one, white
+from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.noise import describe, white
 from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
-THIN = 400  # samples on which many starts are tried
-MOST = 300  # iterations on all samples
 BETTER = 1e-6  # reduction of the sum of squares, as a share, that makes another minimum of it
-ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
-FINALISTS = 8  # of them that go on with all samples: one vector of lanes
-INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
-
-Told = Callable[[str, int, float], None]
-"""What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
 
 
 @checked(threads=THREADS)  # the others are declared as settings, for files too
@@ -124,10 +113,10 @@ def fit(
         trend_axis=trend_axis, offset=offset, loss=loss, width=width, weights=weights, errors=errors, starts=starts,
     )  # fmt: skip
     if plan.loss != "linear" and plan.width is None:
-        first, _, _ = _searched(replace(plan, loss="linear"), starts, threads, progress)
+        first, _, _ = searched(replace(plan, loss="linear"), starts, threads, progress)
         comparison = replace(plan, loss="linear").comparison(threads)
         plan = check_width(plan, comparison.residuals(first.coordinates[:1])[0][0])
-    found, search, bounds = _searched(plan, starts, threads, progress)
+    found, search, bounds = searched(plan, starts, threads, progress)
     return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
 
 
@@ -147,127 +136,10 @@ def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
     ends = minimise(lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST).sorted()
     if not ends.ssq[0] < result.ssq * (1 - BETTER):
         return result
-    found = _ordered(ends.coordinates, space)[0]
+    found = ordered(ends.coordinates, space)[0]
     errors = "correlated" if result.correlated else "independent"
     search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
     return finished(plan, comparison, found, search, errors, result.bounds)
-
-
-def _searched(
-    plan: Plan, starts: int, threads: int | None, progress: Told | None
-) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
-    """The best minimum: from several starts on few samples, the best of those on all.
-
-    A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
-    then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
-    from where these end.
-    """
-    space, whole = plan.space(), plan.comparison(threads)
-    quick = replace(_thinned(plan), rtol=1e-5).comparison(threads)
-    low, high = search_bounds(whole.parts, space)
-    rough = Minima(np.empty((0, len(space))), np.empty(0), np.empty(0, dtype=bool), np.empty(0, dtype=int))
-
-    def told(what: str, among: Comparison) -> Callable[[Minima], None]:
-        def tell(ends: Minima) -> None:
-            if progress is not None:
-                tried, least = len(rough.ssq), float(np.min(ends.ssq, initial=np.inf))
-                progress(what, tried, float(np.sqrt(least / among.size)))
-
-        return tell
-
-    for upto in dict.fromkeys((-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts)):
-        begin = starting_points(whole.parts, space, upto - len(rough.ssq), len(rough.ssq))
-        rough = rough + minimise(
-            lambda z, _: quick.residuals(z), begin, low, high, most=40, tolerance=1e-4, race=ENOUGH,
-            told=told("searching", quick),
-        )  # fmt: skip
-        if not np.any(np.isfinite(rough.ssq)):
-            continue
-        arrived = int(np.sum(rough.ssq <= np.min(rough.ssq) * (1 + SAME)))
-        if arrived < ENOUGH or (upto < starts and arrived < upto / 3):
-            continue
-        found = _polished(whole, rough, low, high, told("refining", whole))
-        if upto >= starts or not _leaves_structure(whole, found.coordinates[0]):
-            break
-    else:
-        if not np.any(np.isfinite(rough.ssq)):
-            raise NotAvailable(
-                "the model cannot follow these records from any start; are law and drive those of the experiment?"
-            )
-        found = _polished(whole, rough, low, high, told("refining", whole))
-    models = simpler(space, plan.rig.parameters())
-    if models:
-        begin = from_simpler(models, quick, whole, rough.sorted().coordinates, low, high, told("refining", whole))
-        ends = minimise(lambda z, _: whole.residuals(z), begin, low, high, most=MOST, told=told("refining", whole))
-        found = (found + ends).sorted()
-    if not np.isfinite(found.ssq[0]):
-        raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
-    worse = np.concatenate([found.ssq / found.ssq[0], rough.ssq[rough.converged] / np.min(rough.ssq)])
-    others = sorted({float(f"{x:.3g}") for x in worse if np.isfinite(x) and x > 1 + SAME})
-    search = SearchStory(len(rough.ssq), arrived, tuple(others), int(found.iterations[0]), bool(found.converged[0]))
-    found.coordinates = _ordered(found.coordinates, space)
-    return found, search, (low, high)
-
-
-def _polished(whole: Comparison, rough: Minima, low: Array, high: Array, told: Callable[[Minima], None]) -> Minima:
-    """The best of rough minima brought to their end, the best first."""
-    begin = rough.distinct(FINALISTS)
-    found = minimise(lambda z, _: whole.residuals(z), begin, low, high, most=MOST, race=1, told=told)
-    begin = _released(whole.space, found.coordinates[int(np.argmin(found.ssq))], low, high)
-    if len(begin):
-        found = found + minimise(lambda z, _: whole.residuals(z), begin, low, high, most=MOST, told=told)
-    return found.sorted()
-
-
-def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
-    """The same point with times that ran to the end of their windows put back inside, (0 or more, p).
-
-    Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
-    """
-    times = np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
-    ended = times & ((coordinates <= low) | (coordinates >= high))
-    if not np.any(ended):
-        return np.empty((0, len(coordinates)))
-    share = np.array(INSIDE)[:, None]
-    return np.where(ended, low + share * np.where(ended, high - low, 0.0), coordinates)
-
-
-def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
-    """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
-    r = whole.residuals(coordinates[None])[0][0]
-    return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
-
-
-def _ordered(coordinates: Array, space: Space) -> Array:
-    """States by rising slip distance, so that equal minima look equal."""
-    members: dict[tuple[int | None, str], dict[str, dict[str, int]]] = {}
-    for i, one in enumerate(space.unknowns):
-        owner, _, last = one.parameter.rpartition(".")
-        family, _, number = owner.rpartition(".")
-        if number.isdigit():
-            members.setdefault((one.record, family), {}).setdefault(number, {})[one.kind or last] = i
-    found = coordinates.copy()
-    for family_members in members.values():
-        states = list(family_members.values())
-        if len(states) < 2 or any(set(s) != set(states[0]) or "slip distance" not in s for s in states):
-            continue
-        ranks = np.argsort(coordinates[:, [s["slip distance"] for s in states]], axis=1)
-        for what in states[0]:
-            columns = [s[what] for s in states]
-            found[:, columns] = np.take_along_axis(coordinates[:, columns], ranks, axis=1)
-    return found
-
-
-def _thinned(plan: Plan) -> Plan:
-    """The same plan on few samples of every record."""
-    count = max(THIN // len(plan.records), 100)
-    rows = []
-    for record, sharp in zip(plan.records, plan.sharp, strict=True):
-        few = transient_rows(record, count) if len(record) > count else np.arange(len(record))
-        rows.append(np.union1d(few, sharp.rows(record.time)))
-    thin = tuple(r.taken(k, "thinned") for r, k in zip(plan.records, rows, strict=True))
-    weights = None if plan.weights is None else tuple(w[k] for w, k in zip(plan.weights, rows, strict=True))
-    return replace(plan, records=thin, weights=weights)
 
 
 def _from_levels(plan: Plan, comparison: Comparison, z: Array, rows: Array) -> Array:

@@ -18,7 +18,7 @@ from steadyslip.motion.jobs import automatic_method
 
 Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
-MOST_STEPS = 40  # per row of the table and lane, on average, before a trial is given up
+MOST_STEPS = 40  # per row of the table and lane, on average, before a motion is given up
 SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
 _STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
 
@@ -89,13 +89,16 @@ class Forward:
     threads : int, optional
     sensitive : bool
         Whether derivatives are wanted.
+    patience : int
+        Steps per row of the table and lane, on average, before a trial is given up.
     """
 
     def __init__(
         self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, threads: int | None = None,
-        sensitive: bool = True,
+        sensitive: bool = True, patience: int = MOST_STEPS,
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.threads = rig, tuple(names), rtol, shifts, threads
+        self.patience = patience
         own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
         self._base = operating_point(rig, own)
         self.model = self._base.model
@@ -199,7 +202,7 @@ class Forward:
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
-        settings[:, Setting.MOST_STEPS] = MOST_STEPS * table.samples.shape[1] + 1000
+        settings[:, Setting.MOST_STEPS] = self.patience * table.samples.shape[1] + 1000
         settings[:, Setting.FIRST_STEP] = np.inf
         for i, name in enumerate(reduction.names):
             settings[:, Setting.ATOL + i] = self.rtol * scales[name]

@@ -14,6 +14,7 @@ import numpy as np
 
 from steadyslip.core.records import Address
 from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.condensed import Condensed
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
@@ -75,15 +76,16 @@ def simpler(space: Space, addresses: Mapping[str, Address]) -> tuple[Idle, ...]:
 
 
 def from_simpler(
-    models: tuple[Idle, ...], quick: Comparison, whole: Comparison, starts: Array, low: Array, high: Array, told: Told
-) -> Array:
+    models: tuple[Idle, ...], quick: Comparison, whole: Comparison | Condensed, starts: Array, low: Array, high: Array,
+    told: Told,
+) -> Array:  # fmt: skip
     """Where the simpler models end, as starts of the richer one, (m, p).
 
     Parameters
     ----------
     models : tuple of Idle
     quick, whole : Comparison
-        With few samples, and with all.
+        With few samples, and with all (or what stands for all).
     starts : ndarray (n, p)
         Of the richer model, the most promising first.
     low, high : ndarray (p,)
@@ -98,7 +100,7 @@ def from_simpler(
         )
         if not np.any(np.isfinite(rough.ssq)):
             continue
-        best = rough.distinct(2)
+        best, _ = rough.distinct(2)
         held = np.tile(model.held, (len(best), 1))
         ends = minimise(lambda z, _: whole.residuals(z), best, low, high, most=FINE, held=held, race=1, told=told)
         ended = ends.sorted().coordinates[0]

@@ -20,7 +20,7 @@ from steadyslip.experiments.fitting.comparison import (
     trend_rows,
     trend_unknowns,
 )
-from steadyslip.experiments.fitting.forward import Forward
+from steadyslip.experiments.fitting.forward import MOST_STEPS, Forward
 from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
@@ -124,13 +124,13 @@ class Plan:
             return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)
 
-    def comparison(self, threads: int | None = None) -> Comparison:
-        """Records against the model."""
+    def comparison(self, threads: int | None = None, patience: int = MOST_STEPS) -> Comparison:
+        """Records against the model, given up after `patience` steps of it per sample on average."""
         space = self.space()
-        parts = tuple(self._part(i, record, space, threads) for i, record in enumerate(self.records))
+        parts = tuple(self._part(i, record, space, threads, patience) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
 
-    def _part(self, i: int, record: Record, space: Space, threads: int | None) -> RecordPart:
+    def _part(self, i: int, record: Record, space: Space, threads: int | None, patience: int) -> RecordPart:
         rig, pressed = self.driven(record, i)
         places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
         for place, one in enumerate(space.unknowns):
@@ -139,7 +139,7 @@ class Plan:
                 places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
-        forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads)
+        forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads, patience=patience)
         inputs: Any
         moved: Array | None = None
         if self.follows:

@@ -16,7 +16,8 @@ Residuals = Callable[[Array, Array], tuple[Array, Array]]
 
 CONVERGED = 1e-10  # reduction of the sum of squares that is still to be had, as a share of it
 STALLED = 1e-7  # the same, where no step succeeds any more: below this the sum is at its rounding
-STEEPEST = 1e10  # of the damping
+STILL = 1e-9  # the same, of a step however short that failed: at a kink, no direction leads down
+MOST_RAISED = 64.0  # times the damping rises from one step that fails to the next
 HOPE = 2.0  # times the best sum of squares: rough minima beyond have no chance
 NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
@@ -55,16 +56,32 @@ class Minima:
         order = np.argsort(self.ssq, kind="stable")
         return Minima(self.coordinates[order], self.ssq[order], self.converged[order], self.iterations[order])
 
-    def distinct(self, most: int) -> Array:
-        """Coordinates of the best, each place once, as far as there is hope for them."""
+    @classmethod
+    def none(cls, size: int) -> Minima:
+        """No problems, of so many coordinates."""
+        return cls.at(np.empty((0, size)))
+
+    @classmethod
+    def at(cls, coordinates: Array) -> Minima:
+        """Problems that have not begun."""
+        count = len(coordinates)
+        return cls(coordinates, np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
+
+    def distinct(self, most: int) -> tuple[Array, Array]:
+        """Coordinates of the best, each place once, as far as there is hope for them; how many ended at each."""
         ranked = self.sorted()
         chosen: list[Array] = []
+        counts: list[int] = []
         for z, ssq in zip(ranked.coordinates, ranked.ssq, strict=True):
-            if not np.isfinite(ssq) or len(chosen) == most or ssq > HOPE * ranked.ssq[0]:
+            if not np.isfinite(ssq) or ssq > HOPE * ranked.ssq[0]:
                 break
-            if not any(np.max(np.abs(z - other)) < NEAR for other in chosen):
+            near = [i for i, other in enumerate(chosen) if np.max(np.abs(z - other)) < NEAR]
+            if near:
+                counts[near[0]] += 1
+            elif len(chosen) < most:
                 chosen.append(z)
-        return np.array(chosen).reshape(-1, self.coordinates.shape[1])
+                counts.append(1)
+        return np.array(chosen).reshape(-1, self.coordinates.shape[1]), np.array(counts, dtype=int)
 
 
 def minimise(
@@ -100,7 +117,8 @@ def minimise(
     normal, gradient = _normal(r, jacobian)
     ssq = np.where(_usable(normal, gradient), _squares(r), np.inf)
     found.ssq[:] = ssq
-    damping, scale = np.full(count, 1e-2), np.zeros((count, size))
+    damping, raised, scale = np.full(count, 1e-2), np.full(count, 2.0), np.zeros((count, size))
+    stuck = np.zeros(count, dtype=bool)
     active = everyone[np.isfinite(ssq)]
     keep = np.isfinite(ssq)
     normal, gradient = normal[keep], gradient[keep]
@@ -112,14 +130,15 @@ def minimise(
         scale[active] = np.maximum(scale[active] * 0.5, diagonal)
         free = ~held[active] & ~(((z <= low) & (gradient < 0)) | ((z >= high) & (gradient > 0)))
         promise = _promise(normal, gradient, free)
-        over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | (damping[active] > STEEPEST)
+        over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | stuck[active]
         if race and np.any(found.converged):
             best = np.min(found.ssq[found.converged])
             if np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
                 over |= found.ssq[active] - promise > (1 - 1e-9) * best
         if np.any(over):
             ended = active[over]
-            found.converged[ended] = promise[over] <= max(STALLED, tolerance) * np.maximum(found.ssq[ended], 1e-300)
+            small = promise[over] <= max(STALLED, tolerance) * np.maximum(found.ssq[ended], 1e-300)
+            found.converged[ended] = small | stuck[ended]
             rest = ~over
             active, normal, gradient, z, free = active[rest], normal[rest], gradient[rest], z[rest], free[rest]
             if not len(active):
@@ -127,16 +146,17 @@ def minimise(
         step = _step(normal, gradient, free, damping[active], scale[active])
         step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
         trial = np.clip(z + step, low, high)
-        taken = trial - z
-        expected = np.einsum("mi,mi->m", gradient, taken) * 2 - np.einsum("mi,mij,mj->m", taken, normal, taken)
+        hoped, expected = _expected(normal, gradient, step), _expected(normal, gradient, trial - z)
         r, jacobian = residuals(trial, active)
         new_normal, new_gradient = _normal(r, jacobian)
         after = np.where(_usable(new_normal, new_gradient), _squares(r), np.inf)
         good = after < found.ssq[active]
         with np.errstate(all="ignore"):
             ratio = np.where(expected > 0, (found.ssq[active] - after) / expected, 0.0)
-        factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), 2.0)  # slow to give up, quick to go on
+        stuck[active] = ~good & (hoped <= STILL * found.ssq[active])
+        factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), raised[active])
         damping[active] = np.clip(damping[active] * factor, 1e-12, None)
+        raised[active] = np.where(good, 2.0, np.minimum(2 * raised[active], MOST_RAISED))
         better = active[good]
         found.coordinates[better], found.ssq[better] = trial[good], after[good]
         found.iterations[active] = iteration
@@ -183,8 +203,13 @@ def _step(normal: Array, gradient: Array, free: Array, damping: Array, scale: Ar
     return _solved(normal, gradient, free, damping[:, None] * np.maximum(scale, 1e-12 * largest))
 
 
+def _expected(normal: Array, gradient: Array, step: Array) -> Array:
+    """How much the sum of squares would fall in a step if the problem were linear."""
+    return np.asarray(2 * np.einsum("mi,mi->m", gradient, step) - np.einsum("mi,mij,mj->m", step, normal, step))
+
+
 def _promise(normal: Array, gradient: Array, free: Array) -> Array:
-    """How much the sum of squares would fall if the problem were linear."""
+    """How much the sum of squares would fall in the best step if the problem were linear."""
     largest = np.max(np.einsum("mii->mi", normal), axis=1, keepdims=True)
     step = _solved(normal, gradient, free, 1e-12 * largest)
     return np.asarray(np.einsum("mi,mi->m", step, np.where(free, gradient, 0.0)))

@@ -1,0 +1,301 @@
+"""Several experiments on one rock: what each says, with the others' help, and what the rock is like.
+
+Every experiment has parameters of its own, drawn from a population whose mean and spread are not known either. Those
+that say little are drawn towards the others (partial pooling); how much follows from how much the experiments differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.options import SEED, checked, real_number, whole
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown, shown_range
+from steadyslip.core.records import resolve
+from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.fitting.numbers import Estimate
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.unknowns import Unknown
+from steadyslip.experiments.numerics.pooling import Pooled, Told, pooled
+from steadyslip.model.sliding import steady_state
+
+Array = np.ndarray
+FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
+STRESS = "normal stress"
+
+
+@dataclass(frozen=True, eq=False)
+class Population(ReadOnly):
+    """What several experiments say together.
+
+    Attributes
+    ----------
+    fits : dict of str to Fit
+        By label.
+    names : tuple of str
+        Parameters.
+    conditions : dict of str to ndarray (experiments,)
+        What the means may depend on, by name.
+    scale : float
+        Of the half-normal prior of the spreads, e-folds or natural sizes.
+    unknowns : tuple of Unknown
+        How coordinates become values, in the order of the names.
+    draws : Pooled
+        From the posterior, in coordinates: logarithms of parameters that must be positive, else natural sizes.
+    """
+
+    fits: Mapping[str, Fit]
+    names: tuple[str, ...]
+    conditions: Mapping[str, Array]
+    scale: float
+    unknowns: tuple[Unknown, ...] = field(repr=False)
+    draws: Pooled = field(repr=False)
+
+    def index(self, name: str) -> int:
+        """Place of a parameter, which may leave out leading parts of its name."""
+        return self.names.index(resolve(name, dict.fromkeys(self.names)))
+
+    def mean(self, name: str) -> Estimate:
+        """The mean of the population (of a positive parameter the median), at mean conditions."""
+        p = self.index(name)
+        return self._estimate(p, self.draws.mean[:, p, 0])
+
+    def experiment(self, label: str, name: str) -> Estimate:
+        """One experiment's parameter, with the help of the others."""
+        if label not in self.fits:
+            raise ParameterError([Problem("label", f"got {label!r}; allowed: {', '.join(map(repr, self.fits))}")])
+        p = self.index(name)
+        return self._estimate(p, self.draws.members[:, list(self.fits).index(label), p])
+
+    def another(self, name: str, seed: int = 0) -> Estimate:
+        """What another experiment on this rock, at mean conditions, would have: mean, spread and their uncertainty."""
+        p = self.index(name)
+        noise = np.random.default_rng(seed).standard_normal(len(self.draws.spread))
+        return self._estimate(p, self.draws.mean[:, p, 0] + self.draws.spread[:, p] * noise)
+
+    def spread(self, name: str, level: float = 0.95) -> tuple[float, float, float]:
+        """How much experiments differ: median, and ends of an interval that leaves the same outside on both sides.
+
+        One standard deviation: of the logarithm where a parameter must be positive, else in SI units.
+        """
+        p = self.index(name)
+        one = self.unknowns[p]
+        size = 1.0 if one.logarithmic else one.size
+        low, middle, high = size * np.quantile(self.draws.spread[:, p], [0.5 - level / 2, 0.5, 0.5 + level / 2])
+        return float(middle), float(low), float(high)
+
+    def slope(self, name: str, condition: str) -> tuple[float, float, float]:
+        """How the mean changes per unit of a condition: median and 95 % interval, as `spread` counts."""
+        if condition not in self.conditions:
+            allowed = ", ".join(map(repr, self.conditions)) or "none were given"
+            raise ParameterError([Problem("condition", f"got {condition!r}; allowed: {allowed}")])
+        p = self.index(name)
+        one = self.unknowns[p]
+        values = self.draws.mean[:, p, 1 + list(self.conditions).index(condition)]
+        low, middle, high = (1.0 if one.logarithmic else one.size) * np.quantile(values, [0.025, 0.5, 0.975])
+        return float(middle), float(low), float(high)
+
+    def _estimate(self, p: int, coordinates: Array) -> Estimate:
+        one = self.unknowns[p]
+        low, middle, high = (float(one.value(z)) for z in np.quantile(coordinates, [0.025, 0.5, 0.975]))
+        error = float(np.std(coordinates) * one.slope(np.median(coordinates)))
+        return Estimate(one.name, middle, error, one.unit, low, high, next(iter(self.fits.values())).plan.rig.area)
+
+    def __str__(self) -> str:
+        lines = [f"population of {len(self.fits)} experiments, each with {len(self.names)} parameters of its own"]
+        wide = max(map(len, self.fits))
+        for name, one in zip(self.names, self.unknowns, strict=True):
+            mean, other = self.mean(name), self.another(name)
+            lines += ["", f"{name}: mean {mean.shown()}, 95 %: {mean.range()}"]
+            lines.append(f"  experiments differ by {_spread_words(self.spread(name), one)}")
+            lines += [f"  {_slope_words(self.slope(name, c), one, c, x)}" for c, x in self.conditions.items()]
+            lines.append(f"  another experiment, 95 %: {other.range()}")
+            for label, own in self.fits.items():
+                alone = f"alone {own[name].shown()}" if name in own.names else "not fitted alone"
+                lines.append(f"  {label:<{wide}}  {alone}, with the others {self.experiment(label, name).shown()}")
+        lines += ["", f"priors          of means flat; of spreads half-normal, {self.scale:g} e-folds or natural sizes"]
+        if self.conditions:
+            middles = {name: float(np.mean(x)) for name, x in self.conditions.items()}
+            means = ", ".join(f"{n} {shown(x, 'Pa') if n == STRESS else f'{x:.4g}'}" for n, x in middles.items())
+            lines.append(f"means           at {means}")
+        return "\n".join(lines)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw every parameter of every experiment, alone and with the others, and the population.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units."""
+        ends = ("median", "low", "high")
+        parameters = {
+            name: {
+                "unit": one.unit,
+                "mean": _plain(self.mean(name)),
+                "spread": dict(zip(ends, self.spread(name), strict=True)),
+                "spread_of": "logarithm" if one.logarithmic else "value",
+                "another": _plain(self.another(name)),
+                "slopes": {c: dict(zip(ends, self.slope(name, c), strict=True)) for c in self.conditions},
+                "experiments": {label: _plain(self.experiment(label, name)) for label in self.fits},
+            }
+            for name, one in zip(self.names, self.unknowns, strict=True)
+        }
+        conditions = {name: values.tolist() for name, values in self.conditions.items()}
+        return {"experiments": list(self.fits), "conditions": conditions, "parameters": parameters}
+
+
+def _plain(one: Estimate) -> dict[str, float]:
+    return {"value": one.value, "error": one.error, "low": one.low, "high": one.high}
+
+
+def _spread_words(found: tuple[float, float, float], one: Unknown) -> str:
+    middle, low, high = found
+    if one.logarithmic:
+        return f"{100 * middle:.2g} % ({100 * low:.2g} to {100 * high:.2g} %)"
+    return f"{shown(middle, one.unit)} ({shown_range(low, high, one.unit)})"
+
+
+def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str, values: Array) -> str:
+    """How much the mean changes from the least to the largest of the conditions."""
+    ends = (float(np.min(values)), float(np.max(values)))
+    whole = " to ".join(shown(x, "Pa") if condition == STRESS else f"{x:.4g}" for x in ends)
+    middle, low, high = (x * (ends[1] - ends[0]) for x in found)
+    if one.logarithmic:  # of the mean itself, not its logarithm
+        middle, low, high = (100 * np.expm1(x) for x in (middle, low, high))
+        change = f"{middle:+.3g} % ({low:+.3g} to {high:+.3g} %)"
+    else:
+        change = f"{shown(middle, one.unit)} ({shown(low, one.unit)} to {shown(high, one.unit)})"
+    return f"from {condition} {whole} the mean changes by {change}"
+
+
+@checked(scale=real_number(0, 100), count=whole(100, 10**6), seed=SEED)
+def population(
+    fits: Mapping[str, Fit] | Sequence[Fit], names: Sequence[str] | None = None, *,
+    conditions: str | Mapping[str, Sequence[float]] | None = None, scale: float = 1.0, count: int = 4000, seed: int = 0,
+) -> Population:  # fmt: skip
+    """The population that several experiments are members of, each fitted on its own.
+
+    Every experiment enters with its estimates and their whole covariance: a normal likelihood in the coordinates of
+    the fit, logarithms of parameters that must be positive. An experiment that does not determine a parameter says
+    nothing about it, and takes it from the others.
+
+    Parameters
+    ----------
+    fits : mapping of str to Fit, or sequence of Fit
+        By label; the file of the record unless labelled. All of one friction law.
+    names : sequence of str, optional
+        Parameters; all of the friction law that are fitted in every experiment unless given.
+    conditions : mapping of str to sequence of float, or str, optional
+        What the means may depend on, one number for every experiment, such as ``{"temperature": [20, 100, 250]}``:
+        straight lines, of the logarithm where a parameter must be positive. ``"normal stress"``: that of the records.
+    scale : float
+        Of the half-normal prior of the spreads, in e-folds (or natural sizes): with few experiments it keeps out
+        spreads that nobody would believe.
+    count : int
+        Draws.
+    seed : int
+
+    Returns
+    -------
+    Population
+
+    Raises
+    ------
+    ParameterError
+        If there are too few experiments for this, or they do not have the parameters.
+    NotAvailable
+        If emcee is not installed.
+    """
+    labelled = dict(fits) if isinstance(fits, Mapping) else _labelled(fits)
+    problems = [
+        Problem(str(label), f"got {one!r}; allowed: a Fit")
+        for label, one in labelled.items()
+        if not isinstance(one, Fit)
+    ]
+    if not labelled:
+        problems.append(Problem("fits", f"got none; allowed: {FEWEST} or more"))
+    if not problems and len({type(one.plan.rig.friction) for one in labelled.values()}) > 1:
+        problems.append(Problem("fits", "are of several friction laws; allowed: one"))
+    if problems:
+        raise ParameterError(problems)
+    own_names = _names(labelled, names)
+    given = _conditions(labelled, conditions)
+    centred = np.array([x - np.mean(x) for x in given.values()]).reshape(len(given), len(labelled))
+    unknowns = tuple(_unknown(labelled, name) for name in own_names)
+    told = [
+        _told(one, own_names, unknowns, np.append(1.0, x)) for one, x in zip(labelled.values(), centred.T, strict=True)
+    ]
+    needed = FEWEST + len(given)
+    for p, name in enumerate(own_names):
+        determined = sum(p in one.seen for one in told)
+        if determined < needed:
+            message = f"is determined by {determined} of the experiments; a mean and a spread"
+            message += f" with {len(given)} conditions" if given else ""
+            problems.append(Problem(name, f"{message} need {needed}"))
+    if problems:
+        raise ParameterError(problems)
+    draws = pooled(told, len(own_names), np.full(len(own_names), scale), count, seed)
+    return Population(labelled, own_names, given, scale, unknowns, draws)
+
+
+def _labelled(fits: Sequence[Fit]) -> dict[str, Fit]:
+    found: dict[str, Fit] = {}
+    for i, one in enumerate(fits, start=1):
+        label = one.plan.records[0].source.replace("\\", "/").rpartition("/")[2] if isinstance(one, Fit) else str(i)
+        found[f"{label} ({i})" if label in found else label] = one
+    return found
+
+
+def _names(fits: Mapping[str, Fit], names: Sequence[str] | None) -> tuple[str, ...]:
+    every = dict.fromkeys(name for one in fits.values() for name in one.names if "@" not in name)
+    if names is None:
+        found = [n for n in every if n.startswith("friction.") and all(n in one.names for one in fits.values())]
+    else:
+        found = [resolve(name, every) for name in ([names] if isinstance(names, str) else names)]
+    if not found:
+        raise ParameterError([Problem("names", "no parameter is fitted in every experiment")])
+    return tuple(dict.fromkeys(found))
+
+
+def _conditions(fits: Mapping[str, Fit], conditions: Any) -> dict[str, Array]:
+    if conditions is None:
+        return {}
+    if conditions == STRESS:
+        return {STRESS: np.array([steady_state(one.rig(0)).normal_stress for one in fits.values()])}
+    allowed = f"{STRESS!r}, or a mapping of names to {len(fits)} finite numbers that are not all the same"
+    problems, found = [], {}
+    for name, values in conditions.items() if isinstance(conditions, Mapping) else [("", None)]:
+        try:
+            column = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            column = np.empty(0)
+        if column.shape != (len(fits),) or not np.all(np.isfinite(column)) or not np.ptp(column) > 0:
+            problems.append(Problem(f"conditions.{name}".rstrip("."), f"got {values!r}; allowed: {allowed}"))
+        found[str(name)] = column
+    if problems:
+        raise ParameterError(problems)
+    return found
+
+
+def _told(one: Fit, names: tuple[str, ...], unknowns: tuple[Unknown, ...], design: Array) -> Told:
+    """What a fit says of some parameters, those that it does not determine left out."""
+    places = {p: one.names.index(name) for p, name in enumerate(names) if name in one.names}
+    seen = [p for p, k in places.items() if np.isfinite(one.covariance[k, k])]
+    own = [places[p] for p in seen]
+    mine, theirs = [unknowns[p] for p in seen], [one.space.unknowns[k] for k in own]
+    units = np.array([1.0 if a.logarithmic else b.size / a.size for a, b in zip(mine, theirs, strict=True)])
+    covariance = one.covariance[np.ix_(own, own)] * np.outer(units, units)
+    return Told(np.array(seen, dtype=int), one.coordinates[own] * units, covariance, design)
+
+
+def _unknown(fits: Mapping[str, Fit], name: str) -> Unknown:
+    return next(one.space.unknowns[one.names.index(name)] for one in fits.values() if name in one.names)

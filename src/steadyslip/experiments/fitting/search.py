@@ -1,0 +1,228 @@
+"""The search for the best minimum: from many starts on few samples, then on all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.condensed import Condensed, condensed
+from steadyslip.experiments.fitting.nested import from_simpler, simpler
+from steadyslip.experiments.fitting.numbers import SearchStory
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.starts import search_bounds, starting_points
+from steadyslip.experiments.fitting.unknowns import Space
+from steadyslip.experiments.measured.record import transient_rows
+from steadyslip.experiments.numerics.least_squares import SAME, Minima, minimise
+from steadyslip.experiments.numerics.noise import DETECTED, lag_one
+
+Array = np.ndarray
+THIN = 400  # samples on which many starts are tried
+HASTY = 8  # steps of the model per sample, on average, before a trial on few of them is given up
+ROUGH = 40  # iterations on few samples
+MOST = 300  # iterations on all samples
+ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
+FINALISTS = 8  # of them that go on with all samples: one vector of lanes
+NEAREST = 3  # of the ends on few numbers that go on with all samples
+INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
+
+Told = Callable[[str, int, float], None]
+"""What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
+
+
+def searched(
+    plan: Plan, starts: int, threads: int | None, progress: Told | None
+) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
+    """The best minimum, how it was found, and the bounds of the search.
+
+    A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
+    then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
+    from where these end.
+
+    Raises
+    ------
+    NotAvailable
+        If the model cannot follow the records from any start.
+    """
+    search = _Search(plan, threads, progress)
+    for upto in dict.fromkeys((-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts)):
+        search.try_starts(upto)
+        if not np.any(np.isfinite(search.rough.ssq)):
+            continue
+        search.promising()
+        if search.arrived < ENOUGH and upto >= starts:
+            search.quick = search.thin.comparison(threads)  # with all the patience there is
+        if search.arrived < ENOUGH or (upto < starts and search.arrived < upto / 3):
+            continue
+        found = search.polished()
+        if upto >= starts or not _leaves_structure(search.whole, found.coordinates[0]):
+            break
+    else:
+        if not np.any(np.isfinite(search.rough.ssq)):
+            raise NotAvailable(
+                "the model cannot follow these records from any start; are law and drive those of the experiment?"
+            )
+        found = search.polished()
+    found = search.nested(found)
+    if not np.isfinite(found.ssq[0]):
+        raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
+    story = search.story(found)
+    found.coordinates = ordered(found.coordinates, search.whole.space)
+    return found, story, (search.low, search.high)
+
+
+class _Search:
+    """A search under way.
+
+    Parameters
+    ----------
+    plan : Plan
+    threads : int or None
+    progress : callable or None
+
+    Attributes
+    ----------
+    rough : Minima
+        Where starts ended on few samples.
+    best : Minima
+        Where the most promising of those end on what stands for all samples.
+    arrived : int
+        How many starts lead to the best minimum.
+    """
+
+    def __init__(self, plan: Plan, threads: int | None, progress: Told | None) -> None:
+        self.plan, self.progress = plan, progress
+        self.whole = plan.comparison(threads)
+        self.thin = replace(_thinned(plan), rtol=1e-5)
+        self.quick = self.thin.comparison(threads, HASTY)
+        self.low, self.high = search_bounds(self.whole.parts, self.whole.space)
+        self.rough = self.best = Minima.none(len(self.whole.space))
+        self.few: Comparison | Condensed = self.whole
+        self.arrived = 0
+
+    def told(self, what: str, among: Comparison) -> Callable[[Minima], None]:
+        def tell(ends: Minima) -> None:
+            if self.progress is not None:
+                tried, least = len(self.rough.ssq), float(np.min(ends.ssq, initial=np.inf))
+                self.progress(what, tried, float(np.sqrt(least / among.size)))
+
+        return tell
+
+    def try_starts(self, upto: int) -> None:
+        """Starts up to a number of them, on few samples."""
+        already = len(self.rough.ssq)
+        begin = starting_points(self.whole.parts, self.whole.space, upto - already, already)
+        self.rough = self.rough + minimise(
+            lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH, tolerance=1e-4,
+            race=ENOUGH, told=self.told("searching", self.quick),
+        )  # fmt: skip
+
+    def promising(self) -> None:
+        """The most promising ends: on what stands for all samples, where anything does, and how many starts agree."""
+        begin, counts = self.rough.distinct(FINALISTS)
+        self.few = condensed(self.plan, self.whole, begin)
+        if self.few is self.whole:
+            self.best = Minima.at(begin)
+            self.arrived = int(np.sum(self.rough.ssq <= np.min(self.rough.ssq) * (1 + SAME)))
+            return
+        self.best = minimise(
+            lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=ENOUGH,
+            told=self.told("refining", self.whole),
+        )  # fmt: skip
+        self.arrived = int(np.sum(counts[self.best.ssq <= np.min(self.best.ssq) * (1 + SAME)]))
+
+    def polished(self) -> Minima:
+        """The best of the promising brought to their end on all samples, the best first."""
+        begin = self.best.coordinates if self.few is self.whole else self.best.distinct(NEAREST)[0]
+        found = self._on_all(begin)
+        inside = _released(self.whole.space, found.coordinates[0], self.low, self.high)
+        return (found + self._refined(inside)).sorted() if len(inside) else found
+
+    def nested(self, found: Minima) -> Minima:
+        """The same, or better ones where simpler models inside this one lead."""
+        models = simpler(self.whole.space, self.plan.rig.parameters())
+        if not models:
+            return found
+        begin = from_simpler(
+            models, self.quick, self.few, self.rough.sorted().coordinates, self.low, self.high,
+            self.told("refining", self.whole),
+        )  # fmt: skip
+        return (found + self._refined(begin)).sorted()
+
+    def _refined(self, begin: Array) -> Minima:
+        """Where starts end on all samples: on what stands for them to begin with."""
+        if self.few is not self.whole:
+            told = self.told("refining", self.whole)
+            ends = minimise(lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, told=told)
+            begin = ends.distinct(NEAREST)[0]
+        return self._on_all(begin)
+
+    def _on_all(self, begin: Array) -> Minima:
+        told = self.told("refining", self.whole)
+        return minimise(
+            lambda z, _: self.whole.residuals(z), begin, self.low, self.high, most=MOST, race=1, told=told
+        ).sorted()
+
+    def story(self, found: Minima) -> SearchStory:
+        """How the minimum was found."""
+        others = [found.ssq / found.ssq[0]]
+        for ends in (self.rough, self.best):
+            done = ends.ssq[ends.converged]
+            others.append(done / np.min(ends.ssq) if len(done) else done)
+        ratios = {float(f"{x:.3g}") for x in np.concatenate(others) if np.isfinite(x) and x > 1 + SAME}
+        last = int(found.iterations[0])
+        return SearchStory(len(self.rough.ssq), self.arrived, tuple(sorted(ratios)), last, bool(found.converged[0]))
+
+
+def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:
+    """The same point with times that ran to the end of their windows put back inside, (0 or more, p).
+
+    Within a sampling interval the misfit need not fall one way only: a time held at an end may hide a better minimum.
+    """
+    times = np.array([one.parameter.startswith(("step.", "jump.")) for one in space.unknowns])
+    ended = times & ((coordinates <= low) | (coordinates >= high))
+    if not np.any(ended):
+        return np.empty((0, len(coordinates)))
+    share = np.array(INSIDE)[:, None]
+    return np.where(ended, low + share * np.where(ended, high - low, 0.0), coordinates)
+
+
+def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
+    """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
+    r = whole.residuals(coordinates[None])[0][0]
+    return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
+
+
+def ordered(coordinates: Array, space: Space) -> Array:
+    """States by rising slip distance, so that equal minima look equal."""
+    members: dict[tuple[int | None, str], dict[str, dict[str, int]]] = {}
+    for i, one in enumerate(space.unknowns):
+        owner, _, last = one.parameter.rpartition(".")
+        family, _, number = owner.rpartition(".")
+        if number.isdigit():
+            members.setdefault((one.record, family), {}).setdefault(number, {})[one.kind or last] = i
+    found = coordinates.copy()
+    for family_members in members.values():
+        states = list(family_members.values())
+        if len(states) < 2 or any(set(s) != set(states[0]) or "slip distance" not in s for s in states):
+            continue
+        ranks = np.argsort(coordinates[:, [s["slip distance"] for s in states]], axis=1)
+        for what in states[0]:
+            columns = [s[what] for s in states]
+            found[:, columns] = np.take_along_axis(coordinates[:, columns], ranks, axis=1)
+    return found
+
+
+def _thinned(plan: Plan) -> Plan:
+    """The same plan on few samples of every record."""
+    count = max(THIN // len(plan.records), 100)
+    rows = []
+    for record, sharp in zip(plan.records, plan.sharp, strict=True):
+        few = transient_rows(record, count) if len(record) > count else np.arange(len(record))
+        rows.append(np.union1d(few, sharp.rows(record.time)))
+    thin = tuple(r.taken(k, "thinned") for r, k in zip(plan.records, rows, strict=True))
+    weights = None if plan.weights is None else tuple(w[k] for w, k in zip(plan.weights, rows, strict=True))
+    return replace(plan, records=thin, weights=weights)

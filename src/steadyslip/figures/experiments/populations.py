@@ -1,0 +1,69 @@
+"""Several experiments and the population that they are members of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.figures.experiments.panels import brief, grid
+from steadyslip.figures.style import BLUE, GREY, SKY, VERMILION, display_unit, labelled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from steadyslip.experiments import Estimate, Population
+
+APART = 0.15  # of a row: what one experiment says alone, and with the others
+
+
+def population(result: Population, ax: Any = None) -> np.ndarray:
+    """Every parameter of every experiment, alone and with the others, over the mean and what another one would have.
+
+    Parameters
+    ----------
+    result : Population
+    ax : array of matplotlib Axes, optional
+        One for every parameter, in a row.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    count, rows = len(result.names), len(result.fits)
+    panels = grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.2 + 2.2 * count, 2.2 + 0.3 * rows))[0]
+    place = np.arange(rows)[::-1]
+    for panel, name in zip(panels, result.names, strict=True):
+        mean, other = result.mean(name), result.another(name)
+        size, unit = display_unit(mean.unit, abs(mean.value) or mean.error, mean.area)
+        panel.axvspan(
+            other.low / size, other.high / size, color=GREY, alpha=0.4, linewidth=0, label="another one, 95 %"
+        )
+        panel.axvspan(mean.low / size, mean.high / size, color=SKY, alpha=0.6, linewidth=0, label="mean, 95 %")
+        panel.axvline(mean.value / size, color=BLUE, linewidth=1)
+        for y, (label, own) in zip(place, result.fits.items(), strict=True):
+            if name in own.names and own[name].determined:
+                _bar(panel, y + APART, own[name], size, VERMILION, "o", "alone, 95 %" if y == place[0] else "")
+            _bar(
+                panel,
+                y - APART,
+                result.experiment(label, name),
+                size,
+                BLUE,
+                "s",
+                "with the others, 95 %" if y == place[0] else "",
+            )
+        panel.set_xlabel(labelled(brief(name), unit))
+        panel.set_yticks(place, list(result.fits) if panel is panels[0] else [""] * rows)
+        panel.set_ylim(-0.6, rows - 0.4)
+        panel.locator_params(axis="x", nbins=4)
+    figure = panels[0].get_figure(root=True)
+    if ax is None and figure is not None:
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize="small")
+    return np.asarray(panels)
+
+
+def _bar(panel: Axes, y: float, one: Estimate, size: float, colour: str, marker: str, label: str) -> None:
+    """A value and its 95 % interval."""
+    panel.plot([one.low / size, one.high / size], [y, y], color=colour, linewidth=1.2)
+    panel.plot([one.value / size], [y], marker, color=colour, markersize=4, label=label or None)

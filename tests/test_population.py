@@ -1,0 +1,157 @@
+"""Several experiments on one rock: the population comes back, with errors that mean what they say."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import lab_records as lab
+import steadyslip as ss
+from steadyslip.experiments.numerics.pooling import Told, log_evidence, pooled
+
+MEAN, SPREAD = np.array([-4.5, 1.2]), np.array([0.12, 0.05])
+
+
+def experiments(seed, count, errors=(0.03, 0.04), slope=None):
+    """What experiments say of two coordinates that are correlated in each; the truth of every one."""
+    rng = np.random.default_rng(seed)
+    told, truth = [], []
+    for j in range(count):
+        x = np.array([1.0]) if slope is None else np.array([1.0, j - 0.5 * (count - 1)])
+        own = MEAN + (0.0 if slope is None else slope * x[1]) + SPREAD * rng.standard_normal(2)
+        deviation = np.array(errors) * 10 ** rng.uniform(-0.3, 0.3, 2)
+        covariance = np.outer(deviation, deviation) * np.array([[1.0, 0.8], [0.8, 1.0]])
+        told.append(Told(np.arange(2), rng.multivariate_normal(own, covariance), covariance, x))
+        truth.append(own)
+    return told, np.array(truth)
+
+
+def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
+    """The other route: mean, spreads and all members sampled together, nothing integrated out."""
+    import emcee
+
+    told, _ = experiments(3, 3)
+    found = pooled(told, 2, np.ones(2), 8000, 1)
+
+    inverse = np.array([np.linalg.inv(one.covariance) for one in told])
+    values = np.array([one.values for one in told])
+
+    def log_probability(z):
+        mean, log_spread, members = z[:, None, :2], z[:, 2:4], z[:, 4:].reshape(-1, 3, 2)
+        spread = np.exp(log_spread)
+        r = values - members
+        value = np.sum(log_spread - 0.5 * spread**2, axis=1) - 3 * np.sum(log_spread, axis=1)
+        value -= 0.5 * np.sum(((members - mean) / spread[:, None]) ** 2, axis=(1, 2))
+        value -= 0.5 * np.einsum("mjk,jkl,mjl->m", r, inverse, r)
+        return np.where(np.all((log_spread > -16) & (log_spread < 4), axis=1), value, -np.inf)
+
+    rng = np.random.default_rng(0)
+    centre = np.concatenate([MEAN, np.log([0.1, 0.1]), np.concatenate([one.values for one in told])])
+    sampler = emcee.EnsembleSampler(
+        64, 10, log_probability, vectorize=True, moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2)]
+    )
+    sampler._random = np.random.RandomState(4)
+    sampler.run_mcmc(centre + 0.02 * rng.standard_normal((64, 10)), 4000)
+    chain = sampler.get_chain(discard=1000, flat=True)
+    ours = np.column_stack([found.mean[:, :, 0], np.log(found.spread), found.members.reshape(-1, 6)])
+    for level in (0.1, 0.5, 0.9):
+        theirs = np.quantile(chain, level, axis=0)
+        np.testing.assert_allclose(
+            np.quantile(ours, level, axis=0), theirs, atol=0.2 * np.std(chain, axis=0).max(), rtol=0.02
+        )
+
+
+def test_known_spreads_leave_generalised_least_squares():
+    """Given the spread, the mean is that of weighted least squares of stacked estimates."""
+    told, _ = experiments(5, 6, slope=np.array([0.02, -0.01]))
+    _, precision, best = log_evidence(told, SPREAD[None])
+    rows = np.concatenate([one.slopes(2) for one in told])
+    variance = np.zeros((12, 12))
+    for j, one in enumerate(told):
+        variance[2 * j : 2 * j + 2, 2 * j : 2 * j + 2] = one.covariance + np.diag(SPREAD**2)
+    information = rows.T @ np.linalg.solve(variance, rows)
+    values = np.concatenate([one.values for one in told])
+    np.testing.assert_allclose(precision[0], information, rtol=1e-12)
+    np.testing.assert_allclose(
+        best[0], np.linalg.solve(information, rows.T @ np.linalg.solve(variance, values)), rtol=1e-10
+    )
+
+
+@pytest.mark.parametrize("count", [4])
+def test_intervals_contain_the_truth_as_often_as_they_say(count):
+    """Means, spreads and members of populations of few experiments; see benchmarks/population.py for many."""
+    trials = 16
+    hits = {"mean": 0, "spread": 0, "members": 0}
+    for seed in range(trials):
+        told, truth = experiments(seed, count)
+        found = pooled(told, 2, np.ones(2), 1000, seed)
+        for what, draws, value in (
+            ("mean", found.mean[:, 0, 0], MEAN[0]),
+            ("spread", found.spread[:, 0], SPREAD[0]),
+            ("members", found.members[:, 0, 0], truth[0, 0]),
+        ):
+            low, high = np.quantile(draws, [0.025, 0.975])
+            hits[what] += low <= value <= high
+    for what, hit in hits.items():
+        assert binom.cdf(hit, trials, 0.95) > 1e-3, what
+        assert what == "members" or hit >= 0.75 * trials
+
+
+def test_experiments_that_say_little_are_drawn_to_the_others():
+    """Partial pooling lies between none and complete, and leaves smaller errors than none."""
+    told, truth = experiments(11, 8, errors=(0.05, 0.05))
+    vague = Told(np.arange(2), truth[0] + 0.6, 0.5**2 * np.eye(2), np.array([1.0]))
+    found = pooled([*told, vague], 2, np.ones(2), 4000, 0)
+    own = found.members[:, -1]
+    assert np.all(np.std(own, axis=0) < 0.3)
+    assert np.all(np.mean(own, axis=0) < truth[0] + 0.35)
+    unseen = Told(np.array([1]), truth[:1, 1], np.array([[1e-4]]), np.array([1.0]))  # says nothing of the first
+    members = pooled([*told, unseen], 2, np.ones(2), 4000, 0).members[:, -1, 0]
+    assert np.mean(members) == pytest.approx(MEAN[0], abs=0.15)
+    assert np.std(members) > 0.8 * SPREAD[0]
+
+
+@pytest.fixture(scope="module")
+def fits():
+    """Six experiments on one rock at three normal stresses; a rises with the stress."""
+    rng = np.random.default_rng(8)
+    found = {}
+    for j, stress in enumerate((5e6, 5e6, 10e6, 10e6, 20e6, 20e6)):
+        a = 0.011 * (stress / 10e6) ** 0.2 * np.exp(0.02 * rng.standard_normal())
+        rig = lab.rig(a=a).with_values(
+            {"contact.steady_normal_stress": stress, "slider.stiffness": 2e10 * stress / 1e7}
+        )
+        found[f"run {j + 1}"] = ss.fit(ss.lab_rig(), lab.record(rig, lab.STEP, j, count=800))
+    return found
+
+
+def test_a_population_of_fits(fits):
+    everyone = ss.population(fits, count=1000)
+    assert set(everyone.names) == {"friction.a", "friction.mu_ref", "friction.b", "friction.d_c"}
+    assert everyone.spread("a")[0] == pytest.approx(0.13, abs=0.08)
+    assert everyone.mean("d_c").low < 12e-6 < everyone.mean("d_c").high
+    assert everyone.another("a").high - everyone.another("a").low > everyone.mean("a").high - everyone.mean("a").low
+    by_stress = ss.population(fits, ["a"], conditions="normal stress", count=1000)
+    assert by_stress.spread("a")[0] < 0.6 * everyone.spread("a")[0]
+    assert by_stress.slope("a", "normal stress")[1] > 0
+    text = str(by_stress)
+    assert "normal stress" in text
+    assert "run 1" in text
+    assert by_stress.to_dict()["parameters"]["friction.a"]["mean"]["low"] > 0
+    panels = everyone.plot()
+    assert len(panels) == 4
+    assert panels[0].get_xlabel()
+
+
+def test_what_cannot_be_a_population_is_refused(fits):
+    with pytest.raises(ss.ParameterError, match="3"):
+        ss.population(list(fits.values())[:2])
+    with pytest.raises(ss.ParameterError, match="finite numbers"):
+        ss.population(fits, conditions={"temperature": [1.0, 2.0]})
+    with pytest.raises(ss.ParameterError, match="allowed: a Fit"):
+        ss.population([SimpleNamespace(), *fits.values()])
+    with pytest.raises(ss.ParameterError, match="got none"):
+        ss.population([])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, cast
 
 PRIMITIVES = (
@@ -32,21 +33,19 @@ class Node:
         ``real``, ``int`` or ``bool``.
     loop : Loop or None
         The loop in which it has to be computed.
+    operands : tuple of Node
+        Those of `args` that have to be computed before.
     order : int
         Rises in the order in which nodes were made.
     """
 
-    __slots__ = ("args", "kind", "loop", "op", "order")
+    __slots__ = ("args", "kind", "loop", "op", "operands", "order")
 
     def __init__(self, op: str, args: tuple[Any, ...], kind: str = "real", loop: Loop | None = None) -> None:
         self.op, self.args, self.kind = op, args, kind
+        self.operands = tuple([a for a in args if isinstance(a, Node)])
         self.loop: Loop | None = loop or next((a.loop for a in self.operands if a.loop is not None), None)
         self.order = next(_order)
-
-    @property
-    def operands(self) -> tuple[Node, ...]:
-        """Nodes that have to be computed before."""
-        return tuple(a for a in self.args if isinstance(a, Node))
 
     def _with(self, op: str, other: Any, kind: str | None = None, swapped: bool = False) -> Node:
         other = as_node(other, self.kind)
@@ -193,13 +192,15 @@ class Loop:
         """The results, for what comes after the loop."""
         return [Node("result", (self, i)) for i in range(len(self.results))]
 
+    @cached_property
     def nodes(self) -> list[Node]:
         """What every round computes, in order."""
         return [node for node in reachable([*self.following, *self.results]) if node.loop is self]
 
+    @cached_property
     def given(self) -> list[Node]:
         """What has to be there before the first round."""
-        wanted = [*self.following, *self.results, *(a for node in self.nodes() for a in node.operands)]
+        wanted = [*self.following, *self.results, *(a for node in self.nodes for a in node.operands)]
         return [*self.start, *(node for node in wanted if node.loop is None)]
 
 
@@ -212,7 +213,7 @@ def reachable(ends: Iterable[Node]) -> list[Node]:
         if node.order in found:
             continue
         found[node.order] = node
-        waiting += cast(Loop, node.args[0]).given() if node.op == "result" else node.operands
+        waiting += cast(Loop, node.args[0]).given if node.op == "result" else node.operands
     return [found[order] for order in sorted(found)]
 
 

@@ -180,7 +180,7 @@ class _Writer:
         """A block that is left after a fixed number of rounds."""
         if loop.results[0].order in self.values:
             return
-        self.emit(reachable(loop.given()))
+        self.emit(reachable(loop.given))
         before, label = self.block, f"loop{len(self.lines)}"
         counter, following = self._fresh("i"), self._fresh("i")
         self.lines += [f"  br label %{label}", f"{label}:"]
@@ -189,7 +189,7 @@ class _Writer:
         place = len(self.lines)
         for node in loop.carried:
             self.values[node.order] = [self._fresh() for _ in range(self.chains)]
-        self.emit(loop.nodes(), loop)
+        self.emit(loop.nodes, loop)
         phis = []
         for node, start, after in zip(loop.carried, loop.start, loop.following, strict=True):
             for chain, name in enumerate(self.values[node.order]):

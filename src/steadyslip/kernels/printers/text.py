@@ -83,7 +83,7 @@ class Writer(ABC):
             for operand in node.operands:
                 self.uses[operand.order] = self.uses.get(operand.order, 0) + 1
             if node.op == "result":
-                self._count(node.args[0].nodes())
+                self._count(node.args[0].nodes)
 
     def line(self, level: int, statement: str) -> None:
         """Add a line."""
@@ -122,13 +122,13 @@ class Writer(ABC):
     def _loop(self, loop: Loop, level: int) -> None:
         if loop.results[0].order in self.known:
             return
-        self.emit(reachable(loop.given()), level)
+        self.emit(reachable(loop.given), level)
         names = [f"z{len(self.lines)}_{i}" for i in range(len(loop.carried))]
         for node, name, start in zip(loop.carried, names, loop.start, strict=True):
             self.known[node.order] = name
             self.line(level, self.carried(name, self.known[start.order]))
         self.line(level, self.rounds(loop.rounds))
-        self.emit(loop.nodes(), level + 1, loop)
+        self.emit(loop.nodes, level + 1, loop)
         values = [self.known[node.order] for node in loop.following]
         if {self.known[node.order] for node in loop.results} & set(names):
             raise ValueError("a result of a loop is what it leaves, not what it began with")

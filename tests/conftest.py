@@ -5,6 +5,7 @@ Fresh random examples on a developer's machine, the same ones every time in cont
 ``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.
 """
 
+import gc
 import os
 from itertools import accumulate
 from pathlib import Path
@@ -33,6 +34,13 @@ def pytest_collection_modifyitems(items):
             if not left[test]:
                 item.add_marker(pytest.mark.slow)
             left[test] -= left[test] > 0
+
+
+def pytest_collection_finish():
+    """Formulas make objects by the million, and modules live on: garbage is looked for less often, and not in those."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 20)
 
 
 def pytest_configure(config):

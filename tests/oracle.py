@@ -5,6 +5,7 @@ the plain variables x, ln v, memory.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
@@ -19,39 +20,16 @@ class Oracle:
 
     def __init__(self, rig, velocity=None, disturbance=None, pressure=None, plain=False):
         """`plain`: integrate and search for v itself, which may pass through zero, instead of ln v."""
-        self.plain = plain
-        values = operating_point(rig)
-        self.model = model = values.model
-        sigma = float(values.sigma)
-        self.drive = rig.drive.velocity
+        self.plain, self.drive = plain, rig.drive.velocity
+        self.model, self.balance, self.rates, self.start = equations(rig)
+        self.inertial = self.model.inertial
         v_lp = velocity or (lambda t: self.drive)
         self.inputs = lambda t: (v_lp(t), (disturbance or zero)(t), (pressure or zero)(t), t)
-        contact = model.contact
-        numbers = dict(zip(model.arguments, (*values.arguments, sigma), strict=True))
-        self.memory = [m.symbol for m in model.memory]
-        self.others = [*self.memory, *(m.symbol for m in model.integrals)]
-        symbols = [contact.slip, contact.velocity, contact.acceleration, *self.others]
-        symbols += [model.inputs[n] for n in ("load_velocity", "disturbance", "normal_disturbance", "time")]
-
-        def inlined(expression):
-            pressure = model.inputs["normal_disturbance"]
-            imposed = contact.imposed
-            definitions = {s: d.xreplace({pressure: pressure + imposed}) for s, d in model.definitions.items()}
-            for symbol, definition in reversed(definitions.items()):
-                expression = expression.xreplace({symbol: definition})
-            return expression.xreplace(numbers)
-
-        self.balance = scalar_function(symbols, [inlined(contact.balance)])
-        rates = model.rate_of
-        self.rates = scalar_function(symbols, [inlined(rates[s]) for s in self.others])
-        self.stresses = scalar_function(symbols, [*map(inlined, (contact.normal, contact.friction, contact.spring))])
-        self.start = [float(sp.sympify(model.steady[s]).xreplace(numbers)) for s in self.memory]
-        self.start += [0.0] * (len(self.others) - len(self.memory))
 
     def unknown(self, t, x, v, rest):
         """Acceleration, or without inertia the velocity, that balances forces."""
         given = (*rest, *self.inputs(t))
-        if self.model.inertial:
+        if self.inertial:
             return linear_root(lambda a: self.balance(x, v, a, *given)[0], self.drive)
         if self.plain:
             return bracketed(lambda v: self.balance(x, v, 0.0, *given)[0], 0.0, self.drive)
@@ -60,8 +38,8 @@ class Oracle:
 
     def slope(self, t, y):
         y = y.tolist()
-        x, rest = y[0], y[2:] if self.model.inertial else y[1:]
-        if self.model.inertial:
+        x, rest = y[0], y[2:] if self.inertial else y[1:]
+        if self.inertial:
             v = y[1] if self.plain else self.drive * math.exp(y[1])
             a = self.unknown(t, x, v, rest)
             return [
@@ -76,18 +54,42 @@ class Oracle:
         """Final x, v and memory (and integral)."""
         memory = self.start if memory is None else memory
         v = self.drive if v is None else v
-        y = [x, *([v if self.plain else np.log(v / self.drive)] if self.model.inertial else []), *memory]
-        size = [self.drive if self.plain else 1.0] if self.model.inertial else []
+        y = [x, *([v if self.plain else np.log(v / self.drive)] if self.inertial else []), *memory]
+        size = [self.drive if self.plain else 1.0] if self.inertial else []
         scale = np.array([1e-6, *size, *np.maximum(np.abs(memory), 0 if self.plain else 1e-3)])
         solution = solve_ivp(
             self.slope, (start, until), y, method=method, rtol=rtol, atol=rtol * scale * 0.1, t_eval=times
         )
         assert solution.success, solution.message
         y = solution.y[:, -1]
-        rest = y[2:] if self.model.inertial else y[1:]
-        if not self.model.inertial:
+        rest = y[2:] if self.inertial else y[1:]
+        if not self.inertial:
             return np.array([y[0], self.unknown(until, y[0], None, rest), *rest])
         return np.array([y[0], y[1] if self.plain else self.drive * np.exp(y[1]), *rest])
+
+
+@lru_cache(maxsize=8)
+def equations(rig):
+    """Model; balance and rates as functions of floats; memory in steady sliding, integrals zero."""
+    values = operating_point(rig)
+    model, contact = values.model, values.model.contact
+    numbers = dict(zip(model.arguments, (*values.arguments, float(values.sigma)), strict=True))
+    memory = [m.symbol for m in model.memory]
+    others = [*memory, *(m.symbol for m in model.integrals)]
+    symbols = [contact.slip, contact.velocity, contact.acceleration, *others]
+    symbols += [model.inputs[n] for n in ("load_velocity", "disturbance", "normal_disturbance", "time")]
+
+    def inlined(expression):
+        pressure = model.inputs["normal_disturbance"]
+        definitions = {s: d.xreplace({pressure: pressure + contact.imposed}) for s, d in model.definitions.items()}
+        for symbol, definition in reversed(definitions.items()):
+            expression = expression.xreplace({symbol: definition})
+        return expression.xreplace(numbers)
+
+    balance = scalar_function(symbols, [inlined(contact.balance)])
+    rates = scalar_function(symbols, [inlined(model.rate_of[s]) for s in others])
+    start = [float(sp.sympify(model.steady[s]).xreplace(numbers)) for s in memory]
+    return model, balance, rates, start + [0.0] * (len(others) - len(memory))
 
 
 def zero(t):

@@ -142,9 +142,8 @@ def test_inputs_that_vary_in_time(changes, inputs):
     piece, functions = INPUTS[inputs]
     got, outcome = interpreted(a_rig, piece, 2.0, {"x": 1e-7}, 1e-9)
     assert outcome.status[0] == 1
-    oracle, state = None, None
+    oracle, state = Oracle(a_rig, **functions), None
     for start, stop in ((0.0, 0.5), (0.5, 1.5), (1.5, 2.0)):  # kinks at the ends of the ramp
-        oracle = Oracle(a_rig, **functions)
         begin = {"x": 1e-7} if state is None else {"x": state[0], "v": state[1], "memory": state[2:]}
         state = oracle.run(stop, start=start, method="Radau" if "mass" in changes else "DOP853", **begin)
     scale = np.maximum(np.abs(state), [1e-6, 1e-6, *[1e-3] * (len(state) - 2)])

@@ -74,6 +74,7 @@ def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr
         modules=[{"asinh_exp": numpy_asinh_exp}, "numpy"],
         printer=_Printer,
         cse=True,
+        docstring_limit=0,  # nobody reads it, and writing it takes long
     )
 
     def evaluate(*values: Any) -> list[Any]:

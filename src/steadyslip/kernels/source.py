@@ -28,6 +28,15 @@ class Constants:
         self.symbols: dict[sp.Expr, sp.Symbol] = {}
         self.rates: dict[tuple[sp.Symbol, int], sp.Symbol] = {}
         self._seen: dict[sp.Expr, sp.Expr] = {}
+        self._moves: dict[sp.Basic, bool] = {}
+
+    def moves(self, expression: sp.Basic) -> bool:
+        """Whether an expression has a variable in it."""
+        known = self._moves.get(expression)
+        if known is None:
+            known = expression in self.variables or any(map(self.moves, expression.args))
+            self._moves[expression] = known
+        return known
 
     def lifted(self, expression: sp.Expr) -> sp.Expr:
         """The expression with every largest parameter-only part replaced by a constant."""
@@ -41,11 +50,11 @@ class Constants:
             return expression
         if not isinstance(expression, sp.Expr):  # conditions of a Piecewise
             return expression.func(*(self.lifted(a) for a in expression.args)) if expression.args else expression
-        if not expression.free_symbols & self.variables:
+        if not self.moves(expression):
             return self._constant(expression)
         if expression.is_Mul or expression.is_Add:
-            fixed = [a for a in expression.args if not a.free_symbols & self.variables]
-            moving = [self.lifted(a) for a in expression.args if a.free_symbols & self.variables]
+            fixed = [a for a in expression.args if not self.moves(a)]
+            moving = [self.lifted(a) for a in expression.args if self.moves(a)]
             if fixed:
                 part = expression.func(*fixed)
                 moving.append(part if part.is_Number else self._constant(part))

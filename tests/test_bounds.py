@@ -304,11 +304,7 @@ def test_damaged_records_are_one_message(tmp_path, ending):
 
 # -- formulas
 
-# what ends a simplification may strike while Python collects garbage, which ignores it and says so; it is raised again
-ENDED_FROM_OUTSIDE = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
-
-@ENDED_FROM_OUTSIDE
 def test_a_formula_that_takes_too_long_stays_as_it_stands(monkeypatch):
     module = import_module("steadyslip.linear.formula")
     from steadyslip.model import build_model
@@ -323,7 +319,6 @@ def test_a_formula_that_takes_too_long_stays_as_it_stands(monkeypatch):
     assert float(short.rhs.subs(numbers)) == pytest.approx(float(whole.rhs.subs(numbers)), rel=1e-12)
 
 
-@ENDED_FROM_OUTSIDE
 def test_simplifying_ends(monkeypatch):
     import itertools
     import threading

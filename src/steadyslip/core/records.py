@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from functools import cache
 from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 import numpy as np
@@ -252,9 +253,16 @@ def role_of(item: Field[Any]) -> Declared:
     return role
 
 
-def field_name(record: FrozenRecord | type[FrozenRecord], item: Field[Any], prefix: str) -> str:
-    """Dotted name of a field."""
-    return f"{prefix}{record.section if isinstance(role_of(item), Parameter) else ''}{item.name}"
+def _layout(record: FrozenRecord) -> tuple[tuple[str, str, Declared], ...]:
+    """Of every field: name, name in tables, what it may hold."""
+    kind: Any = type(record)
+    return _layout_of(kind)
+
+
+@cache
+def _layout_of(kind: Any) -> tuple[tuple[str, str, Declared], ...]:
+    found = [(item.name, role_of(item)) for item in fields(kind)]
+    return tuple((name, (kind.section if isinstance(role, Parameter) else "") + name, role) for name, role in found)
 
 
 def is_required(item: Field[Any]) -> bool:
@@ -279,9 +287,8 @@ class Address:
 def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
     """All numeric parameters below `record`, by dotted name, in order of declaration."""
     found: dict[str, Address] = {}
-    for item in fields(record):  # type: ignore[arg-type]
-        role, value = role_of(item), getattr(record, item.name)
-        name = field_name(record, item, prefix)
+    for field_name, own_name, role in _layout(record):
+        value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Parameter):
             found[name] = Address(name, role, value)
         elif isinstance(role, Part) and role.many:
@@ -294,17 +301,17 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
 
 def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Condition]]:
     """Every condition below `record`, with the dotted name of the field that it is about."""
-    items = {item.name: item for item in fields(record)}  # type: ignore[arg-type]
-    for condition in record.conditions():
-        yield field_name(record, items[condition.name], prefix), condition
-    for item in items.values():
-        role, value = role_of(item), getattr(record, item.name)
-        name = field_name(record, item, prefix)
-        if isinstance(role, Part) and role.many:
-            for index, member in enumerate(value, start=1):
-                yield from conditions(member, f"{name}.{index}.")
-        elif isinstance(role, Part) and value is not None:
-            yield from conditions(value, prefix if role.inline else f"{name}.")
+    layout = _layout(record)
+    own = {field_name: prefix + own_name for field_name, own_name, _ in layout}
+    yield from ((own[condition.name], condition) for condition in record.conditions())
+    for field_name, _, role in layout:
+        if isinstance(role, Part):
+            value, name = getattr(record, field_name), own[field_name]
+            if role.many:
+                for index, member in enumerate(value, start=1):
+                    yield from conditions(member, f"{name}.{index}.")
+            elif value is not None:
+                yield from conditions(value, prefix if role.inline else f"{name}.")
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:
@@ -330,17 +337,16 @@ def resolve(name: str, known: Mapping[str, Any]) -> str:
 def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
     """A copy with the parameters of the given full dotted names changed; checked like any other."""
     own: dict[str, Any] = {}
-    for item in fields(record):  # type: ignore[arg-type]
-        role, value = role_of(item), getattr(record, item.name)
-        name = field_name(record, item, prefix)
+    for field_name, own_name, role in _layout(record):
+        value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Part) and role.many:
-            own[item.name] = tuple(
+            own[field_name] = tuple(
                 replaced(member, changes, f"{name}.{index}.") for index, member in enumerate(value, start=1)
             )
         elif isinstance(role, Part) and value is not None:
-            own[item.name] = replaced(value, changes, prefix if role.inline else f"{name}.")
+            own[field_name] = replaced(value, changes, prefix if role.inline else f"{name}.")
         elif name in changes:
-            own[item.name] = changes[name]
+            own[field_name] = changes[name]
     return replace(record, **own)  # type: ignore[type-var]
 
 
@@ -350,24 +356,23 @@ def twin(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
     Law methods read their own fields, so the same method serves numbers and symbols.
     """
     copy: R = object.__new__(type(record))
-    for item in fields(record):  # type: ignore[arg-type]
-        role, value = role_of(item), getattr(record, item.name)
-        name = field_name(record, item, prefix)
+    for field_name, own_name, role in _layout(record):
+        value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Part) and role.many:
             value = tuple(twin(member, values, f"{name}.{i}.") for i, member in enumerate(value, start=1))
         elif isinstance(role, Part) and value is not None:
             value = twin(value, values, prefix if role.inline else f"{name}.")
         elif isinstance(role, Parameter):
             value = values.get(name, value)
-        object.__setattr__(copy, item.name, value)
+        object.__setattr__(copy, field_name, value)
     return copy
 
 
 def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
     """A hashable description of everything but the numbers: types, options, which parameters are given."""
     shape: list[Any] = [type(record)]
-    for item in fields(record):  # type: ignore[arg-type]
-        role, value = role_of(item), getattr(record, item.name)
+    for field_name, _, role in _layout(record):
+        value = getattr(record, field_name)
         if isinstance(role, Parameter):
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")
         elif isinstance(role, Series):

@@ -212,14 +212,13 @@ class Search:
         The static stiffness vanishes there too, so that rounding alone decides which of the two is met first.
         """
         unit = max(np.spacing(abs(low)), np.spacing(abs(high)))
-        for reach in _ROUNDING * unit * 8.0 ** np.arange(_WIDER):  # friction hardly changes with the velocity, say
-            wide = np.array([low - reach, high + reach])
-            if not np.all(self.role.domain.contains(wide)):
-                break
-            status = self.status(wide)
-            if np.any(status == ABSENT) and not np.all(status == ABSENT) and not np.any(status == UNKNOWN):
-                return float(wide[0]), float(wide[1])
-        return low, high
+        reach = _ROUNDING * unit * 8.0 ** np.arange(_WIDER)  # friction hardly changes with the velocity, say
+        wide = np.stack([low - reach, high + reach])
+        wide = wide[:, : np.argmin(np.append(np.all(self.role.domain.contains(wide), axis=0), False))]
+        status = self.status(wide.ravel()).reshape(wide.shape) if wide.size else np.zeros_like(wide, dtype=int)
+        ends = np.sum(status == ABSENT, axis=0) == 1
+        ends &= ~np.any(status == UNKNOWN, axis=0)
+        return tuple(wide[:, np.argmax(ends)].tolist()) if np.any(ends) else (low, high)
 
     def _kind(self, low: float, high: float, below: int, above: int) -> tuple[str, float]:
         if ABSENT in (below, above):

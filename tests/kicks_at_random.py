@@ -13,7 +13,7 @@ from scipy.integrate import DOP853, Radau
 
 import steadyslip as ss
 from steadyslip.nonlinear.kicks.kicks import Kicked
-from steadyslip.nonlinear.kicks.outcomes import OUTCOMES
+from steadyslip.nonlinear.kicks.spans import OUTCOMES
 
 D_C, V_REF, MU, SIGMA = 1e-6, 1e-6, 0.6, 5e6
 LAWS = ("slip", "aging", "prz", "nagata", "two-slip", "two-aging", "lugre")

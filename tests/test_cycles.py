@@ -17,7 +17,7 @@ from rigs_of_theory import CONTACTS, rate_state, rig
 from steadyslip.files.specifications import read_rig
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.continuation import Failure, Point, Track
-from steadyslip.nonlinear.kicks.outcomes import constant_inputs
+from steadyslip.nonlinear.kicks.spans import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module
 from steadyslip.nonlinear.orbits.branch import SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, Runs

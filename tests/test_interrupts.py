@@ -13,7 +13,7 @@ from steadyslip import cli, reproduce as reproducing
 from steadyslip.experiments.answers import laws, predict as predicting, uncertainty
 from steadyslip.experiments.fitting import forward
 from steadyslip.maps.sensitivity import LEAST
-from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED
+from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,14 @@ from dimensionless import unit_rig
 from kicks_at_random import KINDS, Reference, drawn, outcome_of
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.kicks import outcomes as outcomes_module
+from steadyslip.nonlinear.kicks import outcomes as outcomes_module, spans as spans_module
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.closed_orbits import _attraction
+from steadyslip.nonlinear.kicks.fold import at_fold
 from steadyslip.nonlinear.kicks.kicks import Kicked
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood, rates_at
-from steadyslip.nonlinear.kicks.outcomes import BLOW_UP, OUTCOMES, RETURNS, UNDECIDED
 from steadyslip.nonlinear.kicks.rest import rest_of
+from steadyslip.nonlinear.kicks.spans import BLOW_UP, OUTCOMES, RETURNS, UNDECIDED
 
 STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
 
@@ -231,6 +232,63 @@ def test_outcomes_change_at_a_threshold_with_mass():
     assert (below, above) == ("returns", "oscillation")
 
 
+# -- kicks that are hard to follow
+
+
+def test_a_block_thrown_far_ahead_is_waited_for():
+    """It stands still until the load point has caught up, for as long as that takes: friction stops what it may."""
+    friction = ss.RateState(a=0.0128, b=0.0172, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=ss.Slip())
+    base = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=2.8e10, mass=1.5e8,
+                     drive=ss.Steady(1e-6))  # fmt: skip
+    sizes = np.array([1e5, 2e6, 1e9])
+    assert outcomes(base, "impulse", sizes) == ["returns"] * 3
+    kicked = Kicked(base, "impulse", 1, "before", {}, 0, None)
+    lengths = sizes * 1e-6 * np.sqrt(base.mass / base.stiffness) / kicked.length[0]
+    assert lengths[1] > 10 * spans_module.MOST_LOADING  # the load point moves so far before anything happens
+
+
+def test_steps_that_damping_makes_stiff_are_followed():
+    """At e^20 times the velocity memory follows slip at once, and damping lets the spring follow slowly."""
+    friction = ss.RateState(a=0.0139, b=0.0208, d_c=1e-6, mu_ref=0.6, v_ref=1e-6, evolution=ss.PRZ())
+    damped = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=6.8e10, radiation_damping=3.2e8,
+                       drive=ss.Steady(1e-6))  # fmt: skip
+    assert outcomes(damped, "velocity", [5.0, 20.0, 25.0]) == ["returns"] * 3
+    kicked = Kicked(damped, "velocity", 1, "before", {}, 0, None)
+    roots = kicked.rest_after(np.zeros(1, dtype=int), np.array([25.0])).roots[0].real
+    assert roots.min() / roots.max() > 1e8
+    exact = -damped.stiffness / damped.radiation_damping  # of a damper and a spring
+    assert roots.max() == pytest.approx(exact, rel=1e-6)
+
+
+def folding(factor=1.03):
+    """Bristles without mass, whose forces balance at three velocities: .6, .8 and 1 times the drive's."""
+    friction = ss.LuGre(mu_coulomb=0.148, mu_static=0.214, v_stribeck=0.00168, viscous=4.55,
+                        bristle_stiffness=1.29e4, bristle_damping=26.3)  # fmt: skip
+    base = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=4e9, radiation_damping=2490.0,
+                     drive=ss.Steady(0.00285))  # fmt: skip
+    return base.with_values({"stiffness": factor * ss.hopf(base).value})
+
+
+def test_a_block_without_mass_takes_the_nearest_velocity_that_balances_forces():
+    """A step of a thousandth changes the velocity by as little, whichever way the search for it steps."""
+    a_rig, drive = folding(), 0.00285
+    for size in np.linspace(1e-3, 3e-3, 9):
+        run = ss.simulate(a_rig, ss.VelocityStep(at=0.0, to=drive * (1 + size)), until=1e-6)
+        assert run["v"] == pytest.approx(drive, rel=0.01)
+    assert outcomes(a_rig, "velocity", np.geomspace(1e-3, 5e-3, 9)) == ["returns"] * 9
+
+
+def test_where_no_velocity_balances_forces_any_further_there_is_no_solution():
+    """Two of the three velocities meet: the slope of the balance vanishes, and beyond there is but one far away."""
+    a_rig = folding()
+    assert outcomes(a_rig, "displacement", [0.02, 0.1, 1.0]) == ["returns", "no solution", "no solution"]
+    kicked = Kicked(a_rig, "displacement", 1, "before", {}, 0, None)
+    runs = kicked.runs(np.zeros(1, dtype=int), np.array([0.1]))
+    ended = spans_module.advanced_runs(runs, np.zeros(1, dtype=int), None, runs.times()[0])
+    assert at_fold(runs.rest, ended.state).all()
+    assert not at_fold(runs.rest, runs.rest.state).any()
+
+
 # -- no threshold beyond an edge
 
 
@@ -354,8 +412,8 @@ def test_what_takes_too_long_is_undecided(monkeypatch):
     """An unstable rig whose cycle nobody may look for: nothing is said of it."""
     monkeypatch.setattr(outcomes_module, "_alike", lambda now, before: np.zeros(len(now), dtype=bool))
     monkeypatch.setattr(outcomes_module, "LONG", np.inf)
-    monkeypatch.setattr(outcomes_module, "MOST_TURNS", 20.0)
-    monkeypatch.setattr(outcomes_module, "MOST_LOADING", 50.0)
+    monkeypatch.setattr(spans_module, "MOST_TURNS", 20.0)
+    monkeypatch.setattr(spans_module, "MOST_LOADING", 50.0)
     assert outcomes(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["undecided"]
 
 

@@ -20,7 +20,7 @@ from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
-from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED
+from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
 Array = np.ndarray
 COUNT = 4000

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.layout import Array, Routines, call
+from steadyslip.kernels.layout import Array, Routines, Row, call
+
+FIRST_REACH = 0.01  # natural sizes of w within which a balance is looked for first
 
 
 def solve_balance(R: Array, routines: Routines, guess: float, y: Array) -> float:
-    """The w that balances forces, nearest to the guess: bracketed outwards, then safeguarded Newton."""
+    """The w that balances forces, nearest to the guess: bracketed outwards, then safeguarded Newton.
+
+    Forces may balance at several w. A block without mass takes the first on the side to which forces drive it, so
+    the search begins with steps much smaller than the natural size of w.
+    """
     w = guess
     call(routines.balance, R, w, y)
     value = y[0]
@@ -16,7 +22,7 @@ def solve_balance(R: Array, routines: Routines, guess: float, y: Array) -> float
         return w
     if not math.isfinite(value):
         return math.nan
-    step = 0.5 if value < 0.0 else -0.5
+    step = FIRST_REACH * R[Row.Z_SCALE] if value < 0.0 else -FIRST_REACH * R[Row.Z_SCALE]
     low = high = w
     found = False
     for _ in range(200):

@@ -20,8 +20,9 @@ from steadyslip.motion import History, simulate
 from steadyslip.motion.jobs import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import INTERRUPTED, OUTCOMES, Budget, Judged, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import rest_of
+from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Budget, Judged
 from steadyslip.nonlinear.orbits.branch import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 

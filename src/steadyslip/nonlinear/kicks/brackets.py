@@ -13,7 +13,7 @@ from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
 from steadyslip.nonlinear.kicks.kicks import Kicked
-from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.spans import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 

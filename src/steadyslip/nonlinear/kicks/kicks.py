@@ -18,8 +18,9 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import Budget, Judged, continuous_at, outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
+from steadyslip.nonlinear.kicks.spans import Budget, Judged, continuous_at
 
 Array = np.ndarray
 PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself
@@ -48,7 +49,7 @@ class Kick:
 KICKS = {
     kick.name: kick
     for kick in (
-        Kick("velocity", "m/s", 1e-3, 46.0, "step of the load-point velocity; size ln(new/old)"),
+        Kick("velocity", "m/s", 1e-3, 25.0, "step of the load-point velocity; size ln(new/old)"),
         Kick("displacement", "m", 1e-4, 1e5, "step of the load point; size in natural lengths (d_c)"),
         Kick("normal-stress", "Pa", 1e-6, 1e2, "step of the normal stress; size as a share of the steady one"),
         Kick("impulse", "Pa s", 1e-4, 1e12, "blow on a block with mass; size as change of velocity over the drive's"),

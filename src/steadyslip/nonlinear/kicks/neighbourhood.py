@@ -26,6 +26,7 @@ from steadyslip.nonlinear.kicks.rest import Rest, field_of
 Array = np.ndarray
 LARGEST, SMALLEST = 4.0, 1e-9  # radius, in natural sizes of the weakest mode
 SHRINK = 0.6
+LONG = 30.0  # natural sizes of slip per natural size of all else, beyond which a mode is measured by all else
 SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
 INNER = (0.75, 0.5, 0.25, 0.1)  # shells inside the ball that are looked at too
 MARGIN = 0.5  # share of the linear decay of V that is asked for
@@ -67,11 +68,10 @@ class Neighbourhood:
         asked = np.unique(which[np.isnan(self.radius[which])])
         for start in range(0, len(asked), 512):
             piece = asked[start : start + 512]
-            self.basis[piece], self.decay[piece], good = modes(self.rest.matrix[piece])
+            self.basis[piece], self.inverse[piece], self.decay[piece], good = modes(self.rest.part(piece))
             self.radius[piece[~good]] = 0.0
             piece = piece[good]
             if len(piece):
-                self.inverse[piece] = np.linalg.inv(self.basis[piece])
                 self.radius[piece] = self._radii(piece)
         return np.asarray(self.radius[which])
 
@@ -131,23 +131,40 @@ class Neighbourhood:
             return np.asarray(np.all((slope < asked) & (velocity > 0), axis=1))
 
 
-def modes(matrix: Array) -> tuple[Array, Array, Array]:
-    """Real weighted modes of stable matrices (m, n, n) as columns, slow ones first; their rates of decay (m, n), 1/s;
-    and where they can be used (m,)."""
-    roots, vectors = np.linalg.eig(matrix)
+def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
+    """Real weighted modes of stable steady sliding, slow ones first.
+
+    Natural sizes are those of the state. A mode in which slip changes by many of them before velocity or memory
+    change by one is as long as these allow: slip itself changes forces in proportion.
+
+    Returns
+    -------
+    columns, inverse : ndarray (m, n, n)
+    decay : ndarray (m, n)
+        Their rates, 1/s.
+    good : ndarray of bool (m,)
+        Where they can be used.
+    """
+    roots, vectors = np.linalg.eig(rest.matrix)
     order = np.lexsort((-roots.imag, -roots.real))  # the slowest first
     roots, vectors = np.take_along_axis(roots, order, axis=1), np.take_along_axis(vectors, order[:, None, :], axis=2)
+    slip = rest.reduction.names.index("x")
+    velocity = np.abs(roots * vectors[:, slip]) * (rest.scales[:, slip] / np.abs(rest.velocity))[:, None]
+    others = np.maximum(np.max(np.abs(np.delete(vectors, slip, axis=1)), axis=1, initial=0.0), velocity)
     size = np.max(np.abs(vectors), axis=1)
-    vectors = vectors / size[:, None, :]
+    size = np.where(size > LONG * others, others, size)
     imaginary = np.abs(roots.imag) > 1e-12 * np.abs(roots)
     second = imaginary & (roots.imag < 0)
-    columns = np.where(second[:, None, :], -vectors.imag, vectors.real)
     decay = -roots.real
     weight = (np.min(decay, axis=1)[:, None] / decay) ** 0.25  # V weighs q² by the root of the decay time
     with np.errstate(all="ignore"):
-        columns = columns / weight[:, None, :]
-        good = np.all(np.isfinite(columns), axis=(1, 2)) & (np.linalg.cond(columns) < 1e9)
-    return columns, decay, good
+        vectors = vectors / size[:, None, :]
+        columns = np.where(second[:, None, :], -vectors.imag, vectors.real) / weight[:, None, :]
+        rows = np.max(np.abs(columns), axis=2)[:, :, None]
+        good = np.all(np.isfinite(columns), axis=(1, 2)) & (np.linalg.cond(columns / rows) < 1e9)
+    inverse = np.zeros_like(columns)
+    inverse[good] = np.linalg.inv((columns / rows)[good]) / rows[good].transpose(0, 2, 1)
+    return columns, inverse, decay, good
 
 
 @lru_cache(maxsize=8)

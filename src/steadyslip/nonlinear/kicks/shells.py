@@ -15,17 +15,20 @@ the distance falls, every motion returns; nothing is said of motion outside.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from steadyslip.kernels.program import STATUSES
 from steadyslip.nonlinear.kicks.neighbourhood import LARGEST, rates_at
-from steadyslip.nonlinear.kicks.outcomes import CERTAIN, OPEN, RETURNS, Judged, advanced_runs, outcomes_of
+from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, Judged, advanced_runs
 
 Array = np.ndarray
 DONE = STATUSES.index("done")
 COUNT = 32  # shells, from the ball of `neighbourhood` to a few natural sizes,
 FINE = 24  # and between the last that falls and the first that rises,
 REFINED = 2  # so many times
+NOISE = 25.0  # errors of integration, in those allowed per step, beside which the drift of a turn is clear
 SHARE = 0.02  # of the linear decay a turn: what a change must exceed to count
 POINTS = 16  # from which it is seen what comes of a band
 ROUNDS = 12  # of Newton's method for the time of a turn
@@ -40,10 +43,14 @@ class Shells:
     ----------
     runs : Runs
     threads : int, optional
+    fates : callable
+        Says what comes of runs from given states: ``fates(runs, threads, states)``, as `outcomes.outcomes_of`.
     """
 
-    def __init__(self, runs: Judged, threads: int | None) -> None:
-        self.runs, self.threads = runs, threads
+    def __init__(
+        self, runs: Judged, threads: int | None, fates: Callable[[Judged, int | None, Array], Array]
+    ) -> None:  # fmt: skip
+        self.runs, self.threads, self.fates = runs, threads, fates
         count = len(runs.rest.velocity)
         roots = runs.rest.roots
         with np.errstate(invalid="ignore"):
@@ -83,10 +90,16 @@ class Shells:
 
     def _compute(self, group: Array) -> None:
         """Ball and band of rigs that are all alike: on a surface, or not."""
-        near = self.runs.near
-        radii = np.geomspace(near.radius[group], LARGEST, COUNT, axis=1)
+        near, leading = self.runs.near, self.runs.rest.leading[group]
+        with np.errstate(divide="ignore"):
+            blurred = NOISE * self.runs.jobs.options.rtol * np.abs(leading.imag / (2 * np.pi * leading.real))
+        radii = np.geomspace(np.clip(blurred, near.radius[group], 0.5 * LARGEST), LARGEST, COUNT, axis=1)
         falls, rises = self._drift(group, radii)
-        falls[:, 0] = True  # the neighbourhood itself
+        falls[:, 0] |= radii[:, 0] == near.radius[group]  # the neighbourhood itself
+        clear = falls[:, 0]
+        group, radii, falls, rises = group[clear], radii[clear], falls[clear], rises[clear]
+        if not len(group):
+            return
         inner, begin, end = _drifts(radii, falls, rises)
         for _ in range(REFINED):
             top = np.where(np.isfinite(begin), begin, np.minimum(2 * inner, LARGEST))
@@ -183,7 +196,7 @@ class Shells:
         if not after > radius:
             return OPEN
         states = rest.state[one] + rest.scales[one] * np.geomspace(radius, after, POINTS)[:, None] * ray
-        found = outcomes_of(self.runs.repeated(one, POINTS), self.threads, start=states)
+        found = self.fates(self.runs.repeated(one, POINTS), self.threads, states)
         return int(found[0]) if np.all(found == found[0]) else OPEN
 
 

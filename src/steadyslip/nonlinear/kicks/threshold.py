@@ -14,7 +14,7 @@ from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
-from steadyslip.nonlinear.kicks.outcomes import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED, Budget
+from steadyslip.nonlinear.kicks.spans import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED, Budget
 from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
 
 Array = np.ndarray

@@ -1,0 +1,48 @@
+"""Folds of the balance of forces: where motion of a block without mass has no continuous solution any further.
+
+Velocity is what balances forces. Where friction falls when the block speeds up, two such velocities may meet and vanish
+as the state changes; beyond, the block would have to jump to another one far away.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steadyslip.nonlinear.kicks.rest import Rest, field_of
+
+Array = np.ndarray
+REACH = 60.0  # of ln(velocity/drive), to both sides, within which a fold is looked for,
+COUNT = 2401  # at so many velocities first
+BISECTIONS = 60
+NEAR = 1e-7  # force that is missing, as a share of the normal stress, at a state that has come to a fold
+
+
+def at_fold(rest: Rest, states: Array) -> Array:
+    """Whether states (m, n), one for each rig, are where two velocities that balance forces meet (m,)."""
+    if rest.reduction.unknown is None or rest.reduction.model.inertial:
+        return np.zeros(len(states), dtype=bool)
+    turns = np.linspace(-REACH, REACH, COUNT)
+    with np.errstate(all="ignore"):
+        slope = _balance(rest, states, np.broadcast_to(turns, (len(states), COUNT)))[1]
+        which, at = np.nonzero(slope[:, 1:] * slope[:, :-1] <= 0)
+        low, high, rising = turns[at], turns[at + 1], slope[which, at] < 0
+        part, where = rest.part(which), states[which]
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            falls = _balance(part, where, middle[:, None])[1][:, 0] < 0
+            low, high = np.where(falls == rising, middle, low), np.where(falls == rising, high, middle)
+        missing = np.abs(_balance(part, where, low[:, None])[0][:, 0])
+    found = np.zeros(len(states), dtype=bool)
+    found[which[missing < NEAR * part.sigma]] = True
+    return found
+
+
+def _balance(rest: Rest, states: Array, turns: Array) -> tuple[Array, Array]:
+    """Force that is missing at velocities (m, k), and how it changes with them; given as asinh or ln."""
+    numbers = (*rest.point.arguments, rest.sigma, rest.velocity, rest.pressure)
+    given = [rest.column(np.asarray(number)) for number in numbers]
+    unknown = turns
+    if rest.reduction.velocity == "linear":
+        unknown = rest.velocity[:, None] * np.sinh(turns)
+    *_, missing, slope = field_of(rest.reduction)(*given, *states.T[:, :, None], unknown)
+    return np.broadcast_to(missing, turns.shape), np.broadcast_to(slope, turns.shape)

@@ -1,0 +1,183 @@
+"""Motions of kicked rigs under constant inputs, run side by side for a span of time at a time."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from steadyslip.kernels.program import STATUSES, TALLY, Program
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.reduction import Reduction
+from steadyslip.model.start import restored_of
+from steadyslip.motion.engine import LANES, run_chunk, run_many
+from steadyslip.motion.jobs import Jobs, Options
+from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
+from steadyslip.nonlinear.kicks.rest import Rest, picked
+from steadyslip.protocol import Segments
+
+Array = np.ndarray
+OUTCOMES = ("returns", "blow-up", "contact lost", "oscillation", "no solution", "interrupted", "undecided")
+RETURNS, BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION, INTERRUPTED, UNDECIDED = range(7)
+CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
+"""Outcomes that are not a return."""
+OPEN = -1
+
+LOADING = 40.0  # natural lengths that the load point moves at least, to take up what a kick has let go,
+TURNS = 3.0  # natural periods,
+DECAYS = 6.0  # and decay times in the first span of a run; each span is twice as long as the one before
+MOST_TURNS = 1000.0  # natural periods, and
+MOST_LOADING = 4000.0  # natural lengths after which a motion is undecided
+RELOAD = 1.5  # so many times the time in which the load point catches up with the block is no motion to wait for
+NEUTRAL_TURNS = 100.0  # where small motions neither grow nor decay: what stays bounded so long counts as returned
+
+
+@dataclass
+class Budget:
+    """Steps of integration that a search may still take, all its motions together."""
+
+    steps: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Motions under constant inputs, about to be run.
+
+    Attributes
+    ----------
+    jobs : Jobs
+        Rigs and where they start, one for each motion.
+    rest : Rest
+        The steady sliding that their inputs allow.
+    near : Neighbourhood
+        Of that.
+    jump : ndarray (m,)
+        Step of the load point at the start, m.
+    group : ndarray of int (m,)
+        For each motion the first with the same rig and inputs.
+    effort : float
+        Multiplies how long a motion is followed before it is undecided.
+    budget : Budget
+        Motions that are open when it is used up are undecided.
+    """
+
+    jobs: Jobs
+    rest: Rest
+    near: Neighbourhood
+    jump: Array
+    group: Array
+    effort: float = 1.0
+    budget: Budget = field(default_factory=Budget)
+
+    def repeated(self, one: int, count: int) -> Judged:
+        """So many motions of one rig, to be started anywhere."""
+        which = np.full(count, one)
+        rest, near = self.rest.part(which), self.near.part(which)
+        nothing = np.zeros(count)
+        jobs = replace(self.jobs, point=self.jobs.point.part(which), size=count)
+        return Judged(jobs, rest, near, nothing, which * 0, self.effort, self.budget)
+
+    def times(self) -> tuple[Array, Array]:
+        """Length of the first span, and the time after which a motion is undecided, s."""
+        rest, leading = self.rest, self.rest.leading
+        unit = rest.scales[:, rest.reduction.names.index("x")] / np.abs(rest.velocity)
+        reload = RELOAD * np.abs(self.jump) / np.abs(rest.velocity)
+        with np.errstate(all="ignore"):
+            turn = 2 * np.pi / np.abs(leading)
+            turn = np.where(np.isfinite(turn), turn, 0.0)
+            decays = np.where(rest.stable, DECAYS / np.abs(leading.real), 0.0)
+            decays = np.minimum(np.where(np.isfinite(decays), decays, 0.0), 0.1 * MOST_TURNS * turn)
+        first = reload + LOADING * unit + TURNS * turn + decays
+        turns = np.where(rest.neutral, NEUTRAL_TURNS, self.effort * MOST_TURNS)
+        loading = np.where(rest.neutral, LOADING, self.effort * MOST_LOADING)
+        return first, reload + loading * unit + turns * turn
+
+    def reload(self, which: Array, states: Array) -> Array:
+        """Time, s, that the load point needs to catch up with blocks far from where they would slide, (k,)."""
+        x = self.rest.reduction.names.index("x")
+        away = np.abs(states[:, x] - self.rest.state[which, x])
+        return np.asarray(np.nan_to_num(RELOAD * away / np.abs(self.rest.velocity[which])))
+
+
+def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array) -> Segments:
+    """One segment for each run, with the load point moved at its start; arguments (m,)."""
+    count = len(span)
+    value = np.zeros((count, 1, 3))
+    value[:, 0, 0], value[:, 0, 2] = velocity, pressure
+    waves = np.zeros((count, 1, 3, 0))
+    return Segments(
+        np.zeros((count, 1)), span[:, None], jump[:, None], value, np.zeros_like(value), waves, waves, waves
+    )
+
+
+@dataclass
+class Spans:
+    """What a span of some runs ended with: status, state (k, n), steps and tally."""
+
+    status: Array
+    state: Array
+    steps: Array
+    tally: Array
+    whole: bool = True
+
+    @classmethod
+    def empty(cls, count: int, n: int) -> Spans:
+        """Of runs that are still to be run."""
+        return cls(np.full(count, len(STATUSES)), np.full((count, n), np.nan), np.zeros(count),
+                   np.full((count, len(TALLY)), np.nan))  # fmt: skip
+
+    def part(self, which: Array) -> Spans:
+        """Those of some of the runs."""
+        return Spans(self.status[which], self.state[which], self.steps[which], self.tally[which], self.whole)
+
+    def put(self, which: Array, found: Spans) -> None:
+        """Fill in those of some of the runs."""
+        for name in ("status", "state", "steps", "tally"):
+            getattr(self, name)[which] = getattr(found, name)
+        self.whole = self.whole and found.whole
+
+
+def advanced_runs(
+    runs: Judged, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
+    options: Options | None = None,
+) -> Spans:  # fmt: skip
+    """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning."""
+    jobs, rest = replace(runs.jobs, options=options or runs.jobs.options), runs.rest
+    velocity, pressure = rest.velocity[which], rest.pressure[which]
+    jump = runs.jump[which] if start is None else np.zeros(len(which))
+    point = jobs.point.part(which)
+    if start is None:
+        initial, speed = picked(jobs.initial, which), picked(jobs.velocity, which)
+    else:
+        initial, speed = continuous_at(jobs.reduction, point, start, velocity, pressure)
+    part = replace(
+        jobs, point=point, initial=initial, velocity=speed,
+        segments=constant_inputs(span, velocity, jump, pressure), size=len(which),
+    )  # fmt: skip
+    machine: Program = jobs.program(LANES, dense=True)
+    _ = machine.code.advance  # compile before the threads start
+    count = len(which)
+    found = Spans.empty(count, rest.state.shape[1])
+
+    def work(begin: int, end: int, stopped: threading.Event) -> None:
+        outcome = run_chunk(part, machine, begin, end, np.empty(0), watch, stopped)
+        found.status[begin:end], found.state[begin:end] = outcome.status, outcome.final[:, 4:]
+        found.steps[begin:end], found.tally[begin:end] = outcome.final[:, 2] + outcome.final[:, 3], outcome.tally
+
+    found.whole = run_many(work, count, threads)
+    runs.budget.steps -= float(np.nansum(found.steps))
+    return found
+
+
+def continuous_at(
+    reduction: Reduction, point: OperatingPoint, state: Array, velocity: Array, pressure: Array
+) -> tuple[Array, Array]:
+    """What a kernel starts from: the continuous variables, and a velocity near which to look for its own."""
+    with np.errstate(all="ignore"):
+        found = point.evaluate(restored_of(reduction), *state.T, velocity, 0.0, pressure, 0.0)
+        initial = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), (len(state),)) for c in found])
+        speed = np.array(velocity)
+        if reduction.form == "eliminated":
+            speed = np.asarray(point.drive) * np.exp(state[:, reduction.names.index("w")])
+    return np.ascontiguousarray(initial), speed

@@ -272,9 +272,9 @@ def folding(factor=1.03):
 def test_a_block_without_mass_takes_the_nearest_velocity_that_balances_forces():
     """A step of a thousandth changes the velocity by as little, whichever way the search for it steps."""
     a_rig, drive = folding(), 0.00285
-    for size in np.linspace(1e-3, 3e-3, 9):
+    for size in np.linspace(-0.02, 0.01, 11):
         run = ss.simulate(a_rig, ss.VelocityStep(at=0.0, to=drive * (1 + size)), until=1e-6)
-        assert run["v"] == pytest.approx(drive, rel=0.01)
+        assert run["v"] == pytest.approx(drive, rel=0.03)
     assert outcomes(a_rig, "velocity", np.geomspace(1e-3, 5e-3, 9)) == ["returns"] * 9
 
 

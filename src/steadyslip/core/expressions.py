@@ -45,6 +45,10 @@ def numpy_asinh_exp(x: Any, y: Any) -> Any:
     return np.sign(x) * np.where(size > 20.0, size + np.log(2.0), small)
 
 
+_PYTHON = frozenset((int, float, bool))
+"""Numbers that raise where NumPy's become inf or NaN."""
+
+
 class _Printer(NumPyPrinter):  # type: ignore[misc]  # SymPy's printers are untyped
     """SymPy's own NumPy printer, powers of two and the primitive above added."""
 
@@ -79,7 +83,7 @@ def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr
 
     def evaluate(*values: Any) -> list[Any]:
         with np.errstate(all="ignore"):
-            found: list[Any] = function(*(np.float64(v) if isinstance(v, (int, float)) else v for v in values))
+            found: list[Any] = function(*[np.float64(v) if type(v) in _PYTHON else v for v in values])
         return found
 
     return evaluate

@@ -43,6 +43,8 @@ class Numbers(Role):
     most: float = 1e150
 
     def checked(self, value: Any) -> Any:
+        if type(value) is float and abs(value) <= self.most:
+            return value
         try:
             found = np.asarray(value)
             good = found.dtype.kind in "iuf" and found.size > 0 and bool(np.all(np.abs(found) <= self.most))
@@ -100,14 +102,13 @@ def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        signature = inspect.signature(function)
+        defaults = {name: item.default for name, item in inspect.signature(function).parameters.items()}
 
         @functools.wraps(function)
         def called(*args: P.args, **kwargs: P.kwargs) -> R:
             problems = []
-            for name, value in signature.bind(*args, **kwargs).arguments.items():
-                default = signature.parameters[name].default
-                if name not in roles or value is default:
+            for name, value in (dict(zip(defaults, args, strict=False)) | kwargs).items():
+                if name not in roles or value is (default := defaults[name]):
                     continue
                 try:
                     roles[name].checked(value)

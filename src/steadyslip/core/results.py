@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
+
+_HOLDERS = frozenset((np.ndarray, tuple, dict))
 
 
 class ReadOnly:
     """Base of frozen dataclasses that hold arrays, which become read-only, in tuples and dictionaries too."""
 
     def __post_init__(self) -> None:
-        for item in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
-            object.__setattr__(self, item.name, read_only(getattr(self, item.name)))
+        for name in list(self.__dict__):
+            value = self.__dict__[name]
+            if type(value) in _HOLDERS:
+                object.__setattr__(self, name, read_only(value))
 
 
 def read_only(value: Any) -> Any:

@@ -38,7 +38,6 @@ from steadyslip.kernels.layout import Layout, Routines
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.printers import python
 
-_RIGS = "float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1]"
 ENTRIES: dict[str, tuple[ModuleType, str]] = {
     "advance": (
         lanes,
@@ -46,8 +45,15 @@ ENTRIES: dict[str, tuple[ModuleType, str]] = {
         "float64[:,:,::1], float64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,:,::1], "
         "float64[:,::1], float64[:,::1], int64)",
     ),
-    "observe": (states, f"void({_RIGS})"),
-    "field": (states, f"void({_RIGS})"),
+    "observe": (
+        states,
+        "void(float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1], int64[::1], int64[::1], float64[::1], "
+        "float64[:,::1])",
+    ),
+    "field": (
+        states,
+        "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
+    ),
     "through_table": (
         table,
         "void(int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], int64[:,::1], "

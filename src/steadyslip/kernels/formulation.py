@@ -165,6 +165,11 @@ class Formulation:
             self.speed = self._formulas([self._fixed(speed)])
             self.limit = Formulas([self._fixed(inverse.xreplace({v: W}))], {W: "v"})
 
+    @property
+    def terms(self) -> int:
+        """Coefficients of the dense output of a variable."""
+        return len(self.method.dense) + 2 if self.method.implicit else len(self.method.dense[0]) + 1
+
     def _made_layout(self) -> Layout:
         reduction, choice = self.reduction, self.choice
         massless = reduction.restart is not None
@@ -174,7 +179,8 @@ class Formulation:
             kept=len(reduction.continuous),
             constants=len(self.constants.all),
             harmonics=choice.harmonics,
-            stages=self.method.all_stages if choice.dense else 0,
+            stages=self.method.stages if choice.dense else 0,
+            terms=self.terms,
             extra=choice.dense and self.method.all_stages > self.method.stages,
             massless=massless,
             solved=massless and reduction.unknown is not None,

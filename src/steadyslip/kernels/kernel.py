@@ -28,7 +28,7 @@ class Kernel(Formulation):
             self._step(), self._rates_program(), self._outputs_program(), self._restore_program(),
             self._place_program(), self._balance_program(), self._dense_program(),
         )  # fmt: skip
-        if self.layout.extra:
+        if self.choice.dense:
             found = (*found, self._extend_program())
         if self.layout.watched and self.speed is not None:
             return (*found, Watch(self, self.speed).write())
@@ -70,6 +70,7 @@ class Kernel(Formulation):
         for i, value in enumerate(found):
             program.store(n + i, value, "y")
         program.store(n + Out.V_LP, point["in_v"], "y")
+        program.store(n + Out.Q, point["in_q"], "y")
         program.store(n + Out.ADVANCE, record.load_advance(program.number), "y")
         if self.choice.dense:
             if self.speed is not None:  # an extreme of velocity is one of the dense output in w
@@ -88,12 +89,12 @@ class Kernel(Formulation):
         return record.program
 
     def _balance_program(self) -> Program:
-        """The balance as a function of w after a jump; without one, velocity simply continues."""
+        """The balance as a function of w, after a jump or now; without one, velocity simply continues."""
         record = Record(self, Program("balance"))
         program = record.program
         found: list[Value] = [0.0, 1.0]
         if self.restart is not None:
-            point = record.inputs(0.0) | {"w": program.number}
+            point = record.inputs(program.load(Row.TAU)) | {"w": program.number}
             point |= {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}
             found = self.restart(record.constants | point)
         for i, value in enumerate(found):
@@ -113,16 +114,16 @@ class Kernel(Formulation):
         return program
 
     def _extend_program(self) -> Program:
-        """Stages that only dense output needs."""
-        record, n = Record(self, Program("extend")), self.size
-        for s, stage in enumerate(record.extra_stages()[self.method.stages :], start=self.method.stages):
-            for i in range(n):
-                record.program.store(self.layout.stage + s * n + i, stage[i])
+        """The dense output of the last step as polynomials."""
+        record = Record(self, Program("extend"))
+        for i in range(self.size):
+            for j, coefficient in enumerate(record.polynomial(i)):
+                record.program.store(self.layout.curve + i * self.terms + j, coefficient)
         record.program.store(Row.EXTENDED, 1.0)
         return record.program
 
     def _dense_program(self) -> Program:
-        record = Record(self, Program("dense"))
+        record = Record(self, Program("dense"), extended=True)
         program = record.program
         theta = program.number
         if self.choice.dense:

@@ -39,7 +39,7 @@ class Row(IntEnum):
     DONE, TAU_OLD, W_RATE_OLD = 35, 36, 37
     """Length of the last step, where it began, and the rate of the velocity variable there."""
     EXTENDED = 38
-    """Whether the stages are there that only dense output needs."""
+    """Whether the dense output of the last step is there."""
     HAPPENED = 39
     """How many events the last step has."""
     W_LIMIT, W_LP = 40, 41
@@ -65,9 +65,9 @@ SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, a
 class Out(IntEnum):
     """Places of the outputs, counted from the end of the state."""
 
-    V, ACCELERATION, SIGMA, TAU, T, V_LP, ADVANCE, W_SLOPE, COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8
-    """ADVANCE is the way of the load point since the start of the segment, W_SLOPE the slope of the dense output of the
-    velocity variable; events follow from COUNT on."""
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+    """Q is the disturbance, ADVANCE the way of the load point since the start of the segment, W_SLOPE the slope of the
+    dense output of the velocity variable; events follow from COUNT on. What `observe` gives ends with ADVANCE."""
 
 
 class Setting(IntEnum):
@@ -127,7 +127,7 @@ class Layout(NamedTuple):
     stages: int
     """That are kept for dense output; none without."""
     extra: int
-    """Whether some of the stages are computed only where they are needed."""
+    """Whether dense output has stages of its own: then steps are long."""
     events: int
     """That are watched; none without dense output."""
     watched: int
@@ -152,6 +152,8 @@ class Layout(NamedTuple):
     constant: int
     old: int
     stage: int
+    curve: int
+    """Dense output of the last step: coefficients of powers of the fraction of it, variable by variable."""
     mark: int
     """Values of the functions of events."""
     happened: int
@@ -164,15 +166,16 @@ class Layout(NamedTuple):
 
 
 def make_layout(
-    *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, massless: bool = False,
-    solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0, seen: int = 0, events: int = 0,
-    watched: bool = False, extra: bool = False,
+    *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, terms: int = 0,
+    massless: bool = False, solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0,
+    seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False,
 ) -> Layout:  # fmt: skip
     """Put the groups one behind the other."""
     waves = INPUTS * harmonics
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "amplitude": waves, "omega": waves,
         "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages,
+        "curve": size * terms if stages else 0,
         "mark": events, "happened": events, "counted": 2 * events, "seen": seen,
         "before": own if seen else 0,
     }  # fmt: skip
@@ -205,7 +208,7 @@ class Routines(NamedTuple):
     place : the record's state from them and the velocity variable `number`
     balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
     dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`
-    extend : the stages that only dense output needs
+    extend : the dense output of the last step, made ready for `dense`
     watch_lanes : of every lane: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed
     """

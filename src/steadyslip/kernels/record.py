@@ -79,8 +79,9 @@ class Moment:
 class Record:
     """What every evaluation within one program reads: constants, inputs, the unknown."""
 
-    def __init__(self, kernel: Formulation, program: Program) -> None:
+    def __init__(self, kernel: Formulation, program: Program, extended: bool = False) -> None:
         self.kernel, self.program = kernel, program
+        self.extended = extended  # whether the dense output of the last step is there as polynomials
         layout, load = kernel.layout, program.load
         self.constants: Point = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
         self.z: Value = 0.0
@@ -151,15 +152,11 @@ class Record:
 
     @cached_property
     def stages(self) -> list[list[Value]]:
-        """Stages of the last step, as they were kept."""
-        layout, n, method = self.kernel.layout, self.kernel.size, self.kernel.method
-        place = [[layout.stage + s * n + i for i in range(n)] for s in range(method.all_stages)]
-        return [[self.program.load(row) for row in rows] for rows in place]
-
-    def extra_stages(self) -> list[list[Value]]:
-        """All stages, those that only dense output needs computed."""
+        """Stages of the last step: as they were kept, and computed if only dense output needs them."""
         kernel, method, load, n = self.kernel, self.kernel.method, self.program.load, self.kernel.size
-        found, h = self.stages[: method.stages], load(Row.DONE)
+        place = [[kernel.layout.stage + s * n + i for i in range(n)] for s in range(method.stages)]
+        found: list[list[Value]] = [[load(row) for row in rows] for rows in place]
+        h = load(Row.DONE)
         old = [load(kernel.layout.old + i) for i in range(n)]
         for s in range(method.stages, method.all_stages):
             y = [old[i] + h * weighted(method.a[s], [k[i] for k in found]) for i in range(n)]
@@ -170,6 +167,8 @@ class Record:
     def polynomial(self, i: int) -> list[Value]:
         """Dense output of state variable i: coefficients of powers of the fraction of the last step."""
         method, load = self.kernel.method, self.program.load
+        if self.extended:
+            return [load(self.kernel.layout.curve + i * self.kernel.terms + j) for j in range(self.kernel.terms)]
         old, stages = load(self.kernel.layout.old + i), [stage[i] for stage in self.stages]
         if not method.implicit:
             h, columns = load(Row.DONE), zip(*method.dense, strict=True)

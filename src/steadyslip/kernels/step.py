@@ -198,7 +198,6 @@ class Step(Record):
                 store(layout.stage + s * n + i, stage[i])
         if layout.w >= 0:
             store(Row.W_RATE_OLD, self.first[layout.w])
-        if layout.extra:
-            store(Row.EXTENDED, 0.0)
+        store(Row.EXTENDED, 0.0)
         store(Row.DONE, self.h)
         store(Row.TAU_OLD, self.tau)

@@ -51,8 +51,6 @@ class Watch(Record):
     def _locate(self) -> None:
         """The fraction of the step at which velocity turns or slip begins."""
         kernel, program, w = self.kernel, self.program, self.kernel.layout.w
-        if kernel.layout.extra:
-            self.stages = self.extra_stages()
         own, course = self.polynomial(w), self.course(w)
         limit = program.load(Row.W_LIMIT)
         crossing: list[Value] = [own[0] - limit, *own[1:]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
@@ -146,7 +147,7 @@ class Model(Keeper):
             raise NotAvailable(f"this is not offered for a model with {len(self.contacts)} contacts; allowed: 1")
         return self.contacts[0]
 
-    @property
+    @cached_property
     def inertial(self) -> bool:
         """Whether every sliding body has a velocity of its own."""
         return all(contact.inertial for contact in self.contacts)
@@ -156,12 +157,12 @@ class Model(Keeper):
         """Whether some normal stress is prescribed in time."""
         return any(contact.imposed != 0 for contact in self.contacts)
 
-    @property
+    @cached_property
     def memory(self) -> tuple[Variable, ...]:
         """The memory variables of all contacts."""
         return tuple(item for item in self.variables if item.kind == "memory")
 
-    @property
+    @cached_property
     def integrals(self) -> tuple[Variable, ...]:
         """What controllers integrate."""
         return tuple(item for item in self.variables if item.kind == "integral")

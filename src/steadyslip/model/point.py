@@ -97,9 +97,19 @@ class OperatingPoint(Keeper):
         """Where the equation for σss leaves the range of floating point, so that nothing can be said."""
         return beyond_floats(self.model, self.arguments, self.shape)
 
+    @cached_property
+    def single(self) -> bool:
+        """Whether all values are numbers: one rig."""
+        return not any(map(np.ndim, self.arguments))
+
+    @cached_property
+    def _numbers(self) -> tuple[Any, ...]:
+        """`arguments` and `sigma` as NumPy's numbers and arrays."""
+        return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, self.sigma))
+
     def evaluate(self, function: Callable[..., list[Any]], *further: Any) -> list[Any]:
         """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
-        return function(*self.arguments, self.sigma, *further)
+        return function(*self._numbers, *further)
 
     def pieces(self, most: int) -> Iterator[OperatingPoint]:
         """The same rigs, flattened, at most `most` at a time; itself if it is no larger."""
@@ -113,7 +123,7 @@ class OperatingPoint(Keeper):
 
     def part(self, rows: slice | np.ndarray) -> OperatingPoint:
         """Some rigs of a flat point; single numbers are for all of them."""
-        if self.size == 1 and not any(map(np.ndim, self.arguments)):
+        if self.single:
             return self
         cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, self.sigma)]
         found = self.with_arguments(cut[:-1], np.broadcast_shapes(*map(np.shape, cut)))

@@ -21,6 +21,24 @@ def _steady_memory(model: Model) -> Callable[..., list[Any]]:
 
 
 @question
+def _continuous_names(reduction: Reduction) -> tuple[str, ...]:
+    """Names of what a jump leaves alone; ``w`` is the velocity variable."""
+    by_symbol = {item.symbol: item.name for item in reduction.model.variables} | {W: "w"}
+    return tuple(by_symbol[symbol] for symbol in reduction.continuous)
+
+
+@question
+def _own_memory(point: OperatingPoint) -> list[Any]:
+    """The memory in steady sliding."""
+    return point.evaluate(_steady_memory(point.model))
+
+
+def _number(value: Any) -> Any:
+    """A float or an array of them; NumPy is quicker with the former than with arrays without axes."""
+    return np.asarray(value, dtype=float)[()]
+
+
+@question
 def _velocity_variable(reduction: Reduction) -> Callable[..., list[Any]]:
     model = reduction.model
     return model.function([reduction.w_of_v], model.contact.velocity, *(item.symbol for item in model.memory))
@@ -56,10 +74,8 @@ def initial_values(
     model = reduction.model
     names = [item.name for item in model.memory]
     start = _checked_initial(given, model)
-    steady = point.evaluate(_steady_memory(model))
-    memory = [np.asarray(start.get(name, value), dtype=float) for name, value in zip(names, steady, strict=True)]
-    x = np.asarray(start.get("x", 0.0), dtype=float)
-    v = np.asarray(start.get("v", point.drive), dtype=float)
+    memory = [_number(start.get(name, value)) for name, value in zip(names, _own_memory(point), strict=True)]
+    x, v = _number(start.get("x", 0.0)), _number(start.get("v", point.drive))
     if reduction.velocity == "logarithm" and not np.all(v > 0):
         raise ParameterError([Problem("initial.v", f"got {given.get('v')!r}; allowed: > 0 m/s with this law")])
     if not model.inertial and "v" in start:
@@ -68,13 +84,15 @@ def initial_values(
             message = "cannot be given: without mass it follows from the memory; give the memory or the velocity"
             raise ParameterError([Problem("initial.v", message)])
         memory[free[0]] = _matching_memory(reduction, point, x, v, memory, free[0])
-    values = {model.contact.slip: x, **{item.symbol: one for item, one in zip(model.memory, memory, strict=True)}}
-    values |= {item.symbol: start.get(item.name, 0.0) for item in model.integrals}
-    if W in reduction.continuous:
-        values[W] = point.evaluate(_velocity_variable(reduction), v, *memory)[0]
-    columns = [np.atleast_1d(np.asarray(values[symbol], dtype=float)) for symbol in reduction.continuous]
-    arrays = np.broadcast_arrays(*columns)
-    return np.ascontiguousarray(np.column_stack(arrays)), np.atleast_1d(v)
+    order = _continuous_names(reduction)
+    values = {"x": x, **dict(zip(names, memory, strict=True))}
+    values |= {item.name: start.get(item.name, 0.0) for item in model.integrals}
+    if "w" in order:
+        values["w"] = point.evaluate(_velocity_variable(reduction), v, *memory)[0]
+    columns = [values[name] for name in order]
+    if not any(map(np.ndim, columns)):
+        return np.array([columns], dtype=float), np.atleast_1d(v)
+    return np.ascontiguousarray(np.column_stack(np.broadcast_arrays(*map(np.atleast_1d, columns)))), np.atleast_1d(v)
 
 
 def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.ndarray]:
@@ -99,7 +117,7 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
 def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any, memory: list[Any], index: int) -> Any:
     """The memory variable that balances forces at a given velocity, by Newton's method (one step where linear)."""
     function = _balance(reduction, index)
-    current = [np.asarray(m, dtype=float) for m in memory]
+    current = list(memory)
     for _ in range(60):
         with np.errstate(all="ignore"):
             residual, slope = point.evaluate(function, x, v, *current)

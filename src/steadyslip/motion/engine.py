@@ -24,7 +24,7 @@ INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATU
 
 @dataclass
 class Outcome:
-    """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only.
+    """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only; `tables` it was given.
 
     ``final`` has columns time, segment, accepted, rejected, then the state.
     """
@@ -35,6 +35,7 @@ class Outcome:
     samples: np.ndarray
     log: np.ndarray
     recorded: np.ndarray
+    tables: tuple[np.ndarray, ...]
 
 
 class Call:
@@ -80,7 +81,7 @@ class Call:
         self.status[self.status == 0] = INTERRUPTED
         return Outcome(
             self.status, self.final, self.tally, self.samples,
-            self.log[: self.cursor[Cursor.LOGGED]], self.recorded[: self.cursor[Cursor.RECORDED]],
+            self.log[: self.cursor[Cursor.LOGGED]], self.recorded[: self.cursor[Cursor.RECORDED]], self.tables,
         )  # fmt: skip
 
 

@@ -72,7 +72,8 @@ class SlipEvent:
 def events_of(log: np.ndarray) -> tuple[Event, ...]:
     """The kernel's log as records, in the order of time: it logs a beginning only when slip has become fast."""
     log = log[np.argsort(log[:, 1], kind="stable")]
-    return tuple(Event(LOG_KINDS[int(row[0])], *row[1:7]) for row in log.tolist())
+    kinds, *columns = log.T[:7].tolist()
+    return tuple(map(Event, [LOG_KINDS[int(kind)] for kind in kinds], *columns))
 
 
 def slip_events(events: tuple[Event, ...]) -> tuple[SlipEvent, ...]:

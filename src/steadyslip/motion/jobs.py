@@ -118,7 +118,7 @@ class Jobs:
         at_start = guess(self.reduction, point, initial, velocity)
         ask = _kept_settings if point.size == 1 else _settings
         settings = ask(point, machine, self.reduction, self.options)
-        settings = np.tile(settings, (max(len(settings), np.size(at_start)) // len(settings), 1))
+        settings = settings.repeat(max(len(settings), np.size(at_start)) // len(settings), axis=0)
         settings[:, Setting.GUESS] = at_start
         settings[:, Setting.WATCH], settings[:, Setting.RECORD] = watch, record
         return machine.constants(point), initial, settings, self.segments.rows(start, stop)
@@ -203,7 +203,7 @@ def prepare(
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate)
     start, velocity = initial_values(reduction, point, initial)
-    size = max(len(point.stresses), len(segments.start), len(start), *(np.size(a) for a in point.arguments), 1)
+    size = max(len(point.stresses), len(segments.start), len(start), point.size, 1)
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
 
 

@@ -288,7 +288,7 @@ class _Store:
             return
         ran = np.flatnonzero(np.isfinite(outcome.final[:, 4:]).all(axis=1) & ~absent)
         final = outcome.final[ran]
-        found = observe(jobs, machine, first, ran, final[:, 1].astype(int), final[:, 0], final[:, 4:])
+        found = observe(jobs, machine, first, ran, final[:, 1].astype(int), final[:, 0], final[:, 4:], outcome.tables)
         rows = np.arange(len(self.code))[where]
         self._leaves_range(rows[ran], final[:, 0], out_of_range(found))
         for name, array in self.final.items():
@@ -297,7 +297,9 @@ class _Store:
         if self.samples:
             lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, 0]) & ~absent[:, None])
             segment = segment_of(jobs.segments, first + lane, self.times[k])
-            found = observe(jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k])
+            found = observe(
+                jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k], outcome.tables
+            )
             self._leaves_range(rows[lane], self.times[k], out_of_range(found))
             for name, array in self.samples.items():
                 if name in found:

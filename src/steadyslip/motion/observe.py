@@ -11,9 +11,12 @@ from steadyslip.core.questions import question
 from steadyslip.kernels.program import Program
 from steadyslip.model import Model
 from steadyslip.motion.jobs import Jobs
-from steadyslip.protocol.inputs import input_slopes, inputs_at, load_displacement
 
 Array = np.ndarray
+Tables = tuple[np.ndarray, ...]
+OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity", "disturbance",
+            "load_displacement")  # fmt: skip
+"""What the driver's `observe` gives, in this order."""
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s",
                "disturbance": "Pa"}  # fmt: skip
 
@@ -42,8 +45,9 @@ def _function(model: Model) -> tuple[list[str], Callable[..., list[Any]]]:
 
 
 def observe(
-    jobs: Jobs, machine: Program, first: int, lane: Array, segment: Array, time: Array, states: Array
-) -> dict[str, Array]:
+    jobs: Jobs, machine: Program, first: int, lane: Array, segment: Array, time: Array, states: Array,
+    tables: Tables | None = None,
+) -> dict[str, Array]:  # fmt: skip
     """All observables at given states.
 
     Parameters
@@ -54,27 +58,27 @@ def observe(
     time : ndarray (points,)
         Since the start of the run.
     states : ndarray (points, state)
+    tables : tuple of ndarray, optional
+        Those of the jobs from `first` on, if they are at hand.
     """
     reduction = machine.reduction
     model = reduction.model
     last = first + (int(lane.max()) if len(lane) else 0) + 1
-    constants, _, settings, _ = jobs.tables(machine, first, last, False, False)
-    where = jobs.segments, first + lane, segment, time
-    inputs = np.column_stack([inputs_at(*where), input_slopes(*where), time])
-    values = np.empty((len(time), 5 + len(reduction.continuous)))
-    machine.code.observe(constants, settings, np.ascontiguousarray(states), inputs, lane.astype(np.int64), values)
-    found = dict(zip(("v", "acceleration", "normal_stress", "shear_stress", "spring_stress"), values.T, strict=False))
+    constants, _, settings, segments = tables or jobs.tables(machine, first, last, False, False)
+    values = np.empty((len(OBSERVED) + len(reduction.continuous), len(time)))
+    machine.code.observe(
+        constants, settings, segments, np.ascontiguousarray(states), np.ascontiguousarray(lane, dtype=np.int64),
+        np.ascontiguousarray(segment, dtype=np.int64), np.ascontiguousarray(time), values,
+    )  # fmt: skip
+    found = dict(zip(OBSERVED, values, strict=False))
     found["x"] = states[:, 0]
-    continuous = dict(zip(reduction.continuous, values.T[5:], strict=True))
+    continuous = dict(zip(reduction.continuous, values[len(OBSERVED) :], strict=True))
     found |= {item.name: continuous[item.symbol] for item in (*model.memory, *model.integrals)}
-    found["load_velocity"], found["disturbance"] = inputs[:, 0], inputs[:, 1]
-    found["load_displacement"] = load_displacement(*where)
     found["slip"] = found["x"] + found["load_displacement"]
     names, function = _function(model)
     point = jobs.point.part(slice(first, last)).part(lane)
     stresses = [found["x"], found["v"], found["normal_stress"], found["shear_stress"], found["spring_stress"]]
     own = [found[item.name] for item in model.memory]
-    with np.errstate(all="ignore"):
-        for name, value in zip(names, point.evaluate(function, *stresses, *own), strict=True):
-            found[name] = np.broadcast_to(value, time.shape).astype(float)
+    for name, value in zip(names, point.evaluate(function, *stresses, *own), strict=True):
+        found[name] = value if np.shape(value) == time.shape else np.full(time.shape, value, dtype=float)
     return found

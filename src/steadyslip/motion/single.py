@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,8 @@ def simulate(
         If the rig's motion is ill-posed, or a law cannot move as asked.
     """
     options = Options(method, rtol, most_steps, arrest)
-    jobs = prepare(rig, protocol, until, {}, initial or {}, options, branch)
+    plan = Protocol.of(protocol)
+    jobs = prepare(rig, plan, until, {}, initial or {}, options, branch)
     if not jobs.sigma[0] > 0:
         steady_state(rig)  # raises, and says why
     if not jobs.posed[0]:
@@ -103,9 +105,13 @@ def simulate(
     requested = checked_times(times, final)
     machine = jobs.program(lanes=1, dense=True)
     outcome = run_single(jobs, machine, requested, watch=events, record=times is None, progress=progress)
-    plan = Protocol.of(protocol)
-    plan = plan if plan.until == final else replace(plan, until=final)
-    return _history(rig, plan, jobs, machine, outcome, requested, times is None)
+    return _history(rig, _ended(plan, final), jobs, machine, outcome, requested, times is None)
+
+
+@lru_cache(maxsize=32)
+def _ended(plan: Protocol, until: float) -> Protocol:
+    """A protocol with its end."""
+    return plan if plan.until == until else replace(plan, until=until)
 
 
 def checked_times(times: Any, until: float) -> np.ndarray:
@@ -141,11 +147,11 @@ def _history(
         time, states = requested[reached], outcome.samples[0][reached]
         segment = segment_of(jobs.segments, np.zeros(len(time), dtype=int), time)
     lane = np.zeros(len(time), dtype=int)
-    found = observe(jobs, machine, 0, lane, segment, time, states)
+    found = observe(jobs, machine, 0, lane, segment, time, states, outcome.tables)
     units = {"t": "s"} | observable_units(machine.reduction.model)
     events = events_of(outcome.log)
     if status == "blow-up":
-        events += (_last_event("blow-up", jobs, machine, final),)
+        events += (_last_event("blow-up", jobs, machine, outcome),)
     if status == "done" and np.any(bad := out_of_range(found)):
         first = int(np.argmax(bad))
         status, end, time = "out of range", float(time[first]), time[:first]
@@ -166,9 +172,9 @@ def _history(
     )
 
 
-def _last_event(kind: str, jobs: Jobs, machine: Program, final: np.ndarray) -> Event:
+def _last_event(kind: str, jobs: Jobs, machine: Program, outcome: Outcome) -> Event:
     """The end of a run that could not go on, as an event."""
-    zero = np.zeros(1, dtype=int)
-    found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], final[None, 4:])
+    zero, final = np.zeros(1, dtype=int), outcome.final[0]
+    found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], final[None, 4:], outcome.tables)
     names = ("v", "normal_stress", "shear_stress", "spring_stress", "slip")
     return Event(kind, float(final[0]), *(float(found[name][0]) for name in names))

@@ -8,6 +8,7 @@ from the segment's start.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.protocol.curves import Array
-from steadyslip.protocol.protocol import LOAD_POINT
 from steadyslip.protocol.segments import Segments
 
 Waves = Iterable[tuple[Any, Any, Any]]
@@ -94,32 +94,6 @@ def inputs_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array
     return found
 
 
-def input_slopes(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
-    """Their rates of change, as `inputs_at`."""
-    where, _, slope, waves = _parts(segments, lane, segment)
-    found: Array = slope_at((time - segments.start[where])[..., None], slope, waves, np.cos)
-    return found
-
-
-def load_displacement(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
-    """Distance that the load point has moved since the start of the run, jumps included, m."""
-    every = np.arange(len(segments.start))[:, None], np.arange(segments.start.shape[1])[None]
-    whole = _moved(segments, *every, segments.end)
-    before = np.cumsum(segments.jump, axis=1) + np.cumsum(whole, axis=1) - whole
-    lane = lane if len(segments.start) > 1 else np.zeros_like(lane)
-    found: Array = before[lane, segment] + _moved(segments, lane, segment, time)
-    return found
-
-
-def _moved(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
-    where, value, slope, waves = _parts(segments, lane, segment)
-    own = [(a[..., LOAD_POINT], omega[..., LOAD_POINT], phase[..., LOAD_POINT]) for a, omega, phase in waves]
-    found: Array = integral_to(
-        time - segments.start[where], value[..., LOAD_POINT], slope[..., LOAD_POINT], own, np.cos
-    )
-    return found
-
-
 def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
     """Load-point velocity (m/s), disturbance stress (Pa) and added normal stress (Pa) of the first lane at times `t`.
 
@@ -135,6 +109,6 @@ def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
     if not np.all((times >= 0) & (times <= last)):
         raise ParameterError([Problem("t", f"got {t!r}; allowed: times between 0 and {last!r} s")])
     lane = np.zeros(times.size, dtype=int)
-    first = Segments(*(part[:1] for part in vars(segments).values()))
+    first = Segments(*(getattr(segments, item.name)[:1] for item in fields(Segments)))
     found = inputs_at(first, lane, segment_of(first, lane, times.ravel()), times.ravel()).reshape(*times.shape, -1)
     return found[..., 0], found[..., 1], found[..., 2]

@@ -76,7 +76,7 @@ class Protocol(FrozenRecord):
             If `given` is none of these, or pieces overlap.
         """
         if given is None:
-            return cls()
+            return _NOTHING
         if isinstance(given, Protocol):
             return given
         if isinstance(given, Piece):
@@ -134,6 +134,9 @@ class Protocol(FrozenRecord):
                     "without overlap",
                 )
             earlier, last_end = f"piece {number} ({piece.name or type(piece).__name__})", max(end, last_end)
+
+
+_NOTHING = Protocol()
 
 
 def _joined(first: Piece | Protocol, second: Piece | Protocol) -> Protocol:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -59,7 +59,14 @@ class Segments:
 
     def rows(self, start: int, stop: int) -> Array:
         """Those of some lanes as the kernels read them: start, end, jump, values, slopes, waves."""
-        lanes = slice(start, stop) if len(self.start) > 1 else slice(None)
+        return self._rows(slice(start, stop)) if len(self.start) > 1 else self._shared_rows
+
+    @cached_property
+    def _shared_rows(self) -> Array:
+        """Those that all lanes share."""
+        return self._rows(slice(None))
+
+    def _rows(self, lanes: slice) -> Array:
         parts = [part[lanes, :, None] for part in (self.start, self.end, self.jump)]
         parts += [self.value[lanes], self.slope[lanes]]
         for wave in (self.amplitude, self.divisors(), self.phase):

@@ -14,7 +14,7 @@ def look_now(R: Array, layout: Layout, routines: Routines, tau: float, y: Array)
 
 def between(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
     """The state at the fraction theta of the last step, in y."""
-    if layout.extra > 0 and R[Row.EXTENDED] == 0.0:
+    if R[Row.EXTENDED] == 0.0:
         call(routines.extend, R, 0.0, y)
     call(routines.dense, R, theta, y)
 

@@ -20,13 +20,18 @@ def set_inputs(S: Array, lanes: int, lane: int, row: Array, first: int) -> None:
         S[(Row.SLOPE + i) * lanes + lane] = row[first + INPUTS + i]
 
 
-def begin_segment(S: Array, lanes: int, lane: int, row: Array) -> None:
+def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -> None:
     """Times and inputs of a segment, for one lane."""
     S[Row.TAU * lanes + lane] = 0.0
     S[Row.START * lanes + lane] = row[0]
     S[Row.STOP * lanes + lane] = row[1]
     S[Row.END * lanes + lane] = row[1] - row[0]
     set_inputs(S, lanes, lane, row, 3)
+    waves = INPUTS * layout.harmonics
+    for i in range(waves):
+        S[(layout.amplitude + i) * lanes + lane] = row[9 + i]
+        S[(layout.omega + i) * lanes + lane] = row[9 + waves + i]
+        S[(layout.phase + i) * lanes + lane] = row[9 + 2 * waves + i]
 
 
 def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, segments: Array, y: Array) -> bool:
@@ -36,14 +41,9 @@ def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, 
         call(routines.restore, R, 0.0, y)
     row = segments[s, k]
     R[Row.SEGMENT] = k
-    begin_segment(R, 1, 0, row)
+    begin_segment(R, layout, 1, 0, row)
     R[layout.continuous] -= row[2]
     R[Row.LOAD_MOVED] += row[2]
-    waves = INPUTS * layout.harmonics
-    for i in range(waves):
-        R[layout.amplitude + i] = row[9 + i]
-        R[layout.omega + i] = row[9 + waves + i]
-        R[layout.phase + i] = row[9 + 2 * waves + i]
     w = R[Row.Z]  # the velocity variable before the jump, as a guess
     if layout.massless:
         w = solve_balance(R, routines, w, y)

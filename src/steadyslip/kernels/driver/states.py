@@ -5,64 +5,90 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.kernels.driver.balance import solve_balance
-from steadyslip.kernels.driver.segments import set_inputs
+from steadyslip.kernels.driver.segments import begin_segment, set_inputs
 from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Setting, call
 
 
-def placed(
-    R: Array, layout: Layout, routines: Routines, constants: Array, settings: Array, state: Array, inputs: Array,
-    own: int, y: Array,
-) -> None:  # fmt: skip
-    """Bring a given state into a record, balance solved where there is one left to solve."""
+def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
+    """Constants of a rig, and its guess of the unknown."""
     for i in range(layout.constants):
         R[layout.constant + i] = constants[own if constants.shape[0] > 1 else 0, i]
+    R[Row.Z] = settings[own if settings.shape[0] > 1 else 0, Setting.GUESS]
     R[Row.Z_SCALE] = settings[own if settings.shape[0] > 1 else 0, Setting.Z_SCALE]
-    R[Row.START] = inputs[6]
-    set_inputs(R, 1, 0, inputs, 0)
-    R[Row.TAU] = 0.0
+
+
+def place_state(R: Array, layout: Layout, routines: Routines, states: Array, m: int, y: Array) -> None:
+    """Bring state m into a record and into y, balance solved where there is one left to solve."""
     for i in range(layout.size):
-        R[layout.state + i] = state[i]
+        R[layout.state + i] = states[m, i]
     if layout.solved:
         for i in range(layout.kept):
-            R[layout.continuous + i] = state[i]
+            R[layout.continuous + i] = states[m, i]
         R[Row.Z] = solve_balance(R, routines, R[Row.Z], y)
     for i in range(layout.size):
-        y[i] = state[i]
+        y[i] = states[m, i]
+
+
+def go_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array, s: int, k: int, y: Array) -> None:
+    """From the segment that the record is in (-1 before the first) to a later one, with the way of the load point."""
+    while R[Row.SEGMENT] < k:
+        if R[Row.SEGMENT] >= 0.0:
+            R[Row.TAU] = R[Row.END]
+            call(routines.restore, R, 0.0, y)  # for the way of the load point
+        R[Row.SEGMENT] += 1.0
+        row = segments[s, int(R[Row.SEGMENT])]
+        begin_segment(R, layout, 1, 0, row)
+        R[Row.LOAD_MOVED] += row[2]
 
 
 def observe(
-    layout: Layout, routines: Routines, constants: Array, settings: Array, states: Array, inputs: Array, own: Array,
-    values: Array,
+    layout: Layout, routines: Routines, constants: Array, settings: Array, segments: Array, states: Array, own: Array,
+    segment: Array, times: Array, values: Array,
 ) -> None:  # fmt: skip
     """Outputs and continuous variables at given states.
 
-    `states` is (m, size); `inputs` (m, 7) holds v_lp, q, p, their slopes and the time; `own` the rig's row.
-    `values` is (m, 5 + kept).
+    `states` is (m, size); `own` (m,) the rig's row, `segment` and `times` where and when in its protocol, since the
+    start of the run. `values` is (8 + kept, m): `Out` up to ADVANCE, which is here the way of the load point since the
+    start of the run, and the variables that jumps leave alone.
     """
     R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
     rig = -1
     for m in range(states.shape[0]):
         if own[m] != rig:
             rig = own[m]
-            R[Row.Z] = settings[rig if settings.shape[0] > 1 else 0, Setting.GUESS]
-        placed(R, layout, routines, constants, settings, states[m], inputs[m], rig, y)
-        call(routines.outputs, R, 0.0, y)
-        for i in range(5):
-            values[m, i] = y[layout.size + i]
+            place_rig(R, layout, constants, settings, rig)
+            R[Row.SEGMENT] = -1.0
+            R[Row.LOAD_MOVED] = 0.0
+        for i in range(layout.size):
+            R[layout.state + i] = states[m, i]
+        if R[Row.SEGMENT] > segment[m]:
+            R[Row.SEGMENT] = -1.0
+            R[Row.LOAD_MOVED] = 0.0
+        go_to_segment(R, layout, routines, segments, rig if segments.shape[0] > 1 else 0, segment[m], y)
+        R[Row.TAU] = times[m] - R[Row.START]
+        place_state(R, layout, routines, states, m, y)
+        call(routines.outputs, R, R[Row.TAU], y)
+        for i in range(Out.W_SLOPE):
+            values[i, m] = y[layout.size + i]
+        moved = R[Row.LOAD_MOVED]
+        values[Out.ADVANCE, m] += moved
         call(routines.restore, R, 0.0, y)
+        R[Row.LOAD_MOVED] = moved
         for i in range(layout.kept):
-            values[m, 5 + i] = R[layout.continuous + i]
+            values[Out.W_SLOPE + i, m] = R[layout.continuous + i]
 
 
 def field(
     layout: Layout, routines: Routines, constants: Array, settings: Array, states: Array, inputs: Array, own: Array,
     values: Array,
 ) -> None:  # fmt: skip
-    """Rates at given states, (m, size); arguments as for `observe`."""
+    """Rates at given states, (m, size); `inputs` (m, 7) holds v_lp, q, p, their slopes and the time, `own` the rig."""
     R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
     for m in range(states.shape[0]):
-        R[Row.Z] = settings[own[m] if settings.shape[0] > 1 else 0, Setting.GUESS]
-        placed(R, layout, routines, constants, settings, states[m], inputs[m], own[m], y)
+        place_rig(R, layout, constants, settings, own[m])
+        set_inputs(R, 1, 0, inputs[m], 0)
+        R[Row.START] = inputs[m, 6]
+        place_state(R, layout, routines, states, m, y)
         call(routines.rates, R, 0.0, y)
         for i in range(layout.size):
             values[m, i] = R[layout.rate + i]

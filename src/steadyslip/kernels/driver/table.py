@@ -19,7 +19,7 @@ def enter_row(S: Array, layout: Layout, group: int, k: int, segments: Array, inp
     W = layout.lanes
     for lane in range(W):
         row = segments[min(group + lane, segments.shape[0] - 1), k]
-        begin_segment(S, W, lane, row)
+        begin_segment(S, layout, W, lane, row)
         S[(layout.state + layout.x) * W + lane] -= row[2]
         if input_rates.shape[1] > 0:
             own = min(group + lane, input_rates.shape[0] - 1)

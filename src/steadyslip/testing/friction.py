@@ -88,16 +88,14 @@ def check_steady_state(law: FrictionLaw, conditions: Conditions = MIDDLE) -> Non
     """Rates vanish at `steady_memory`, and the strength there is `steady_strength`, over decades of v and σ."""
     said = statement(law)
     values = said.function(*said.rates, said.strength)
-    gradients = said.function(*(d for e in (*said.rates, said.strength) for d in said.gradient(e)))
-    width = len(said.inputs)
+    gradients = [said.function(*said.gradient(rate)) for rate in said.rates]
     for v, sigma in conditions.grid():
         with mpmath.workdps(DIGITS):
             point = said.steady(v, sigma)
             *rates, strength = values(*point)
-            slopes = gradients(*point)
-            for i, (name, rate) in enumerate(zip(law.memory(), rates, strict=True)):
+            for name, rate, gradient in zip(law.memory(), rates, gradients, strict=True):
                 # what each input contributes to the rate: the size of the terms that have to cancel
-                terms = sum(abs(d * x) for d, x in zip(slopes[i * width : (i + 1) * width], point, strict=True))
+                terms = sum(abs(d * x) for d, x in zip(gradient(*point), point, strict=True))
                 require(
                     abs(rate) <= TOLERANCE * terms,
                     law,

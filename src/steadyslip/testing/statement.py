@@ -12,6 +12,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.expressions import array_function
+from steadyslip.core.questions import Keeper, question
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import in_symbols, precise_function, stated
 
@@ -48,7 +49,7 @@ class Conditions:
 MIDDLE = Conditions()
 
 
-class Statement:
+class Statement(Keeper):
     """What a law says, in symbols: its expressions, their gradients, and both as numbers to fifty digits."""
 
     def __init__(self, law: FrictionLaw) -> None:
@@ -69,11 +70,13 @@ class Statement:
         """τss(v, σ); stated last, because by default it uses the memory variables stated before."""
         return stated(self.law, "steady_strength", self._copy.steady_strength, self.v, self.sigma)
 
+    @question
     def function(self, *expressions: sp.Expr) -> Callable[..., list[mpmath.mpf]]:
         """The expressions as a function of v, σ, memory variables, τ."""
         compiled = precise_function(self.law, [*self.inputs, *self.numbers], expressions)
         return lambda *numbers: compiled(*numbers, *self.numbers.values())
 
+    @question
     def floats(self, *expressions: sp.Expr) -> Callable[..., list[Any]]:
         """The same in ordinary floats, as the rest of the package evaluates a law."""
         compiled = array_function([*self.inputs, *self.numbers], expressions)
@@ -88,10 +91,12 @@ class Statement:
     def _steady(self) -> Callable[..., list[mpmath.mpf]]:
         return self.function(*self.steady_memory, self.steady_strength)
 
-    def gradient(self, expression: sp.Expr) -> list[sp.Expr]:
+    @question
+    def gradient(self, expression: sp.Expr) -> tuple[sp.Expr, ...]:
         """Partial derivatives with respect to v, σ, memory variables, τ."""
-        return [sp.diff(expression, name).doit() for name in self.inputs]
+        return tuple(sp.diff(expression, name).doit() for name in self.inputs)
 
+    @question
     def relaxation(self) -> Callable[..., Any]:
         """The matrix of ∂(rates)/∂(memory) at fixed v and σ, τ following the strength, as a function of numbers."""
         slope = 1 - sp.diff(self.strength, self.tau)

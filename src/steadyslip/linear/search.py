@@ -30,6 +30,7 @@ _DECADES = 6
 _LINEAR = 721
 _ROUNDING = 64  # units of the last place within which two conditions are one, at first;
 _WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
+_FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a level stretch, which hides no zero
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 
 
@@ -166,6 +167,7 @@ class Search:
         for which, measure in enumerate(measures):
             size = np.abs(measure)
             dips = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
+            dips &= np.maximum(size[:-2], size[2:]) > size[1:-1] * (1 + _FLAT)
             at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
             if at.size:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])

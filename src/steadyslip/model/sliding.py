@@ -147,9 +147,13 @@ def explain_absence(rig: Slider, point: OperatingPoint) -> NoSteadySliding:
     )
 
 
+@question
+def _friction_function(model: Model) -> Callable[..., Any]:
+    contact = model.contact
+    return model.function([model.steady[contact.friction] / contact.sigma_ss])
+
+
 def _friction_coefficient(point: OperatingPoint) -> float:
     """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact where τ is proportional to σ)."""
-    model = point.model
-    contact = model.contact
-    value = float(model.function([model.steady[contact.friction] / contact.sigma_ss])(*point.arguments, 1e6)[0])
+    value = float(_friction_function(point.model)(*point.arguments, 1e6)[0])
     return value if math.isfinite(value) else float("nan")

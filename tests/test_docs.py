@@ -124,6 +124,25 @@ def test_what_a_page_adds_to_one_file_works(page, tmp_path):
     assert done.stdout == re.search(r"^```text\n(.*?)^```", text, re.M | re.S)[1], done.stderr
 
 
+def test_a_run_can_be_stepped_through(tmp_path):
+    """Python's debugger says what the page shows, in that order."""
+    text = (ROOT / "docs/how-to/step-through-a-run.md").read_text(encoding="utf-8")
+    script, session = (re.search(rf"^```{kind}\n(.*?)^```", text, re.M | re.S)[1] for kind in ("python", "text"))
+    (tmp_path / "stepped.py").write_text(script, encoding="utf-8")
+    lines = session.splitlines()
+    commands = [line.removeprefix("(Pdb) ") for line in lines if line.startswith("(Pdb) ")]
+    done = subprocess.run(
+        [sys.executable, "-m", "pdb", "stepped.py"], input="\n".join(commands), cwd=tmp_path, text=True,
+        capture_output=True, env=os.environ | {"STEADYSLIP_INTERPRET": "1"},
+    )  # fmt: skip
+    said = done.stdout
+    for line in lines:
+        if line.startswith("(Pdb) "):
+            continue
+        assert line in said, (line, done.stdout[-2000:], done.stderr)
+        said = said.split(line, 1)[1]
+
+
 # --- the command line as shown ----------------------------------------------------------------------
 
 

@@ -618,3 +618,18 @@ def test_summary_tells_the_same_whatever_the_steps():
         return str(run).splitlines()[1]
 
     assert lines() == lines(rtol=1e-11) == lines(times=[0.0, 40.0])
+
+
+def test_a_method_that_would_compile_for_minutes_is_refused():
+    """Where each of many stages would solve the balance of forces; what `auto` and few stages do is not touched."""
+    rock = ss.RateState(a=0.014, b=0.016, d_c="1 um", mu_ref=0.7, v_ref="1 um/s", regularised=True)
+    slow = ss.Slider(
+        friction=rock, contact=ss.Constant(preload="5 MPa"), stiffness="12 GPa/m", drive=ss.Steady("1 um/s"),
+        radiation_damping=1e6,
+    )  # fmt: skip
+    assert prepare(slow, None, 1.0, {}, {}, Options()).reduction.unknown is not None
+    for run in (ss.simulate, lambda a_rig, **more: ss.simulate_many(a_rig, {"stiffness": [1e10, 2e10]}, **more)):
+        with pytest.raises(ss.ParameterError, match=r"13 stages.*allowed here: auto, tsit5, rodas4, rodas5p"):
+            run(slow, until=1.0, method="dop853")
+    for method in ("auto", "explicit", "rosenbrock", "rodas5p"):
+        assert prepare(slow, None, 1.0, {}, {}, Options(method=method)).reduction.unknown is not None

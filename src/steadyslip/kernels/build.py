@@ -6,7 +6,8 @@ versions that matter and of the processor, in one sealed file, written under a t
 into place. It is opened only if it and its folder are this user's and nobody else can write to them, and if its seal
 (`steadyslip.files.sealed`) says that it is of this very function. Anything odd about it (damaged, of another function,
 foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder that cannot be written
-to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none.
+to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none. With ``STEADYSLIP_INTERPRET=1``
+nothing is compiled, and Python runs it all.
 """
 
 from __future__ import annotations
@@ -118,9 +119,14 @@ class Code:
         return self._bound("through_table")
 
 
+def interpreting() -> bool:
+    """Whether everything is to be run by Python, to be stepped through."""
+    return os.environ.get("STEADYSLIP_INTERPRET", "") not in ("", "0")
+
+
 def interpreted(programs: Sequence[Program], layout: Layout) -> Code:
     """Everything as plain Python, slow: for tests, and to be stepped through."""
-    functions = {program.name: python.function(program) for program in programs}
+    functions = {program.name: python.function(program, interpreting()) for program in programs}
     return Code(layout, Routines(**{name: functions.get(name, _absent) for name in Routines._fields}), True)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.questions import question
-from steadyslip.kernels.build import Code, compiled, interpreted
+from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
 from steadyslip.model import Model, OperatingPoint
@@ -111,4 +111,4 @@ def _stacked(columns: list[Any], jobs: int) -> np.ndarray:
 @question
 def experiment_program(model: Model, directions: int, method: str) -> ExperimentProgram:
     """The kernel for a model; made once per process."""
-    return ExperimentProgram(reduce_model(model, None), directions, method)
+    return ExperimentProgram(reduce_model(model, None), directions, method, plain=interpreting())

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.questions import question
-from steadyslip.kernels.build import Code, compiled, interpreted
+from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
@@ -79,4 +79,5 @@ def _constants(point: OperatingPoint, machine: Program) -> np.ndarray:
 @question
 def program(model: Model, choice: Choice, eliminate: int | None = 0) -> Program:
     """The kernel of a model; made once per process."""
-    return Program(reduce_model(model, eliminate), choice)
+    reduction = reduce_model(model, eliminate)
+    return Program(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Program(reduction, choice)

@@ -24,6 +24,7 @@ from steadyslip.protocol import Protocol, Segments, pack
 
 METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
+MOST_SOLVED = 8  # stages of a method, where the balance has to be solved in each
 BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
 CONTACT_SHARE = 1e-9  # of the steady normal stress: below, contact is lost
 
@@ -202,9 +203,24 @@ def prepare(
         )  # fmt: skip
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate)
+    _refuse_endless(reduction, options.method)
     start, velocity = initial_values(reduction, point, initial)
     size = max(len(point.stresses), len(segments.start), len(start), point.size, 1)
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
+
+
+def _refuse_endless(reduction: Reduction, method: str) -> None:
+    """A method with so many stages that an equation to be solved in each takes minutes to compile."""
+    if reduction.unknown is None or METHODS[method] not in TABLEAUS:
+        return
+    stages = {name: make().stages for name, make in TABLEAUS.items()}
+    if stages[METHODS[method]] > MOST_SOLVED:
+        allowed = ", ".join(["auto", *(name for name, count in stages.items() if count <= MOST_SOLVED)])
+        message = (
+            f"got {method!r}; for this rig velocity follows from an equation that has to be solved in each of its "
+            f"{stages[METHODS[method]]} stages, which would take minutes to compile; allowed here: {allowed}"
+        )
+        raise ParameterError([Problem("method", message)])
 
 
 def _refuse_singular(rig: Slider, point: OperatingPoint, varied: bool) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import linecache
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,14 +13,18 @@ from steadyslip.kernels.nodes import PRIMITIVES, Node, Program
 from steadyslip.kernels.printers.text import Writer
 
 _WORDS = {"and": "and", "or": "or"}
+_numbers = itertools.count(1)
 _OF_INTEGERS = {"shl": "<<", "shr": ">>"}
 
 
-def function(program: Program) -> Callable[[Any, float, Any], None]:
-    """A program as a Python function."""
+def function(program: Program, steppable: bool = False) -> Callable[[Any, float, Any], None]:
+    """A program as a Python function, its lines at hand for debuggers if it is to be `steppable`."""
     known = {name: getattr(primitives, name) for name in (*PRIMITIVES, "bits", "real", "as_float")}
     found: dict[str, Any] = {}
-    exec(compile(text(program), f"<{program.name}>", "exec"), known | {"math": math}, found)
+    source, file = text(program), f"<program {next(_numbers)}: {program.name}>"
+    if steppable:
+        linecache.cache[file] = len(source), None, source.splitlines(keepends=True), file
+    exec(compile(source, file, "exec"), known | {"math": math}, found)
     made: Callable[[Any, float, Any], None] = found[program.name]
     return made
 

@@ -236,6 +236,7 @@ def test_bootstrap_profile_and_covariance_agree_where_noise_is_white():
     for name in fit.names:
         assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.2)
     outline = ss.profile(fit, "d_c")
+    assert outline.gaussian
     low, high = outline.interval(0.95)
     assert (low, high) == pytest.approx(fit.interval("d_c"), rel=0.01)
     assert np.min(outline.rise) == pytest.approx(0, abs=1e-3)
@@ -281,8 +282,11 @@ def test_a_jump_at_an_unknown_time_makes_errors_that_are_not_gaussian():
     fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(rig, protocol, 3, count=800))
     assert "errors of what the jump tells" in " ".join(str(fit).split())
     assert "the load point is measured" not in str(fit)
-    low, high = ss.profile(fit, "alpha", reach=8, count=65).interval(0.999)
+    outline = ss.profile(fit, "alpha", reach=8, count=65)
+    low, high = outline.interval(0.999)
     assert low < 0.45 < high
+    assert not outline.gaussian
+    assert "not Gaussian" in str(outline)
 
 
 # -- what the data cannot tell

@@ -102,6 +102,9 @@ def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
     ends = sorted(line.get_xdata()[0] for line in ax.lines if len(set(line.get_xdata())) == 1)
     expected = sorted(1e6 * np.array([*found.interval(0.68), *found.interval(0.95)]))
     np.testing.assert_allclose(ends, expected)
+    parabola = next(line for line in ax.lines if line.get_label() == "its error alone")
+    np.testing.assert_allclose(parabola.get_ydata()[0], 16.0)  # four standard deviations from the best value
+    assert ax.get_title() == ("Gaussian" if found.gaussian else "not Gaussian")
     assert ax.get_xlabel() == "d_c (µm)"
 
 

@@ -4,7 +4,8 @@ from steadyslip.experiments.answers.laws import LawComparison, compare, compare_
 from steadyslip.experiments.answers.population import Population, population
 from steadyslip.experiments.answers.precision import Precision, best_protocol, precision
 from steadyslip.experiments.answers.predict import Prediction, predict
-from steadyslip.experiments.answers.uncertainty import Draws, Profile, bootstrap, normal_draws, posterior, profile
+from steadyslip.experiments.answers.profiles import Profile, profile
+from steadyslip.experiments.answers.uncertainty import Draws, bootstrap, normal_draws, posterior
 from steadyslip.experiments.answers.validation import CrossValidation, cross_validate
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.numbers import Estimate

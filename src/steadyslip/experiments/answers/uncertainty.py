@@ -1,4 +1,4 @@
-"""How sure a fit is, beyond its covariance: profiles, bootstrap, posterior samples; all on the compiled model."""
+"""How sure a fit is, beyond its covariance: bootstrap and posterior samples; on the compiled model."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.core.options import NAME, SEED, THREADS, Number, checked, whole
+from steadyslip.core.options import NAME, SEED, THREADS, checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
-from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
@@ -215,111 +214,6 @@ def _resampled(residuals: Array, block: int, many: int, generator: np.random.Gen
     starts = generator.integers(0, size, size=(many, -(-size // block)))
     places = (starts[:, :, None] + np.arange(block)).reshape(many, -1)[:, :size] % size
     return np.asarray(residuals[places])
-
-
-@dataclass(frozen=True, eq=False)
-class Profile(ReadOnly):
-    """Least sum of squares with one parameter held at each of several values.
-
-    Attributes
-    ----------
-    name : str
-    unit : str
-    values : ndarray (m,)
-    ssq : ndarray (m,)
-    rise : ndarray (m,)
-        Rise above the minimum in units in which 1 is one standard deviation squared.
-    area : float or None
-        Of the rig, m²: people are told totals then.
-    """
-
-    name: str
-    unit: str
-    values: Array
-    ssq: Array = field(repr=False)
-    rise: Array
-    area: float | None = None
-
-    def interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Where the rise is below that of a probability; infinite where the profile does not rise so far."""
-        from scipy.stats import chi2
-
-        limit = float(chi2.ppf(level, 1))
-        best = int(np.argmin(self.rise))
-        ends = []
-        for side in (slice(best, None, -1), slice(best, None, 1)):
-            rise, values = self.rise[side], self.values[side]
-            beyond = np.flatnonzero(rise > limit)
-            if not len(beyond):
-                ends.append(-np.inf if side.step == -1 else np.inf)
-                continue
-            i = int(beyond[0])
-            share = (limit - rise[i - 1]) / (rise[i] - rise[i - 1]) if i else 0.0
-            ends.append(float(values[i - 1] + share * (values[i] - values[i - 1])) if i else float(values[0]))
-        return ends[0], ends[1]
-
-    def __str__(self) -> str:
-        low, high = self.interval()
-        ends = " to ".join(
-            "beyond the profile" if not np.isfinite(x) else shown(x, self.unit, area=self.area) for x in (low, high)
-        )
-        return f"{self.name}, 95 % by its profile: {ends}"
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw how fast the misfit rises, with the intervals that this gives.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
-        return draw(self, ax=ax)
-
-
-@checked(reach=Number(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
-def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
-    """Profile of a parameter: all others fitted anew at each value, side by side.
-
-    Parameters
-    ----------
-    fit : Fit
-    name : str
-    reach : float
-        How far to go, in standard deviations; two e-folds or natural sizes where the parameter is not determined.
-    count : int
-        Values on the way.
-    threads : int, optional
-    """
-    i = fit.index(name)
-    variance = float(fit.covariance[i, i])
-    width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
-    z = np.tile(fit.coordinates, (count, 1))
-    z[:, i] = fit.coordinates[i] + width * np.linspace(-1, 1, count)
-    if np.isfinite(variance):  # along the valley, as far as it is straight
-        slope = fit.covariance[:, i] / variance
-        slope[~np.isfinite(slope)] = 0.0
-        z = fit.coordinates + (z[:, i : i + 1] - fit.coordinates[i]) * slope
-    low, high = fit.bounds
-    z = np.clip(z, low, high)
-    held = np.zeros_like(z, dtype=bool)
-    held[:, i] = True
-    comparison = fit.plan.comparison(threads)
-    found = minimise(lambda x, _: comparison.residuals(x), z, low, high, held=held)
-    rise = (found.ssq - fit.ssq) / _unit_of_rise(fit, i)
-    keep = np.isfinite(found.ssq)
-    order = np.argsort(z[keep, i])
-    one = fit.space.unknowns[i]
-    values = one.value(z[keep, i][order])
-    return Profile(one.name, one.unit, values, found.ssq[keep][order], rise[keep][order], fit.plan.rig.area)
-
-
-def _unit_of_rise(fit: Fit, i: int) -> float:
-    """Rise of the sum of squares one standard deviation from the minimum; more where residuals are correlated."""
-    _, jacobian = fit.comparison.residuals(fit.coordinates[None])
-    information = jacobian[0] @ jacobian[0].T
-    naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])
-    plain = fit.ssq / max(fit.degrees, 1)
-    variance = float(fit.covariance[i, i])
-    return variance / naive if np.isfinite(variance) and naive > 0 else plain
 
 
 @checked(steps=whole(1, 10**9), walkers=whole(1, 10**6), seed=SEED, threads=THREADS)

@@ -7,13 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from steadyslip.experiments.fitting.forward import InputTable
-from steadyslip.experiments.loading.loading import Change, Course, Loading
+from steadyslip.experiments.loading.loading import Change, Course, Loading, resting_rate
 
 Array = np.ndarray
 STRAIGHT = 5e-4  # of the range of a curve: what straight lines may miss of it
 MOST_CUTS = 30  # of one interval between samples
 BRIEFEST = 1e-9  # of the record: a ramp shorter than that is a step
 _COLUMN = {"load": 0, "stress": 2}
+SLID = 1e-3  # of the record: how long the steady sliding before a first rest is run through; any time would do
 
 
 class CommandedInputs:
@@ -26,10 +27,12 @@ class CommandedInputs:
         Of the samples, s.
     pressed : bool
         Whether its normal stress drives the model.
+    lag : bool
+        Whether all changes may come later (or earlier) than the columns have them, by one free time.
     """
 
-    def __init__(self, loading: Loading, time: Array, pressed: bool) -> None:
-        self.loading, self.time = loading, time
+    def __init__(self, loading: Loading, time: Array, pressed: bool, lag: bool = False) -> None:
+        self.loading, self.time, self.lag, self.resting = loading, time, lag, resting_rate(loading)
         self.courses: dict[str, Course] = {}
         if loading.load is not None:
             self.courses["load"] = loading.load
@@ -63,12 +66,13 @@ class CommandedInputs:
 
     @cached_property
     def free(self) -> list[tuple[int, str]]:
-        """What the free times are: the place of a change, and ``at`` or ``duration``."""
+        """What the free times are: the place of a change, and ``at`` or ``duration``; then ``lag`` and ``hold``."""
         found = []
         for i, (_, _, change) in enumerate(self.changes):
             found += [(i, "at")] if change.free else []
             found += [(i, "duration")] if change.stretches else []
-        return found
+        found += [(-1, "lag")] if self.lag else []
+        return found + ([(-1, "hold")] if self.resting is not None else [])
 
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """The table for free times (jobs, free), s; see `MeasuredInputs.table`."""
@@ -85,15 +89,21 @@ class CommandedInputs:
         begins = np.array([[change.time for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
         lengths = np.array([[change.duration for _, _, change in self.changes]] * jobs).reshape(jobs, -1)
         for k, (i, what) in enumerate(self.free):
-            (begins if what == "at" else lengths)[:, i] = times[:, k]
+            if i >= 0:
+                (begins if what == "at" else lengths)[:, i] = times[:, k]
+            elif what == "lag":
+                begins = begins + times[:, k : k + 1]
         ramps = [i for i, (_, _, change) in enumerate(self.changes) if change.duration > 0]
         low, high = float(self.time[0]), float(self.time[-1])
         events = np.hstack([begins, (begins + lengths)[:, ramps]])
         inside = (events > low) & (events < high)
-        nodes = np.hstack([np.clip(events, low, high), np.tile(self.nodes, (jobs, 1))])
+        before = np.empty((jobs, 0))
+        if self.resting is not None:  # steady sliding, then a hold that ends where the record begins
+            before = low - times[:, -1:] - np.array([[SLID * (high - low), 0.0]])
+        nodes = np.hstack([np.clip(events, low, high), before, np.tile(self.nodes, (jobs, 1))])
         order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
         nodes = np.take_along_axis(nodes, order, axis=1)
-        count = events.shape[1]
+        count = events.shape[1] + before.shape[1]
         place = np.concatenate([np.full(count, -1), self.sample])
         samples = place[order]
         rows = np.zeros((jobs, nodes.shape[1] - 1, 9))
@@ -104,11 +114,15 @@ class CommandedInputs:
             return table
         moves = np.zeros((jobs, directions, count))
         for k, (i, what) in enumerate(self.free):
+            if what == "lag":
+                moves[:, first + k, : events.shape[1]] = 1.0
+            if what == "hold":
+                moves[:, first + k, -1] = -1.0
             if what == "at":
                 moves[:, first + k, i] = 1.0
             if i in ramps:
                 moves[:, first + k, len(self.changes) + ramps.index(i)] = 1.0
-        moves *= inside[:, None, :]
+        moves[:, :, : events.shape[1]] *= inside[:, None, :]
         event = order[:, :-1]
         rates = np.zeros((jobs, directions, event.shape[1]))
         job, row = np.nonzero(event < count)
@@ -135,6 +149,8 @@ class CommandedInputs:
                     gone = height * (middle > begin)
                     before += gone
                     after += gone
+            if channel == "load" and self.resting is not None:
+                before[:, 0] = after[:, 0] = self.resting
             if course.curve is not None:
                 curve = course.curve(nodes.ravel()).reshape(nodes.shape)
                 before, after = before + curve[:, :-1], after + curve[:, 1:]
@@ -145,18 +161,19 @@ class CommandedInputs:
 
     def _input_rates(self, nodes: Array, begins: Array, lengths: Array, first: int, directions: int) -> Array:
         """How inputs at given times change with the times of a ramp."""
-        if not any(self.changes[i][2].duration > 0 for i, _ in self.free):
+        if not any(change.duration > 0 for _, _, change in self.changes):
             return np.zeros((1, 0, 0, 3))
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
         rates = np.zeros((len(nodes), directions, middle.shape[1], 3))
-        for k, (i, what) in enumerate(self.free):
-            channel, _, change = self.changes[i]
-            if not change.duration > 0:
-                continue
-            begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], BRIEFEST * np.ptp(self.time))
-            share = (middle - begin) / length
-            slope = -(change.after - change.before) / length * (1.0 if what == "at" else share)
-            rates[:, first + k, :, _COLUMN[channel]] = np.where((share > 0) & (share < 1), slope, 0.0)
+        for k, (place, what) in enumerate(self.free):
+            for i in range(len(self.changes)) if what == "lag" else [place] if place >= 0 else []:
+                channel, _, change = self.changes[i]
+                if not change.duration > 0:
+                    continue
+                begin, length = begins[:, i : i + 1], np.maximum(lengths[:, i : i + 1], BRIEFEST * np.ptp(self.time))
+                share = (middle - begin) / length
+                slope = -(change.after - change.before) / length * (share if what == "duration" else 1.0)
+                rates[:, first + k, :, _COLUMN[channel]] += np.where((share > 0) & (share < 1), slope, 0.0)
         return rates
 
 

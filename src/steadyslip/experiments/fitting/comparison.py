@@ -13,7 +13,7 @@ from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.forward import Forward, InputTable
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
-from steadyslip.experiments.loading.loading import Loading
+from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
@@ -174,6 +174,24 @@ def step_unknowns(record: int | None, loading: Loading, pressed: bool) -> list[U
             name = f"step.{k}.{what}"
             if wanted:
                 found.append(Unknown(f"{name}{label}", name, "s", record, False, high - low, low, high))
+    return found
+
+
+LAGGING = 0.02  # of a record: the largest lag between its channels
+LEAST_HOLD, LONGEST_HOLD = 1e-3, 1e5  # of a record, before it, where it begins at rest
+
+
+def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool) -> list[Unknown]:
+    """By how much friction comes later than what drives it; how long a record that begins at rest had rested, s."""
+    label = "" if record is None else f"@{record + 1}"
+    found = []
+    if lag:
+        reach = LAGGING * span
+        found.append(Unknown(f"lag{label}", "lag", "s", record, False, 0.1 * reach, -reach, reach))
+    if resting_rate(loading) is not None:
+        found.append(
+            Unknown(f"start.hold{label}", "start.hold", "s", record, True, 1.0, LEAST_HOLD * span, LONGEST_HOLD * span)
+        )
     return found
 
 

@@ -39,6 +39,7 @@ def fit(
     trend: int = 0,
     trend_axis: str = "displacement",
     offset: bool = False,
+    lag: bool = False,
     loss: str = "linear",
     width: float | None = None,
     weights: Any = None,
@@ -51,7 +52,8 @@ def fit(
 
     The model is driven by the loading that was commanded, as found in the record: rates of the load point by robust
     straight lines, their changes at times that are fitted along, normal stress constant or smooth between its changes.
-    It starts from steady sliding at the first sample. Starting values come from the records.
+    It starts from steady sliding at the first sample; a record that begins at rest, from a hold after such sliding,
+    whose length (``start.hold``) is fitted. Starting values come from the records.
 
     Parameters
     ----------
@@ -80,6 +82,9 @@ def fit(
         What it is a polynomial of: ``displacement`` of the load point, or ``time``.
     offset : bool, optional
         Add a constant to friction as well, beside mu_ref.
+    lag : bool, optional
+        Let friction come later than what drives it, every record by a time of its own (``lag``): for channels whose
+        filters or clocks differ.
     loss : str, optional
         ``linear`` (least squares), or ``soft-l1``, ``huber``, ``cauchy``, in which outliers weigh less.
     width : float, optional
@@ -110,7 +115,8 @@ def fit(
     """
     plan = make_plan(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
-        trend_axis=trend_axis, offset=offset, loss=loss, width=width, weights=weights, errors=errors, starts=starts,
+        trend_axis=trend_axis, offset=offset, lag=lag, loss=loss, width=width, weights=weights, errors=errors,
+        starts=starts,
     )  # fmt: skip
     if plan.loss != "linear" and plan.width is None:
         first, _, _ = searched(replace(plan, loss="linear"), starts, threads, progress)

@@ -77,7 +77,7 @@ def simpler(space: Space, addresses: Mapping[str, Address]) -> tuple[Idle, ...]:
 
 def from_simpler(
     models: tuple[Idle, ...], quick: Comparison, whole: Comparison | Condensed, starts: Array, low: Array, high: Array,
-    told: Told,
+    known: float, told: Told,
 ) -> Array:  # fmt: skip
     """Where the simpler models end, as starts of the richer one, (m, p).
 
@@ -89,6 +89,8 @@ def from_simpler(
     starts : ndarray (n, p)
         Of the richer model, the most promising first.
     low, high : ndarray (p,)
+    known : float
+        Sum of squares that the richer model is known to reach on what stands for all samples.
     told : callable
     """
     found = [np.empty((0, len(low)))]
@@ -102,7 +104,9 @@ def from_simpler(
             continue
         best, _ = rough.distinct(2)
         held = np.tile(model.held, (len(best), 1))
-        ends = minimise(lambda z, _: whole.residuals(z), best, low, high, most=FINE, held=held, race=1, told=told)
+        ends = minimise(
+            lambda z, _: whole.residuals(z), best, low, high, most=FINE, held=held, race=1, known=known, told=told
+        )
         ended = ends.sorted().coordinates[0]
         spread = np.tile(ended, (len(SPREAD) if model.scales else 1, 1))
         for i in model.scales:

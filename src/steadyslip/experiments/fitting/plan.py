@@ -16,6 +16,7 @@ from steadyslip.experiments.fitting.comparison import (
     Comparison,
     RecordPart,
     jump_unknowns,
+    start_unknowns,
     step_unknowns,
     trend_rows,
     trend_unknowns,
@@ -25,7 +26,7 @@ from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, Pr
 from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
-from steadyslip.experiments.loading.loading import Loading
+from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.laws.contact import pressed_at
 from steadyslip.machine.slider import Slider
@@ -62,6 +63,8 @@ class Plan:
         ``displacement`` or ``time``.
     offset : bool
         Whether a constant is added to friction, besides mu_ref.
+    lag : bool
+        Whether friction may come later than what drives it, each record by a time of its own.
     loss : str
     width : float or None
         Residual from which on outliers weigh less.
@@ -83,6 +86,7 @@ class Plan:
     trend: int = 0
     trend_axis: str = "displacement"
     offset: bool = False
+    lag: bool = False
     loss: str = "linear"
     width: float | None = None
     weights: tuple[Array, ...] | None = field(default=None, repr=False)
@@ -111,6 +115,7 @@ class Plan:
             label = i if several else None
             if self.follows:
                 found += step_unknowns(label, self.loading[i], self.pressed)
+                found += start_unknowns(label, self.loading[i], float(np.ptp(self.records[i].time)), self.lag)
             else:
                 found += jump_unknowns(label, self.sharp[i])
             found += trend_unknowns(i if several else None, self.trend, self.offset)
@@ -135,7 +140,8 @@ class Plan:
         places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
         for place, one in enumerate(space.unknowns):
             if one.record in (None, i):
-                kinds = {"protocol": "time", "jump": "time", "step": "time", "trend": "trend", "offset": "trend"}
+                kinds = dict.fromkeys(("protocol", "jump", "step", "lag", "start"), "time")
+                kinds |= {"trend": "trend", "offset": "trend"}
                 places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
@@ -143,7 +149,7 @@ class Plan:
         inputs: Any
         moved: Array | None = None
         if self.follows:
-            inputs = CommandedInputs(self.loading[i], record.time, self.pressed and record.normal is not None)
+            inputs = CommandedInputs(self.loading[i], record.time, self.pressed and record.normal is not None, self.lag)
             load = self.loading[i].load
             moved = None if load is None else load.integral(record.time)
         elif self.protocol is None:
@@ -165,6 +171,7 @@ class Plan:
         if self.protocol is None:
             load = self.loading[i].load if self.follows else None
             rate = record.initial_rate if load is None else float(load.at(record.time[:1])[0])
+            rate = (resting_rate(self.loading[i]) if self.follows else None) or rate
             if rate is None:
                 raise InternalError("rate is not None")
             rig = rig.with_values({"drive.velocity": rate})
@@ -303,10 +310,13 @@ def _check_records(plan: Plan) -> None:
         if plan.protocol is None and record.displacement is None:
             problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or rate; "
                                     "name it, or give the protocol of the experiment"))  # fmt: skip
-        elif plan.protocol is None and not (record.initial_rate or 0.0) > 0:
+        elif plan.protocol is None and not (record.initial_rate or 0.0) > 0 and not _begins_at_rest(plan, record):
             problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
-                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding, so cut it "
-                                    "with between=(start, end)"))  # fmt: skip
+                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding or, driven by "
+                                    "commanded loading, at rest; cut it with between=(start, end)"))  # fmt: skip
+        if plan.lag and (plan.protocol is not None or plan.drive != "commanded" or _curved(record.loading)):
+            problems.append(Problem("lag", f"{record.source} is not driven by steps and ramps found in it; allowed: "
+                                    "false, or drive = 'commanded' and a record of steps and ramps"))  # fmt: skip
         rate = record.initial_rate or 0.0
         if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
             message = f"got {shown(given, 'm/s')}, but {record.source} begins at {shown(rate, 'm/s')}; make them agree"
@@ -323,6 +333,14 @@ def _check_records(plan: Plan) -> None:
             problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))
     if problems:
         raise ParameterError(problems)
+
+
+def _begins_at_rest(plan: Plan, record: Record) -> bool:
+    return plan.drive == "commanded" and resting_rate(record.loading) is not None
+
+
+def _curved(loading: Loading) -> bool:
+    return any(course is not None and course.curve is not None for course in (loading.load, loading.stress))
 
 
 def check_width(plan: Plan, residuals: Array) -> Plan:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from steadyslip.experiments.fitting.plan import Plan, with_loading
+from steadyslip.experiments.loading.loading import resting_rate
 from steadyslip.experiments.numerics.least_squares import minimise
 
 
@@ -25,6 +26,8 @@ def driven_as_measured(
         Where the coordinates were searched.
     """
     noisy = [c for loading in plan.loading for c in (loading.load,) if c is not None and np.any(c.errors > 0)]
+    if any(resting_rate(loading) is not None for loading in plan.loading):
+        return None
     if not noisy or any(course.curve is not None for course in noisy):
         return None
     plan = with_loading(replace(plan, drive="measured"))

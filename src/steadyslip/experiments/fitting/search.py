@@ -23,7 +23,8 @@ Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
 HASTY = 8  # steps of the model per sample, on average, before a trial on few of them is given up
 ROUGH = 40  # iterations on few samples
-MOST = 300  # iterations on all samples
+MOST = 300  # iterations on all samples, or on what stands for them;
+LAST = 12  # on all samples after that
 ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 NEAREST = 3  # of the ends on few numbers that go on with all samples
@@ -123,6 +124,9 @@ class _Search:
     def promising(self) -> None:
         """The most promising ends: on what stands for all samples, where anything does, and how many starts agree."""
         begin, counts = self.rough.distinct(FINALISTS)
+        if len(self.best.ssq):  # where earlier starts have led
+            begin = np.concatenate([begin, self.best.sorted().coordinates[:1]])
+            counts = np.append(counts, 0)
         self.few = condensed(self.plan, self.whole, begin)
         if self.few is self.whole:
             self.best = Minima.at(begin)
@@ -148,22 +152,24 @@ class _Search:
             return found
         begin = from_simpler(
             models, self.quick, self.few, self.rough.sorted().coordinates, self.low, self.high,
-            self.told("refining", self.whole),
+            float(np.min(self.best.ssq)), self.told("refining", self.whole),
         )  # fmt: skip
         return (found + self._refined(begin)).sorted()
 
     def _refined(self, begin: Array) -> Minima:
         """Where starts end on all samples: on what stands for them to begin with."""
         if self.few is not self.whole:
-            told = self.told("refining", self.whole)
-            ends = minimise(lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, told=told)
+            ends = minimise(
+                lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=1,
+                known=float(np.min(self.best.ssq)), told=self.told("refining", self.whole),
+            )  # fmt: skip
             begin = ends.distinct(NEAREST)[0]
         return self._on_all(begin)
 
     def _on_all(self, begin: Array) -> Minima:
-        told = self.told("refining", self.whole)
+        told, most = self.told("refining", self.whole), MOST if self.few is self.whole else LAST
         return minimise(
-            lambda z, _: self.whole.residuals(z), begin, self.low, self.high, most=MOST, race=1, told=told
+            lambda z, _: self.whole.residuals(z), begin, self.low, self.high, most=most, race=1, told=told
         ).sorted()
 
     def story(self, found: Minima) -> SearchStory:

@@ -36,6 +36,10 @@ class FitSettings(Settings):
     trend: int = setting(Whole("order of a polynomial that is added to friction", 0, MOST_TREND), default=0)
     trend_axis: str = option("displacement", "time", doc="what it is a polynomial of", default="displacement")
     offset: bool = option(False, True, doc="add a constant too, beside mu_ref", default=False)
+    lag: bool = option(
+        False, True, default=False,
+        doc="friction may come later than what drives it, each record by a time of its own, `lag`",
+    )  # fmt: skip
     loss: str = option(*LOSSES, doc="of residuals; all but `linear` let outliers weigh less", default="linear")
     width: float | None = parameter(
         "1", _width, "residual from which on they do; 1.345 standard deviations of most unless given", default=None

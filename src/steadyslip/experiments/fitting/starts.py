@@ -18,6 +18,7 @@ from steadyslip.experiments.fitting.comparison import RecordPart
 from steadyslip.experiments.fitting.inputs import ProtocolInputs
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
+from steadyslip.experiments.loading.loading import resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.model.sliding import steady_state
@@ -60,7 +61,7 @@ class Features:
 def features(record: Record, rate: float) -> Features:
     """Read the features off a record; `rate` is the load-point rate at its start, m/s."""
     time, mu = record.time, record.friction
-    moved = _moved(record, rate)
+    moved = _moved(record, 0.0 if resting_rate(record.loading) is not None else rate)
     first = max(5, len(mu) // 50)
     level = float(np.median(mu[:first]))
     steps = [s for s in record.steps if s.kind == "velocity step"]
@@ -215,6 +216,10 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         return steepness * _stress(part)
     if name.startswith(("trend.", "offset")):
         return np.zeros_like(a)
+    if name == "lag":
+        return 0.5 * (spare - 0.5) * (unknown.high - unknown.low)
+    if name == "start.hold":
+        return float(np.ptp(part.record.time)) * 10.0 ** (3 * spare - 1.5)
     if name.startswith("step."):
         return _near(unknown, part, spare)
     if name.startswith("jump."):

@@ -20,14 +20,14 @@ from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 3, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 4, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 _ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
     "loading": str, "steadyslip": str,
 }  # fmt: skip
 _OPTIONS = {
-    "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "loss": str,
-    "width": {float, None}, "rtol": float,
+    "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "lag": bool,
+    "loss": str, "width": {float, None}, "rtol": float,
 }  # fmt: skip
 _COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int)
 _FORMS = {

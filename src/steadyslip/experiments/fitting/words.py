@@ -60,7 +60,7 @@ def short_names(names: tuple[str, ...]) -> list[str]:
     found = []
     for name in names:
         first, *_, last = name.split(".")
-        brief = f"{first}.{last}" if first not in ("protocol", "step") and ".states." not in name else name
+        brief = f"{first}.{last}" if first not in ("protocol", "step", "start") and ".states." not in name else name
         found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
     return found
 
@@ -145,6 +145,8 @@ def drive_line(fit: FitNumbers) -> str:
     free = sum(one.parameter.startswith("step.") for one in fit.space.unknowns)
     text = f"commanded loading found in the record, {count} change{'' if count == 1 else 's'} of rate"
     text += f", {free} of {'its' if count == 1 else 'their'} times and durations fitted" if free else ""
+    if any(one.parameter == "start.hold" for one in fit.space.unknowns):
+        text += "; at rest at first, how long is fitted (start.hold)"
     slips, glitches = sum(c.slips for c in loads), sum(c.glitches for c in loads)
     if slips or glitches:
         text += f"; {slips} slips and {glitches} glitches of the sensor left out"

@@ -140,6 +140,14 @@ class Loading:
         return tuple(sorted(found, key=lambda one: (one[2].time, one[0])))
 
 
+def resting_rate(loading: Loading) -> float | None:
+    """The rate at which a load point that rests at first moves later, m/s; None where it moves from the start."""
+    course = loading.load
+    if course is None or course.curve is not None or course.first != 0.0:
+        return None
+    return next((float(level) for level in course.levels if level > 0), None)
+
+
 def shifted(loading: Loading, pressed: bool) -> Iterator[Loading]:
     """The loading with each of its levels in turn off by its standard deviation, where that is more than rounding."""
     for channel in ("load", "stress") if pressed else ("load",):

@@ -21,6 +21,7 @@ MOST_RAISED = 64.0  # times the damping rises from one step that fails to the ne
 HOPE = 2.0  # times the best sum of squares: rough minima beyond have no chance
 NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
+PACE = 10  # iterations over which the progress of a problem is judged
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
 
@@ -86,7 +87,7 @@ class Minima:
 
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
-    tolerance: float = CONVERGED, race: int = 0, told: Callable[[Minima], None] | None = None,
+    tolerance: float = CONVERGED, race: int = 0, known: float = np.inf, told: Callable[[Minima], None] | None = None,
 ) -> Minima:  # fmt: skip
     """Minimise the sum of squares of every problem.
 
@@ -104,7 +105,9 @@ def minimise(
         Reduction still to be had, as a share of the sum, at which a problem is done.
     race : int
         All problems are one, from several starts: once so many are done at the best place, those that promise no
-        better stop too. Zero: they are not.
+        better stop too; once one is, those that at their pace will not get there. Zero: they are not.
+    known : float
+        Sum of squares that this one problem is known to reach from elsewhere.
     told : callable, optional
         Called after every iteration with what is known by then.
     """
@@ -119,6 +122,7 @@ def minimise(
     found.ssq[:] = ssq
     damping, raised, scale = np.full(count, 1e-2), np.full(count, 2.0), np.zeros((count, size))
     stuck = np.zeros(count, dtype=bool)
+    earlier = ssq.copy()
     active = everyone[np.isfinite(ssq)]
     keep = np.isfinite(ssq)
     normal, gradient = normal[keep], gradient[keep]
@@ -131,10 +135,13 @@ def minimise(
         free = ~held[active] & ~(((z <= low) & (gradient < 0)) | ((z >= high) & (gradient > 0)))
         promise = _promise(normal, gradient, free)
         over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | stuck[active]
-        if race and np.any(found.converged):
-            best = np.min(found.ssq[found.converged])
-            if np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
-                over |= found.ssq[active] - promise > (1 - 1e-9) * best
+        best = min(known, float(np.min(found.ssq[found.converged], initial=np.inf)))
+        if race and iteration % PACE == 0:
+            gone = (earlier[active] - found.ssq[active]) / PACE
+            over |= found.ssq[active] - gone * (most - iteration) > best
+            earlier = found.ssq.copy()
+        if race and np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
+            over |= found.ssq[active] - promise > (1 - 1e-9) * best
         if np.any(over):
             ended = active[over]
             small = promise[over] <= max(STALLED, tolerance) * np.maximum(found.ssq[ended], 1e-300)

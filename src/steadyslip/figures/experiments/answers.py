@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 def profile(result: Profile, ax: Axes | None = None) -> Axes:
     """How fast the misfit rises away from the best value, and the intervals of 68 and 95 % that this gives.
 
+    Grey: what the fit's error alone stands for, a parabola in the coordinate; where the two part, the parameter's
+    likelihood is not Gaussian.
+
     Parameters
     ----------
     result : Profile
@@ -45,6 +48,8 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     factor, unit = display_unit(result.unit, float(np.median(np.abs(result.values))), result.area)
     ax.plot(result.values / factor, result.rise, color=BLUE, marker=".", label="all other parameters fitted anew")
+    if np.all(np.isfinite(result.normal)):
+        ax.plot(result.values / factor, result.normal, color=GREY, linestyle=":", linewidth=2, label="its error alone")
     top = float(np.max(result.rise[np.isfinite(result.rise)], initial=0.0))
     for level, style in ((0.68, "-"), (0.95, "--")):
         limit = float(chi2.ppf(level, 1))
@@ -56,7 +61,8 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
         ax.plot([], [], color=VERMILION, linestyle=style, label=f"{100 * level:.0f} %")
     ax.set_ylim(0.0, min(top, 12.0))
     ax.set_xlabel(labelled(brief(result.name), unit))
-    ax.set_ylabel("rise of the misfit (1 = one error squared)")
+    ax.set_ylabel("rise of the misfit, −2 ln of the profile likelihood (1)")
+    ax.set_title("Gaussian" if result.gaussian else "not Gaussian", fontsize="medium")
     ax.legend(loc="upper center", fontsize="small")
     return ax
 

@@ -1,0 +1,153 @@
+"""Profiles: how fast the misfit rises away from the best value of one parameter, all others fitted anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from steadyslip.core.options import NAME, THREADS, Number, checked, whole
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown
+from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.fitting.condensed import condensed
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.numerics.least_squares import minimise
+
+Array = np.ndarray
+LEVEL = 0.95  # at which a profile and an error are compared
+ALIKE = 0.15  # of the reach of the error to one side: difference of ends that is still Gaussian
+
+
+@dataclass(frozen=True, eq=False)
+class Profile(ReadOnly):
+    """Least sum of squares with one parameter held at each of several values.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+    values : ndarray (m,)
+    ssq : ndarray (m,)
+    rise : ndarray (m,)
+        Rise above the minimum in units in which 1 is one standard deviation squared: minus twice the logarithm of the
+        profile likelihood.
+    normal : ndarray (m,)
+        The rise that the fit's error stands for; NaN where the fit does not determine the parameter.
+    area : float or None
+        Of the rig, m²: people are told totals then.
+    """
+
+    name: str
+    unit: str
+    values: Array
+    ssq: Array = field(repr=False)
+    rise: Array
+    normal: Array = field(repr=False)
+    area: float | None = None
+
+    def interval(self, level: float = LEVEL) -> tuple[float, float]:
+        """Where the rise is below that of a probability; infinite where the profile does not rise so far."""
+        low, high = self._ends(self.rise, level)
+        return low, high
+
+    @property
+    def gaussian(self) -> bool:
+        """Whether its 95 % interval is that of the fit's error, nearly."""
+        if not np.all(np.isfinite(self.normal)):
+            return False
+        own, usual = np.array(self._ends(self.rise, LEVEL)), np.array(self._ends(self.normal, LEVEL))
+        best = float(self.values[int(np.argmin(self.normal))])
+        both = np.isfinite(own) & np.isfinite(usual)
+        return bool(np.all(np.isfinite(own) == np.isfinite(usual)) and
+                    np.all(np.abs(own - usual)[both] <= ALIKE * np.abs(usual - best)[both]))  # fmt: skip
+
+    def _ends(self, rise: Array, level: float) -> tuple[float, float]:
+        limit = float(chi2.ppf(level, 1))
+        best = int(np.argmin(rise))
+        ends = []
+        for side in (slice(best, None, -1), slice(best, None, 1)):
+            own, values = rise[side], self.values[side]
+            beyond = np.flatnonzero(own > limit)
+            if not len(beyond):
+                ends.append(-np.inf if side.step == -1 else np.inf)
+                continue
+            i = int(beyond[0])
+            share = (limit - own[i - 1]) / (own[i] - own[i - 1]) if i else 0.0
+            ends.append(float(values[i - 1] + share * (values[i] - values[i - 1])) if i else float(values[0]))
+        return ends[0], ends[1]
+
+    def __str__(self) -> str:
+        text = f"{self.name}, 95 % by its profile: {self._shown(self.rise)}"
+        if self.gaussian:
+            return text
+        return f"{text}; not Gaussian, its error alone would say {self._shown(self.normal)}" if np.all(
+            np.isfinite(self.normal)
+        ) else f"{text}; not Gaussian, no error can stand for it"  # fmt: skip
+
+    def _shown(self, rise: Array) -> str:
+        ends = self._ends(rise, LEVEL)
+        return " to ".join(
+            "beyond the profile" if not np.isfinite(x) else shown(x, self.unit, area=self.area) for x in ends
+        )
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw how fast the misfit rises, with the intervals that this gives, and what the fit's error stands for.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return draw(self, ax=ax)
+
+
+@checked(reach=Number(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
+def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
+    """Profile of a parameter: all others fitted anew at each value, side by side.
+
+    Parameters
+    ----------
+    fit : Fit
+    name : str
+    reach : float
+        How far to go, in standard deviations; two e-folds or natural sizes where the parameter is not determined.
+    count : int
+        Values on the way.
+    threads : int, optional
+    """
+    i = fit.index(name)
+    variance = float(fit.covariance[i, i])
+    width = np.sqrt(variance) * reach if np.isfinite(variance) else 2.0
+    z = np.tile(fit.coordinates, (count, 1))
+    z[:, i] = fit.coordinates[i] + width * np.linspace(-1, 1, count)
+    if np.isfinite(variance):  # along the valley, as far as it is straight
+        slope = fit.covariance[:, i] / variance
+        slope[~np.isfinite(slope)] = 0.0
+        z = fit.coordinates + (z[:, i : i + 1] - fit.coordinates[i]) * slope
+    low, high = fit.bounds
+    z = np.clip(z, low, high)
+    held = np.zeros_like(z, dtype=bool)
+    held[:, i] = True
+    few = condensed(fit.plan, fit.plan.comparison(threads), np.stack([fit.coordinates, z[0], z[-1]]))
+    found = minimise(lambda x, _: few.residuals(x), z, low, high, held=held)
+    least = float(np.sum(few.residuals(fit.coordinates[None])[0] ** 2))
+    rise = (found.ssq - least) / _unit_of_rise(fit, i)
+    keep = np.isfinite(found.ssq)
+    order = np.argsort(z[keep, i])
+    one = fit.space.unknowns[i]
+    values = one.value(z[keep, i][order])
+    away = z[keep, i][order] - fit.coordinates[i]
+    normal = away**2 / variance if np.isfinite(variance) else np.full(len(away), np.nan)
+    return Profile(one.name, one.unit, values, found.ssq[keep][order], rise[keep][order], normal, fit.plan.rig.area)
+
+
+def _unit_of_rise(fit: Fit, i: int) -> float:
+    """Rise of the sum of squares one standard deviation from the minimum; more where residuals are correlated."""
+    _, jacobian = fit.comparison.residuals(fit.coordinates[None])
+    information = jacobian[0] @ jacobian[0].T
+    naive = float(np.linalg.pinv(information, rcond=1e-13, hermitian=True)[i, i])
+    plain = fit.ssq / max(fit.degrees, 1)
+    variance = float(fit.covariance[i, i])
+    return variance / naive if np.isfinite(variance) and naive > 0 else plain

@@ -86,7 +86,7 @@ def script():
 def test_roots_are_those_that_a_polynomial_was_made_of(script, real, pairs):
     """Backward stable: the coefficients of the roots found are those given, to some units of the last place."""
     made = [*real, *(complex(a, b) for a, b in pairs), *(complex(a, -b) for a, b in pairs)]
-    assume(all(abs(a - b) > 1e-2 for i, a in enumerate(made) for b in made[:i]))
+    assume(all(abs(a - b) > 0.3 for i, a in enumerate(made) for b in made[:i]))
     c = np.atleast_1d(np.poly(made)).real[::-1]
     found = script("roots(c)", c=c)
     assert len(found) == len(c) - 1

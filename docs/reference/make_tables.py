@@ -262,6 +262,7 @@ section 3 of [Equations and where they live](equations.md). This page is written
 GROUPS = {
     "": "Modules",
     "verdict": "The verdict",
+    "explorer": "The explorer",
     "files.specifications": "Rig files",
     "schemas": "Schema of files",
     "laws.contact": "Contact laws",

@@ -48,6 +48,10 @@ from .experiments import (
     read_spec as read_spec,
     record_from_arrays as record_from_arrays,
 )
+from .explorer import (
+    Explorer as Explorer,
+    explore as explore,
+)
 from .files.specifications import (
     piece_from_text as piece_from_text,
     protocol_from_text as protocol_from_text,

@@ -227,6 +227,30 @@ def fit(
 
 
 @app.command()
+def explore(
+    rig: RigFile,
+    changes: Changes = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="write the page (.html) instead of opening it")
+    ] = None,
+    branch: Annotated[int, typer.Option(help="which steady sliding, where there are several")] = 0,
+) -> None:
+    """A page for the browser: the verdict as the rig's values are moved. It needs nothing else, and can be sent on."""
+    from steadyslip.explorer import explore as run
+    from steadyslip.files.output import check_output
+    from steadyslip.files.specifications import read_rig
+
+    if output is not None:
+        check_output([output], [".html"])
+    found = run(read_rig(rig, changes or ()), title=rig.stem, branch=branch)
+    if output is None:
+        say(f"opened {found.open()}")
+        return
+    found.save(output)
+    say(f"wrote {output}")
+
+
+@app.command()
 def simulate(
     rig: RigFile,
     changes: Changes = None,

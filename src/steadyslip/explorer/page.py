@@ -1,0 +1,240 @@
+"""One HTML file from one rig: equations, numbers, modules and style put together; it asks for nothing from outside."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import tempfile
+import webbrowser
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable
+from steadyslip.core.options import BRANCH, NAME, checked
+from steadyslip.core.quantities import outside
+from steadyslip.core.records import Address, twin
+from steadyslip.explorer.equations import linear_part
+from steadyslip.files.output import whole_file
+from steadyslip.files.specifications.write import rig_to_text
+from steadyslip.kernels.printers import javascript
+from steadyslip.linear.boundary import present_zeros
+from steadyslip.linear.search import Search
+from steadyslip.linear.status import STABLE, UNKNOWN, UNSTABLE, status
+from steadyslip.machine.slider import Slider
+from steadyslip.model.point import operating_point
+from steadyslip.verdict.analyze import linear_numbers
+
+MODULES = ("polynomials", "linear", "quantities", "rig", "chart", "page")
+"""Modules of the page, each after those that it imports."""
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+)
+_SENTINEL = 1.2345678901e-211  # first of the numbers that stand for values in the template of a rig file
+
+
+@dataclass(frozen=True)
+class Explorer:
+    """The page of one rig.
+
+    Attributes
+    ----------
+    html : str
+        The whole file.
+    title : str
+    """
+
+    html: str = field(repr=False)
+    title: str
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the file.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        with whole_file(path) as name:
+            Path(name).write_text(self.html, encoding="utf-8")
+
+    def open(self) -> Path:
+        """Show the page in the browser; the file it is in."""
+        with tempfile.NamedTemporaryFile(
+            "w", suffix=".html", prefix="steadyslip-", delete=False, encoding="utf-8"
+        ) as to:
+            to.write(self.html)
+        webbrowser.open(Path(to.name).as_uri())
+        return Path(to.name)
+
+    def _repr_html_(self) -> str:
+        """The page in a frame of its own, for notebooks."""
+        frame = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;border:0"'
+        return f'<iframe title="{html.escape(self.title)}" {frame} srcdoc="{html.escape(self.html)}"></iframe>'
+
+
+@checked(title=NAME, branch=BRANCH)
+def explore(rig: Slider, *, title: str = "rig", branch: int = 0) -> Explorer:
+    """A page that shows how a rig's verdict depends on its parameters.
+
+    Parameters
+    ----------
+    rig : Slider
+        With any law, contact and drive; users' own laws too.
+    title : str, optional
+        What the page calls the rig.
+    branch : int, optional
+        Which steady sliding where there are several, by rising normal stress.
+
+    Returns
+    -------
+    Explorer
+        Shown in a notebook; ``save("page.html")`` writes it, ``open()`` shows it in the browser.
+
+    Raises
+    ------
+    NotAvailable
+        If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
+    """
+    return Explorer(page(rig, title, branch), title)
+
+
+def page(rig: Slider, title: str, branch: int) -> str:
+    """The text of the file."""
+    text, facts = linear_part(rig)
+    web = files("steadyslip.explorer.web")
+    modules = [web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in MODULES]
+    script = javascript.as_script(javascript.runtime(), *modules)
+    data = json.dumps(_data(rig, title, branch, facts), ensure_ascii=False, allow_nan=False)
+    for letter in "<>&\u2028\u2029":  # nothing in a rig can end the element that its data are in
+        data = data.replace(letter, f"\\u{ord(letter):04x}")
+    style = web.joinpath("style.css").read_text(encoding="utf-8")
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{html.escape(title)} – steadyslip</title>\n<style>\nbody {{ margin: 0; }}\n{style}</style>\n</head>\n"
+        '<body>\n<div class="steadyslip-root"></div>\n'
+        f'<script type="application/json" class="steadyslip-data">{data}</script>\n'
+        f'<script>\n"use strict";\n(() => {{\n{script}\nconst programs = {text};\n'
+        "const place = document.currentScript.previousElementSibling;\n"
+        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs);\n})();\n</script>\n"
+        "</body>\n</html>\n"
+    )
+
+
+def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything about a rig but its equations."""
+    from steadyslip import __version__
+
+    names = list(_varied(rig, facts))
+    places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
+    point = operating_point(rig, None, present_zeros(rig), branch)
+    axial = "slider.axial_stiffness"
+    stiffness = axial if axial in names else rig.stiffness_name()
+    return {
+        "title": title,
+        "version": __version__,
+        "branch": branch,
+        "area": rig.area,
+        "parameters": [_parameter(rig, name, branch) for name in names],
+        "facts": dict(facts),
+        "places": places,
+        "fixed": [float(np.asarray(value)) for value in point.arguments],
+        "axial": names.index(axial) if axial in names else -1,
+        "speed": "drive.velocity",
+        "stiffness": stiffness if stiffness in names else None,
+        "toml": _template(rig, names),
+        "checks": _checks(rig, names, branch),
+    }
+
+
+def _varied(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Address]:
+    """The parameters that a page can vary: those in the equations that matter to the verdict.
+
+    An axial stiffness stands in place of that along the sliding.
+    """
+    known = set(facts["parameters"]) - {"slider.stiffness"} | {"slider.axial_stiffness"}
+    if rig.axial_stiffness is None and rig.stiffness is not None:
+        known |= {"slider.stiffness"}
+    return {
+        name: one
+        for name, one in rig.parameters().items()
+        if name in known and one.value is not None and not one.role.gauge
+    }
+
+
+def _parameter(rig: Slider, name: str, branch: int) -> dict[str, Any]:
+    one = rig.parameters()[name]
+    domain, value = one.role.domain, float(one.value or 0.0)
+    factor, unit = outside(one.role.unit, rig.area)
+    natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
+    return {
+        "name": name,
+        "label": name.rpartition(".")[2],
+        "doc": one.role.doc,
+        "unit": unit,
+        "factor": factor,
+        "value": value,
+        "natural": natural if math.isfinite(natural) else 1.0,
+        "low": domain.low if math.isfinite(domain.low) else None,
+        "high": domain.high if math.isfinite(domain.high) else None,
+        "lowAllowed": domain.low_allowed and not (one.role.adds_state and domain.low == 0),
+        "highAllowed": domain.high_allowed,
+        "whole": domain.whole,
+        "allowed": domain.text,
+    }
+
+
+def _template(rig: Slider, names: list[str]) -> str:
+    """The rig file with a place for each value, in SI units per unit area, so that every digit comes back."""
+    marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
+    lines = rig_to_text(twin(rig, marks)).splitlines()
+    for i, name in enumerate(names):
+        one = rig.parameters()[name].role
+        factor, _ = outside(one.unit, rig.area)
+        written = {repr(marks[name]), repr(marks[name] * factor), f'"{marks[name]!r} {one.unit}"'}
+        for k, line in enumerate(lines):
+            key, _, value = line.partition(" = ")
+            if value.partition("  #")[0] in written:
+                lines[k] = f"{key} = {{{{{i}}}}}" if one.unit == "1" else f'{key} = "{{{{{i}}}}} {one.unit}"'
+    return "\n".join(lines) + "\n"
+
+
+def _checks(rig: Slider, names: list[str], branch: int) -> list[dict[str, Any]]:
+    """Answers of Python at the rig's own numbers and at some others, for the page to compare."""
+    stiff = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
+    changes: list[dict[str, float]] = [{}]
+    for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
+        if name in names:
+            changes.append({name: factor * float(rig.value(name) or 0.0)})
+    found = []
+    for change in changes:
+        other = rig.with_values(change) if change else rig
+        word = " and ".join(f"{name} = {value!r}" for name, value in change.items()) or "the rig itself"
+        found.append({"name": word, **_answer(other, names, branch)})
+    return found
+
+
+def _answer(rig: Slider, names: list[str], branch: int) -> dict[str, Any]:
+    point = operating_point(rig, None, present_zeros(rig), branch)
+    answer: dict[str, Any] = {
+        "values": [float(rig.value(name) or 0.0) for name in names],
+        "status": int(status(point)),
+        "critical": None,
+        "eigenvalues": [],
+    }
+    if answer["status"] == UNKNOWN:
+        raise NotAvailable(OUT_OF_RANGE)
+    if answer["status"] in (STABLE, UNSTABLE):
+        with np.errstate(all="ignore"):
+            numbers = linear_numbers(rig, point)
+        answer["critical"] = numbers.get("critical_stiffness")
+        answer["eigenvalues"] = [[s.real, s.imag] for s in numbers["eigenvalues"]]
+    return answer

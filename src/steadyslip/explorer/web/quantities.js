@@ -1,0 +1,82 @@
+// Text such as "9 GPa/m" to SI numbers and back: the counterpart of steadyslip/core/quantities.py for a page.
+
+/** @type {Record<string, [number, number[]]>} factor, and exponents of kilogram, metre, second and radian */
+const TABLE = {
+  g: [1e-3, [1, 0, 0, 0]], kg: [1, [1, 0, 0, 0]], t: [1e3, [1, 0, 0, 0]], min: [60, [0, 0, 1, 0]],
+  h: [3600, [0, 0, 1, 0]], day: [86400, [0, 0, 1, 0]], days: [86400, [0, 0, 1, 0]], yr: [31557600, [0, 0, 1, 0]],
+  bar: [1e5, [1, -1, -2, 0]], rad: [1, [0, 0, 0, 1]], deg: [Math.PI / 180, [0, 0, 0, 1]],
+  "°": [Math.PI / 180, [0, 0, 0, 1]], "%": [0.01, [0, 0, 0, 0]], 1: [1, [0, 0, 0, 0]],
+};
+/** @type {[string, number[]][]} */
+const BASES = [["Pa", [1, -1, -2, 0]], ["N", [1, 1, -2, 0]], ["m", [0, 1, 0, 0]], ["s", [0, 0, 1, 0]], ["Hz", [0, 0, -1, 0]]];
+for (const [name, exponents] of BASES) {
+  TABLE[name] = [1, exponents];
+  const prefixes = { G: 1e9, M: 1e6, k: 1e3, c: 1e-2, m: 1e-3, u: 1e-6, n: 1e-9 };
+  for (const [letter, factor] of Object.entries(prefixes)) TABLE[letter + name] ??= [factor, exponents];
+}
+const WORD = /\s*([/*·])?\s*([A-Za-z%°]+|1)\s*(?:\^\s*(-?\d)|(\d))?/y;
+const NUMBER = /^\s*([-+−]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+−]?\d+)?)\s*(.*?)\s*$/;
+/** @type {[number, string][]} */
+const SHOWN = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+/** @type {[number, string][]} */
+const LONG = [[31557600, "yr"], [86400, "days"], [3600, "h"], [60, "min"]];
+
+/** Factor and exponents of a unit. @param {string} text @returns {[number, number[]]} */
+export function unitOf(text) {
+  const plain = text.replace(/[µμ]/g, "u").replace(/²/g, "^2").replace(/³/g, "^3").trim();
+  let factor = 1, at = 0;
+  const exponents = [0, 0, 0, 0];
+  while (at < plain.length) {
+    WORD.lastIndex = at;
+    const found = WORD.exec(plain), known = found && Object.hasOwn(TABLE, found[2]) && TABLE[found[2]];
+    if (!found || !known) throw new Error(`“${text.slice(0, 40)}” is not a unit`);
+    const power = Number(found[3] || found[4] || 1) * (found[1] === "/" ? -1 : 1);
+    factor *= known[0] ** power;
+    known[1].forEach((e, i) => (exponents[i] += power * e));
+    at = WORD.lastIndex;
+  }
+  return [factor, exponents];
+}
+
+/**
+ * A quantity in SI units; a bare number counts in the unit that is shown.
+ * @param {string} text
+ * @param {string} si expected unit
+ * @param {string} unit shown now
+ */
+export function parse(text, si, unit) {
+  const found = NUMBER.exec(text.slice(0, 200));
+  if (!found) throw new Error(`“${text.slice(0, 40)}” is not a number with a unit`);
+  const name = found[2] || unit, [factor, exponents] = unitOf(name), expected = unitOf(si)[1];
+  if (exponents.some((e, i) => e !== expected[i])) throw new Error(`“${name}” has the wrong dimension; expected ${si}`);
+  const digits = found[1].replace(/−/g, "-");
+  const power = Math.log10(factor); // one rounding where the factor is a power of ten: "10 um" is 1e-05
+  if (Number.isInteger(power) && !/e/i.test(digits)) return Number(`${digits}e${power}`);
+  return Number(digits) * factor;
+}
+
+/** A number with few digits. @param {number} value */
+export function digits(value, many = 4) {
+  const size = Math.abs(value);
+  if (!Number.isFinite(value)) return Number.isNaN(value) ? "–" : value > 0 ? "∞" : "−∞";
+  const text = size !== 0 && (size >= 1e5 || size < 1e-4) ? value.toExponential(many - 1).replace(/\.?0+e/, "e") : String(Number(value.toPrecision(many)));
+  return text.replace("-", "−").replace(/e([+-−]?)(\d+)/, (_, sign, power) => `e${sign === "+" ? "" : "−"}${power}`);
+}
+
+/** Factor and name of the unit in which a value reads best. @param {number} value @param {string} si @returns {[number, string]} */
+export function display(value, si) {
+  if (si === "1") return [1, ""];
+  if (si === "rad") return [Math.PI / 180, "deg"];
+  const first = /^(Pa|N|m|s)(?![a-z])/.exec(si), size = Math.abs(value);
+  if (si === "s" && Number.isFinite(size)) for (const [factor, name] of LONG) if (size >= Math.max(600, 2 * factor)) return [factor, name];
+  if (!first || !(size > 0) || !Number.isFinite(size)) return [1, si];
+  const large = first[0] === "Pa" || first[0] === "N";
+  const [factor, letter] = SHOWN.find(([f, l]) => size >= 0.9999 * f && (f < 10 || large || l === "")) || [1e-9, "n"];
+  return size / factor >= 1e-3 && size / factor < 1e5 ? [factor, letter + si] : [1, si];
+}
+
+/** A value for people, with its unit. @param {number} value @param {string} si */
+export function shown(value, si, many = 4) {
+  const [factor, name] = display(value, si);
+  return `${digits(value / factor, many)} ${name.replace("^2", "²")}`.trim();
+}

@@ -1,0 +1,147 @@
+// The rig of a page: its values, where they may lie, what follows from them, and how they leave the page.
+import { Linear, UNKNOWN } from "./linear.js";
+
+/**
+ * @typedef {{name: string, label: string, unit: string, factor: number, value: number, natural: number, doc: string,
+ *   low: number | null, high: number | null, lowAllowed: boolean, highAllowed: boolean, whole: boolean,
+ *   allowed: string}} Parameter
+ * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
+ *   axial: number, toml: string, branch: number, checks: any[], speed: string, area: number | null,
+ *   stiffness: string | null}} Data
+ * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
+ */
+
+export class Rig {
+  /** @param {Data} data @param {any} programs */
+  constructor(data, programs) {
+    this.data = data;
+    this.linear = new Linear(programs, data.facts);
+    this.values = data.parameters.map((one) => one.value);
+    this.vector = new Float64Array(data.facts.parameters.length);
+  }
+
+  /** The Model's parameters for some values of the page's. @param {number[]} values */
+  set(values) {
+    const { places, fixed, axial } = this.data, model = this.vector;
+    places.forEach((from, i) => (model[i] = from >= 0 ? values[from] : fixed[i]));
+    this.linear.set(model);
+    if (axial >= 0) {
+      const k = this.data.facts.parameters.indexOf("slider.stiffness");
+      model[k] = values[axial] * this.linear.ask("stiffness", 1)[0];
+      this.linear.set(model);
+    }
+    return this.linear;
+  }
+
+  /** @param {number[]} [values] */
+  assess(values = this.values) {
+    return this.set(values).assess(this.data.branch);
+  }
+
+  /** Status with one value, or two, in place of the rig's own. @param {number} i @param {number} x @param {number} [j] @param {number} [y] */
+  status(i, x, j = -1, y = 0) {
+    const parameter = this.data.parameters[i];
+    if (!inside(parameter, x) || (j >= 0 && !inside(this.data.parameters[j], y))) return UNKNOWN;
+    const values = this.trial ??= this.values.slice();
+    for (let k = 0; k < values.length; k++) values[k] = this.values[k];
+    values[i] = x;
+    if (j >= 0) values[j] = y;
+    return this.set(values).status(this.data.branch);
+  }
+
+  /** Where the status changes between two positions of a scale, to rounding of the position. */
+  narrowed(i, scale, low, high) {
+    const before = this.status(i, scale.at(low));
+    for (let step = 0; step < 50 && high - low > 1e-13; step++) {
+      const middle = 0.5 * (low + high);
+      if (this.status(i, scale.at(middle)) === before) low = middle;
+      else high = middle;
+    }
+    return [low, high];
+  }
+
+  /** Answers of Python that travel with the page, compared: what differs, in words. */
+  differences() {
+    const found = [];
+    for (const check of this.data.checks) {
+      const answer = this.assess(check.values), name = check.name;
+      if (answer.status !== check.status) found.push(`${name}: the verdict`);
+      if (check.critical !== null && !near(answer.critical, check.critical)) found.push(`${name}: the critical stiffness`);
+      const same = check.eigenvalues.length === answer.eigenvalues.length &&
+        check.eigenvalues.every(([re, im], i) => {
+          const s = answer.eigenvalues[i];
+          return Math.hypot(s.re - re, s.im - im) <= 1e-9 * Math.hypot(re, im);
+        });
+      if (!same) found.push(`${name}: the eigenvalues`);
+    }
+    return found;
+  }
+
+  /** The rig file with the values of now: a template in which each value has its place. */
+  toml() {
+    return this.data.toml.replace(/\{\{(\d+)\}\}/g, (_, i) => String(this.values[Number(i)]));
+  }
+
+  /** What differs from the rig that the page was made of, for a link. */
+  hash() {
+    const changed = this.data.parameters.flatMap((one, i) => (Object.is(this.values[i], one.value) ? [] : [`${encodeURIComponent(one.name)}=${this.values[i]}`]));
+    return changed.length ? `#${changed.join("&")}` : "";
+  }
+
+  /** Values from a link: only names that the rig has, numbers, and inside their domains; the rest is left alone. */
+  fromHash(text) {
+    const values = this.data.parameters.map((one) => one.value);
+    for (const part of text.slice(0, 10000).replace(/^#/, "").split("&")) {
+      const [name, number] = part.split("=");
+      const i = this.data.parameters.findIndex((one) => encodeURIComponent(one.name) === name);
+      const value = number && /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(number) ? Number(number) : NaN;
+      if (i >= 0 && inside(this.data.parameters[i], value)) values[i] = value;
+    }
+    return values;
+  }
+}
+
+const near = (a, b) => a !== null && Math.abs(a - b) <= 1e-11 * Math.abs(b);
+
+/** Whether a parameter may have a value. @param {Parameter} one @param {number} value */
+export function inside(one, value) {
+  if (!Number.isFinite(value) || (one.whole && !Number.isInteger(value))) return false;
+  const above = one.low === null || (one.lowAllowed ? value >= one.low : value > one.low);
+  return above && (one.high === null || (one.highAllowed ? value <= one.high : value < one.high));
+}
+
+const ZERO = 0.04; // share of a logarithmic scale that is zero
+
+/** Positions from 0 to 1 for values between two, even in what is natural for the parameter. */
+export function scaleOf(one, low, high) {
+  if ((one.low !== null && one.high !== null) || low < 0) {
+    return { at: (t) => low + t * (high - low), of: (v) => (v - low) / (high - low) };
+  }
+  const from = one.value === 0 && one.lowAllowed ? ZERO : 0, ratio = Math.log(high / low);
+  return {
+    at: (t) => (t < from ? 0 : low * Math.exp(((t - from) / (1 - from)) * ratio)),
+    of: (v) => (v <= 0 ? 0 : from + (1 - from) * (Math.log(v / low) / ratio)),
+  };
+}
+
+/** The range that a slider has at first: its whole domain if that is bounded, else some decades, and its nearest edge. */
+export function rangeOf(rig, i) {
+  const one = rig.data.parameters[i];
+  if (one.low !== null && one.high !== null) {
+    const inset = 1e-6 * (one.high - one.low);
+    return [one.lowAllowed ? one.low : one.low + inset, one.highAllowed ? one.high : one.high - inset];
+  }
+  const size = Math.abs(one.value) || one.natural;
+  if (one.low === null || one.low < 0) return one.value > 0 ? [-size, 4 * size] : [-4 * size, one.value < 0 ? size : 4 * size];
+  const own = rig.status(i, one.value), other = (x) => rig.status(i, x) !== own;
+  if (one.value === 0) { // the first change above zero
+    for (let step = -80; step <= 60; step++) if (other(size * 10 ** (step / 10))) return [size * 10 ** (step / 10 - 2), size * 10 ** (step / 10 + 1.5)];
+    return [size * 1e-3, size * 1e2];
+  }
+  const close = [1, 2, 3, 4, 5, 6, 7, 8].some((n) => other(size * 1.5 ** n) || other(size / 1.5 ** n));
+  for (let step = 15; step <= 60 && !close; step++) { // six decades to each side, until something changes
+    const found = [size * 10 ** (step / 10), size / 10 ** (step / 10)].filter(other);
+    if (found.length) return [Math.min(size / 30, ...found.map((x) => x / 3)), Math.max(size * 30, ...found.map((x) => x * 3))];
+  }
+  return [size / 30, size * 30];
+}

@@ -1,0 +1,307 @@
+"""The explorer's page in a real browser: what a user does, and what a hostile file or link may try."""
+
+import json
+import re
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from browser import chromium, driver
+from command import run
+from rigs_of_theory import ONE_MEMORY, SIGMA, rig
+
+pytestmark = pytest.mark.slow  # a browser works in processes of its own, whose seconds are not measured
+INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
+SIZES = [(360, 740), (390, 844), (768, 1024), (1280, 800), (1920, 1080)]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = chromium()
+    with driver() as playwright:
+        opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+class Visit:
+    """A page that is open, with everything it complained about or asked for."""
+
+    def __init__(self, browser, path, link="", **options):
+        self.context = browser.new_context(**options)
+        self.page = self.context.new_page()
+        self.complaints, self.requests = [], []
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri() + link)
+        self.page.wait_for_selector("h1:not(:empty)")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.context.close()
+        assert self.complaints == []
+
+    def sentence(self):
+        return self.page.inner_text("h1")
+
+    def field(self, name):
+        return self.page.get_by_label(re.compile(rf"^{re.escape(name)}: .*value with unit$"))
+
+    def slider(self, name):
+        return self.page.locator(f'input[type=range][aria-label^="{name}: "]')
+
+    def type(self, name, text):
+        self.field(name).fill(text)
+        self.field(name).press("Tab")
+
+    def saved(self, button):
+        with self.page.expect_download() as waiting:
+            self.page.get_by_role("button", name=button).click()
+        return waiting.value.path().read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("pages") / "rig.html"
+    ss.explore(INCLINED, title="A rig").save(path)
+    return path
+
+
+def test_the_page_says_what_python_says_and_asks_for_nothing(browser, file):
+    analysis = ss.analyze(INCLINED)
+    with Visit(browser, file) as visit:
+        assert visit.sentence() == "Unstable: steady sliding at 1 µm/s"
+        text = visit.page.inner_text(".verdict p")
+        assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
+        assert f"{9e9 / analysis.critical_stiffness:.3g} times" in text
+        assert "agrees with 4 answers of Python" in visit.page.inner_text("footer")
+        edges = dict(re.findall(r"(\S+) → (\S+)", visit.page.inner_text(".edges")))
+        for name in ("friction.a", "friction.b"):
+            (edge,) = [one.value for one in ss.boundary(INCLINED, name)]
+            assert float(edges[name]) == pytest.approx(edge, rel=1e-3)
+        assert visit.requests == [file.as_uri()]
+    assert file.stat().st_size <= 200_000
+    assert "default-src 'none'" in file.read_text(encoding="utf-8")
+
+
+def test_values_can_be_typed_with_units_and_taken_back(browser, file):
+    with Visit(browser, file) as visit:
+        visit.type("slider.stiffness", "90 GPa/m")
+        assert visit.sentence().startswith("Stable")
+        visit.type("slider.stiffness", "3 MPa")
+        assert "wrong dimension" in visit.page.inner_text(".fault:not(:empty)")
+        visit.type("slider.stiffness", "-3 GPa/m")
+        assert "allowed: a finite number >= 0" in visit.page.inner_text(".fault:not(:empty)")
+        visit.type("slider.stiffness", "80")  # in the unit that is shown
+        assert visit.field("slider.stiffness").input_value() == "80 GPa/m"
+        for _ in range(2):
+            visit.page.get_by_role("button", name="undo").click()
+        assert visit.sentence().startswith("Unstable")
+        visit.page.get_by_role("button", name="redo").click()
+        assert visit.sentence().startswith("Stable")
+        visit.page.get_by_role("button", name="back to the rig").click()
+        assert visit.sentence().startswith("Unstable")
+
+
+def test_sliders_and_the_chart_work_by_keyboard_and_by_pointer(browser, file):
+    with Visit(browser, file) as visit:
+        stiffness = visit.slider("slider.stiffness")
+        stiffness.focus()
+        for _ in range(12):
+            visit.page.keyboard.press("PageUp")
+        assert visit.sentence().startswith("Stable")
+        assert "GPa/m" in stiffness.get_attribute("aria-valuetext")
+        visit.page.get_by_role("button", name="back to the rig").click()
+        chart = visit.page.locator("svg.chart")
+        chart.focus()
+        for _ in range(10):
+            visit.page.keyboard.press("Shift+ArrowUp")
+        assert visit.sentence().startswith("Stable")
+        assert "Stable" in chart.get_attribute("aria-label")
+        box = chart.bounding_box()
+        point = visit.page.locator("svg.chart .point")
+        visit.page.mouse.move(*_middle(point))
+        visit.page.mouse.down()
+        visit.page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.8 * box["height"], steps=5)
+        visit.page.mouse.up()
+        assert visit.sentence().startswith("Unstable")
+        visit.page.get_by_role("button", name="undo").click()
+        assert visit.sentence().startswith("Stable"), "a drag is one change"
+
+
+def _middle(element):
+    box = element.bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_tracks_are_painted_as_python_judges(browser, file):
+    """Colours of the track of every slider, at positions between the edges, are statuses of Python."""
+    with Visit(browser, file) as visit:
+        paint = visit.slider("friction.a").evaluate("e => e.style.getPropertyValue('--track')")
+        stops = [(name, float(at)) for name, at in re.findall(r"--(\w+)\) ([\d.]+)%", paint)]
+        assert [name for name, _ in stops] == ["unstable", "unstable", "stable", "stable"]
+        (edge,) = [one.value for one in ss.boundary(INCLINED, "friction.a")]
+        low, high = 0.0145 / 30, 0.0145 * 30
+        assert stops[1][1] == pytest.approx(100 * np.log(edge / low) / np.log(high / low), abs=0.01)
+
+
+def test_an_edge_in_the_list_goes_there(browser, file):
+    with Visit(browser, file) as visit:
+        visit.page.get_by_role("button", name=re.compile(r"^slider\.stiffness →")).click()
+        assert visit.sentence().startswith("Stable")
+        assert "1 times the critical" in visit.page.inner_text(".verdict p")
+
+
+def test_files_and_links_carry_every_digit(browser, file, tmp_path):
+    with Visit(browser, file) as visit:
+        visit.type("friction.a", "0.0123456789012345")
+        visit.slider("contact.angle").focus()
+        visit.page.keyboard.press("PageUp")
+        (tmp_path / "rig.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+        link = visit.page.evaluate("location.hash")
+        critical = visit.page.inner_text(".verdict p")
+        table = visit.saved("values and edges")
+        picture = visit.saved("as a picture")
+    again = ss.read_rig(tmp_path / "rig.toml")
+    assert again.friction.a == 0.0123456789012345
+    assert f"{ss.analyze(again).critical_stiffness / 1e9:.4g} GPa/m" in critical
+    assert json.dumps("friction.a") + ",0.0123456789012345," in table
+    assert picture.startswith("<svg")
+    assert "var(" not in picture
+    with Visit(browser, file, link) as visit:
+        assert visit.page.inner_text(".verdict p") == critical
+        (tmp_path / "rig2.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+    assert ss.read_rig(tmp_path / "rig2.toml") == again
+
+
+HOSTILE = (
+    "#friction.a=-1", "#friction.a=1e999", "#friction.a=NaN", "#friction.a=0x10", "#friction.a", "#=", "#%zz",
+    "#&&&===", "#__proto__=1", "#constructor=2&toString=3", "#slider.stiffness=<script>alert(1)</script>",
+    "#" + "a=1&" * 9000,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("link", HOSTILE, ids=range(len(HOSTILE)))
+def test_hostile_links_change_nothing(browser, file, link):
+    with Visit(browser, file, quote(link, safe="#=&%")) as visit:
+        assert visit.sentence() == "Unstable: steady sliding at 1 µm/s"
+        assert visit.field("friction.a").input_value() == "0.0145"
+
+
+def test_hostile_titles_are_text(browser, tmp_path):
+    title = "</title></script><script>throw 1</script>\u2028<!--<img src=x onerror=alert(1)>\"'&amp;{{0}}"
+    ss.explore(INCLINED, title=title).save(tmp_path / "rig.html")
+    with Visit(browser, tmp_path / "rig.html") as visit:
+        assert visit.page.inner_text(".brand b") == title.replace("\u2028", visit.page.inner_text(".brand b")[41])
+        assert visit.page.locator("img").count() == 0
+
+
+def test_a_browser_that_computes_otherwise_says_so(browser, file, tmp_path):
+    text = file.read_text(encoding="utf-8")
+    wrong = re.sub(r'("critical": )(\d+\.\d+)', lambda m: f"{m[1]}{float(m[2]) * (1 + 1e-9)!r}", text, count=1)
+    assert wrong != text
+    (tmp_path / "wrong.html").write_text(wrong, encoding="utf-8")
+    with Visit(browser, tmp_path / "wrong.html") as visit:
+        assert "do not rely on this page" in visit.page.inner_text(".notice")
+        assert "the rig itself: the critical stiffness" in visit.page.inner_text(".notice")
+
+
+def test_two_pages_live_in_one_document(browser, file, tmp_path):
+    other = ss.explore(rig(stiffness=9e10), title="Other").html
+    body = re.search(r"<body>(.*)</body>", other, re.S)[1]
+    (tmp_path / "two.html").write_text(
+        file.read_text(encoding="utf-8").replace("</body>", body + "</body>"), encoding="utf-8"
+    )
+    with Visit(browser, tmp_path / "two.html") as visit:
+        assert visit.page.locator("h1").all_inner_texts() == [
+            "Unstable: steady sliding at 1 µm/s",
+            "Stable: steady sliding at 1 µm/s",
+        ]
+        ids = visit.page.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
+        assert len(ids) == len(set(ids)) == 2
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_it_fits_every_width_and_can_be_read(browser, file, dark):
+    for width, height in SIZES:
+        options = {"viewport": {"width": width, "height": height}, "color_scheme": "dark" if dark else "light"}
+        with Visit(browser, file, **options) as visit:
+            assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
+            if width in (360, 1280):
+                assert visit.page.evaluate(CONTRAST) == []
+
+
+CONTRAST = """() => {
+  const numbers = (c) => c.match(/[\\d.]+/g).map(Number);
+  const linear = (v) => v <= 10 ? v / 3294.6 : ((v / 255 + .055) / 1.055) ** 2.4;
+  const light = (c) => { const [r, g, b] = numbers(c).map(linear); return .2126 * r + .7152 * g + .0722 * b; };
+  const behind = (e) => {
+    const c = getComputedStyle(e).backgroundColor;
+    return (numbers(c)[3] ?? 1) > 0 ? c : e.parentElement ? behind(e.parentElement) : "rgb(255,255,255)";
+  };
+  const bad = [];
+  for (const e of document.querySelectorAll(".steadyslip *")) {
+    const own = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()), style = getComputedStyle(e);
+    if (!own || e.disabled || !e.getClientRects().length) continue;
+    const a = light(e instanceof SVGElement ? style.fill : style.color), b = light(behind(e));
+    const ratio = (Math.max(a, b) + .05) / (Math.min(a, b) + .05);
+    if (ratio < 4.5) bad.push(`${e.tagName} ${e.textContent.slice(0, 20)} ${ratio.toFixed(2)}`);
+  }
+  return bad;
+}"""
+
+
+def test_every_control_has_a_name(browser, file):
+    with Visit(browser, file) as visit:
+        controls = "[...document.querySelectorAll('button, input, select')]"
+        nameless = "e => !(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.length)"
+        assert visit.page.evaluate(f"{controls}.filter({nameless}).length") == 0
+        assert visit.page.locator("h1").count() == 1
+
+
+RIGS = {
+    "area": rig(area=0.01, stiffness=9e9),
+    "axial": rig(contact=ss.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
+    "controller": rig(stiffness=None, drive=ss.PID(1e-6, kp=9e9, ki=1e8), mass=1e3),
+    "locked": rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0)),
+    "bristles": rig(friction=ONE_MEMORY[-1]),
+}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_other_rigs_have_pages_too(browser, tmp_path, name):
+    own = RIGS[name]
+    ss.explore(own).save(tmp_path / "rig.html")
+    analysis = ss.analyze(own)
+    with Visit(browser, tmp_path / "rig.html") as visit:
+        word = {None: "No steady sliding", True: "Stable", False: "Unstable"}[analysis.stable]
+        assert visit.sentence().startswith(word)
+        assert visit.page.inner_text(".notice") == ""
+        text = visit.saved("save as a rig file")
+    again = ss.rig_from_text(text)
+    assert ss.analyze(again).critical_stiffness == analysis.critical_stiffness
+    assert ss.analyze(again).eigenvalues == analysis.eigenvalues
+
+
+def test_the_command_writes_the_page(tmp_path):
+    ss.write_rig(INCLINED, tmp_path / "my rig.toml")
+    answered = run("explore", tmp_path / "my rig.toml", "-o", tmp_path / "page.html", "--set", "stiffness=90 GPa/m")
+    assert answered.returncode == 0, answered.stderr
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<title>my rig – steadyslip</title>" in text
+    assert '"value": 90000000000.0' in text
+    refused = run("explore", tmp_path / "my rig.toml", "-o", tmp_path / "page.pdf")
+    assert refused.returncode == 2
+    assert ".html" in refused.stderr
+
+
+def test_notebooks_show_it_in_a_frame():
+    shown = ss.explore(INCLINED)._repr_html_()
+    assert shown.startswith("<iframe")
+    assert 'sandbox="allow-scripts allow-downloads"' in shown
+    assert "<script" not in shown

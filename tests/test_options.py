@@ -1,5 +1,7 @@
 """Numeric options of Python calls: whatever is given, an answer or one message of ours, and soon."""
 
+from itertools import count
+
 import numpy as np
 import pytest
 
@@ -18,10 +20,14 @@ VALUES = {
 RIG = rig(mass=0.0)
 STIFF = RIG.with_values({"stiffness": 1.5 * float(ss.critical_stiffness(RIG))})
 STEP = ss.VelocityStep(at=0.1, to=2e-6)
+STRESSED = ss.Protocol(pieces=(ss.NormalStressStep(at=30.0, by=5e5), ss.VelocityStep(at=60.0, to=3e-6)), until=90.0)
+PLAN = ss.Map(
+    RIG, {"friction.a": ss.Grid(0.012, 0.015, 3), "stiffness": ss.Grid(1e9, 1e10, 3)}, ["status", "critical_stiffness"]
+)
 QUICK = {"until": 0.2, "most_steps": 50}
 
 
-def _calls(fitted):
+def _calls(fitted, grid, fresh):
     """Name, and a call with the one option."""
 
     def simulate(**o):
@@ -47,7 +53,26 @@ def _calls(fitted):
         return ss.sensitivity(RIG, {"friction.a": (0.01, 0.012), "stiffness": (1e9, 2e9)}, "critical_stiffness",
                               **({"points": 64, "progress": False} | o))  # fmt: skip
 
+    def curve(**o):
+        return ss.hopf_curve(
+            RIG, **({"first": "friction.a", "between": {"friction.a": (0.0139, 0.0151)}, "spacing": 0.05} | o)
+        )
+
+    def chosen(**o):
+        return ss.best_protocol(lab.rig(alpha=0.3), **({"candidates": {"one": STRESSED}, "samples": 100} | o))
+
+    def mapped(**o):
+        return ss.run_map(PLAN, **({"path": next(fresh), "workers": 1, "progress": False} | o))
+
+    def refined(**o):
+        options = {"rounds": 1, "workers": 1, "progress": False, "of": "critical_stiffness", "level": 6.2e9} | o
+        return ss.refine(grid, **options)
+
     calls = {
+        curve: ("first", "second", "between", "branch", "spacing"),
+        chosen: ("candidates", "parameter", "noise", "until", "samples", "fixed"),
+        mapped: ("path", "workers", "cluster"),
+        refined: ("rounds", "of", "level", "compute", "workers", "cluster"),
         simulate: ("until", "rtol", "most_steps", "times", "initial", "method"),
         many: ("until", "rtol", "most_steps", "times", "threads"),
         lambda **o: ss.analyze(RIG, **o): ("branch", "kick"),
@@ -80,9 +105,16 @@ def fitted():
     return ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, 0), starts=3)
 
 
-def test_any_value_of_any_option(fitted):
+@pytest.fixture
+def fresh(tmp_path):
+    """Paths of maps to come."""
+    return (tmp_path / f"{i}.zarr" for i in count())
+
+
+def test_any_value_of_any_option(fitted, fresh):
     faults = []
-    for call, name in _calls(fitted):
+    grid = ss.run_map(PLAN, next(fresh), workers=1, progress=False)
+    for call, name in _calls(fitted, grid, fresh):
         for kind, value in VALUES.items():
             fault = judged(lambda c=call, n=name, v=value: c(**{n: v}))
             if fault:

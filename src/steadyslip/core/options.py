@@ -7,6 +7,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -33,7 +34,8 @@ class Number(Role):
         raise self.refused(value)
 
     def allowed(self) -> str:
-        return f"a finite number above {self.above:g}" + (f", up to {self.most:g}" if math.isfinite(self.most) else "")
+        above = f" above {self.above:g}" if math.isfinite(self.above) else ""
+        return f"a finite number{above}" + (f", up to {self.most:g}" if math.isfinite(self.most) else "")
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,30 @@ class ByName(Role):
         return "a mapping of names to values"
 
 
+class FilePath(Role):
+    """Where a file or folder is."""
+
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, (str, PathLike)):
+            return value
+        raise self.refused(value)
+
+    def allowed(self) -> str:
+        return "a path, as text or pathlib.Path"
+
+
+class Several(Role):
+    """A list of whatever the function says."""
+
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, (list, tuple)):
+            return value
+        raise self.refused(value)
+
+    def allowed(self) -> str:
+        return "a list"
+
+
 def whole(least: int, most: int = 2**31) -> Whole:
     """Whole numbers from `least` to `most`; truth values are none."""
     return Whole("", least, most)
@@ -89,7 +115,7 @@ def whole(least: int, most: int = 2**31) -> Whole:
 
 BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000), whole(0, 2**63)
 NAME, NAMES, SIGN = Text(""), Names(""), Option((1, -1), "")
-LOW_AND_HIGH, BY_NAME = LowAndHigh(), ByName()
+LOW_AND_HIGH, BY_NAME, PATH, SEVERAL = LowAndHigh(), ByName(), FilePath(), Several()
 
 
 def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:

@@ -322,6 +322,8 @@ def resolve(name: str, known: Mapping[str, Any]) -> str:
     UnknownNameError
         If nothing, or more than one parameter, has that name.
     """
+    if not isinstance(name, str):
+        raise UnknownNameError("parameter", name, known)
     if name in known:
         return name
     first, _, rest = name.partition(".")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.options import NAME, SEVERAL, THREADS, Number, checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
@@ -105,6 +107,7 @@ class Refined(ReadOnly):
         return draw(self, ax=ax)
 
 
+@checked(rounds=whole(1, MOST_ROUNDS), of=NAME, level=Number(-math.inf), compute=SEVERAL, workers=THREADS, cluster=NAME)
 def refine(
     found: MapResult,
     rounds: int = 3,
@@ -146,7 +149,7 @@ def refine(
         If the map is not complete, has samples, or no edge.
     """
     of = of or ("status" if "status" in found.results else found.results[0])
-    level = _checked(found, rounds, of, level)
+    level = _level(found, of, level)
     lattice = _Lattice(found, rounds)
     kinds = _Kinds(found, of, level)
     base = found.read(of)
@@ -166,10 +169,8 @@ def refine(
     return Refined(found, of, level, rounds, points, edge, sides, spacing)
 
 
-def _checked(found: MapResult, rounds: int, of: str, level: float | None) -> float | None:
+def _level(found: MapResult, of: str, level: float | None) -> float | None:
     problems = []
-    if isinstance(rounds, bool) or not isinstance(rounds, int) or not 1 <= rounds <= MOST_ROUNDS:
-        problems.append(Problem("rounds", f"got {rounds!r}; allowed: a whole number from 1 to {MOST_ROUNDS}"))
     if of not in found.results:
         problems.append(Problem("of", unknown_name("result", of, found.results)))
     elif found.store.array(of).ndim > len(found.dims):
@@ -182,8 +183,6 @@ def _checked(found: MapResult, rounds: int, of: str, level: float | None) -> flo
         if of not in usual:
             problems.append(Problem("level", f"missing; give the value of {of} at the edge"))
         level = usual.get(of)
-    elif isinstance(level, bool) or not isinstance(level, (int, float)):
-        problems.append(Problem("level", f"got {level!r}; allowed: a number in {found.unit(of)}"))
     if problems:
         raise ParameterError(problems)
     if SAMPLE in found.dims:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import NAME, PATH, THREADS, checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.store.arrays import Store, check_path, open_or_create
@@ -24,6 +25,7 @@ from steadyslip.motion.engine import available_cores
 SHORT = 2.0  # seconds of work for which no processes are started
 
 
+@checked(path=PATH, workers=THREADS, cluster=NAME)
 def run_map(
     plan: Map,
     path: str | PathLike[str],
@@ -64,7 +66,7 @@ def run_map(
         If an argument is wrong.
     """
     target = Path(path)
-    _check(plan, workers, cluster)
+    _check(plan, cluster)
     check_path(target)
     store = open_or_create(target, plan)
     with store.held():
@@ -81,13 +83,11 @@ def run_map(
     return MapResult(store)
 
 
-def _check(plan: Map, workers: int | None, cluster: str | None) -> None:
+def _check(plan: Map, cluster: str | None) -> None:
     problems = []
     if not isinstance(plan, Map):
         problems.append(Problem("plan", f"got {plan!r}; allowed: a Map, such as read_map gives"))
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        problems.append(Problem("workers", f"got {workers!r}; allowed: a whole number >= 1"))
-    if cluster is not None and not (cluster == "local" or re.fullmatch(r"\w+://[^\s:/]+.*", str(cluster))):
+    if cluster is not None and not (cluster == "local" or re.fullmatch(r"\w+://[^\s:/]+.*", cluster)):
         problems.append(Problem("cluster", f"got {cluster!r}; allowed: 'local', or an address such as tcp://host:8786"))
     if problems:
         raise ParameterError(problems)

@@ -68,7 +68,7 @@ def test_from_estimates_to_a_verdict(fitted):
         ([BASALT, "-o", "no/such/folder/fit.nc"], ["there is no folder 'no/such/folder'"]),
         (["examples/fits/basalt.toml"], ["no record given"]),
         ([BASALT, "examples/fits/basalt.toml", "examples/fits/sepiolite.toml"], ["allowed: one"]),
-        ([BASALT, "--set", "fit.trend=x"], ["fit.trend: got 'x'; allowed: a whole number >= 0"]),
+        ([BASALT, "--set", "fit.trend=x"], ["fit.trend: got 'x'; allowed: a whole number from 0 to 6"]),
         ([BASALT, "--set", "fit.tend=1"], ["unknown key 'tend'; did you mean 'trend'?"]),
         ([BASALT, "--set", "record.normal=kPa"], ["is in MPa by its name, but kPa is asked for"]),
         ([BASALT, "--set", "record.friction=Mu"], ["unknown column 'Mu'", "allowed: Time(s), "]),

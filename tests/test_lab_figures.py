@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.contour import ContourSet
@@ -126,3 +128,26 @@ def test_laws_and_experiments_as_bars(record):
 def test_a_prediction_is_in_the_unit_of_its_axis(fit):
     drawn = ss.figures.prediction(ss.predict(lab.rig(alpha=0.35), fit), Figure().subplots())
     assert drawn.get_xlabel() == "stiffness (GPa/m)"
+
+
+def test_shares_of_kicks_sum_to_all_draws(fit):
+    found = ss.predict(lab.rig(alpha=0.35), fit, count=200)
+    sizes = np.concatenate([np.linspace(1.0, 2.0, 100), np.full(50, np.inf), np.zeros(30), np.full(20, np.nan)])
+    kicked = replace(found, thresholds={"velocity": sizes, "normal-stress": np.full(200, 0.1)})
+    panels = kicked.plot("kicks", [Figure().subplots(), Figure().subplots()])
+    title = " ".join(panels[0].get_title().split())
+    shares = [float(part.split()[-1]) for part in title.split("%")[:-1]]
+    assert len(shares) == 4
+    assert sum(shares) == pytest.approx(100)
+    assert panels[0].get_xlabel() == "velocity kick that is survived, ln(new/old velocity) (1)"
+    assert panels[1].get_xlabel() == "normal-stress kick that is survived, share of the steady one (1)"
+    assert "ln(new/old velocity)" in str(kicked)
+    with pytest.raises(ss.NotAvailable, match="kick="):
+        found.plot("kicks")
+
+
+def test_no_axis_of_a_corner_hides_part_of_its_numbers(fit):
+    panels = fit.plot("corner")
+    panels[0, 0].get_figure().draw_without_rendering()
+    for panel in panels.ravel():
+        assert "+" not in panel.xaxis.get_offset_text().get_text()

@@ -14,7 +14,7 @@ from steadyslip.experiments import Draws, Fit, LawComparison, Population, Predic
 from steadyslip.experiments.answers.precision import Ranking
 from steadyslip.figures.chart import stability_chart
 from steadyslip.figures.critical import ANGLES, critical_stiffness_against_mass
-from steadyslip.figures.experiments.answers import comparison, prediction, profile, ranking
+from steadyslip.figures.experiments.answers import comparison, kicks, prediction, profile, ranking
 from steadyslip.figures.experiments.corners import corner
 from steadyslip.figures.experiments.fits import fit, steps
 from steadyslip.figures.experiments.populations import population
@@ -39,6 +39,7 @@ __all__ = [
     "fit",
     "history",
     "hopf_curve",
+    "kicks",
     "map_figure",
     "phase_plane",
     "population",
@@ -71,7 +72,7 @@ register_figures(Profile, profile=profile)
 register_figures(LawComparison, comparison=comparison)
 register_figures(Population, population=population)
 register_figures(Ranking, ranking=ranking)
-register_figures(Prediction, prediction=prediction)
+register_figures(Prediction, prediction=prediction, kicks=kicks)
 register_figures(MapResult, map=map_figure)
 register_figures(Refined, refined=refined)
 register_figures(Sensitivity, sensitivity=sensitivity)

@@ -212,8 +212,9 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
         axes.append((values / factor, labelled(str(dim).rpartition(".")[2].replace("_", " "), unit)))
     size = np.where(np.isfinite(found.values) & (found.values > 0), found.values, np.nan)
     (x, x_label), (y, y_label) = axes
+    label = found.attrs.get("long_name", str(found.name or "threshold").replace("_", " "))
     mesh = ax.pcolormesh(x, y, size, cmap="cividis", shading="nearest", rasterized=True)
-    ax.figure.colorbar(mesh, ax=ax, label=f"{str(found.name or 'threshold').replace('_', ' ')} (1)")
+    ax.figure.colorbar(mesh, ax=ax, label=f"{label} (1)")
     if np.isfinite(size).sum() > 3:
         lines = ax.contour(x, y, size, colors=BLACK, linewidths=0.7)
         ax.clabel(lines, fontsize="small")

@@ -20,6 +20,7 @@ from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
+from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
 Array = np.ndarray
@@ -99,14 +100,14 @@ class Prediction(ReadOnly):
             if without:
                 lines.append(f"no critical stiffness   in {probability_text(without, len(self.stable))} of the draws")
         for kick, sizes in self.thresholds.items():
-            lines.append(f"{kick + ' kick':<24}" + _kick_range(sizes))
+            lines.append(f"{kick + ' kick':<24}" + _kick_range(kick, sizes))
             if doubt := self.undecided[kick]:
                 lines.append(f"{'':<24}undecided in {percent(doubt)} of the draws")
         if self.left_out:
             lines.append(f"stopped                 before the kicks were done: {', '.join(self.left_out)}")
         if self.shares:
-            found = ", ".join(f"{name} {share:.0%}" for name, share in self.shares.items() if share >= 0.005)
-            lines.append(f"spread comes from       {found}")
+            found = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.shares.items() if share >= 0.005)
+            lines.append(f"spread taken away by    {found}, each known by itself")
         lines.append(f"from {len(self.stable)} draws, {self.draws.kind}")
         return "\n".join(lines)
 
@@ -150,14 +151,20 @@ class Prediction(ReadOnly):
         values = [None if x is None else x * factor for x in critical]
         return {"forces": {"area": self.rig.area, "critical_stiffness": values, "unit": unit}}
 
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the distribution of the critical stiffness, and the rig's own.
+    def plot(self, kind: str = "prediction", ax: Any = None) -> Any:
+        """Draw the distribution of the critical stiffness, and the rig's own; or of the kicks that are survived.
+
+        Parameters
+        ----------
+        kind : str
+            ``prediction`` or ``kicks``.
+        ax : matplotlib Axes, or array of one for every kind of kick, optional
 
         Returns
         -------
-        matplotlib.axes.Axes
+        matplotlib.axes.Axes, or ndarray of them
         """
-        return draw(self, ax=ax)
+        return draw(self, kind, ax=ax)
 
 
 @checked(record=whole(0, 10**6), kick=NAMES)
@@ -300,6 +307,6 @@ def _kick_quantiles(sizes: Array) -> tuple[float, ...]:
     return tuple(float(known[min(int(level * len(known)), len(known) - 1)]) for level in LEVELS)
 
 
-def _kick_range(sizes: Array) -> str:
+def _kick_range(kick: str, sizes: Array) -> str:
     low, _, middle, _, high = ("none fails" if np.isinf(q) else f"{q:.4g}" for q in _kick_quantiles(sizes))
-    return f"size {middle}   95 %: {low} to {high}"
+    return f"{middle}   95 %: {low} to {high}, {KICKS[kick].size}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import textwrap
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +12,7 @@ from scipy.stats import chi2
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.quantities import percent, shown
 from steadyslip.experiments.answers.predict import probability_text
-from steadyslip.figures.experiments.panels import brief
+from steadyslip.figures.experiments.panels import brief, grid
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -24,6 +25,7 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
+from steadyslip.nonlinear.kicks.kicks import KICKS
 
 if TYPE_CHECKING:
     from steadyslip.experiments import LawComparison, Prediction, Profile
@@ -163,3 +165,44 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
                  color=GREEN if result.probability_stable > 0.5 else VERMILION)  # fmt: skip
     ax.legend(loc="best", fontsize="small")
     return ax
+
+
+def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
+    """Distribution of the kicks that the rig survives, one panel for every kind of kick.
+
+    The title says in how many of the draws no kick fails, steady sliding is unstable, or the threshold is undecided;
+    with those that are drawn they are all.
+
+    Parameters
+    ----------
+    result : Prediction
+    ax : array of matplotlib Axes, optional
+        One for every kind of kick.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    if not result.thresholds:
+        raise NotAvailable("no thresholds were asked for; write predict(..., kick='velocity')")
+    count = len(result.thresholds)
+    panels = grid(ax if ax is None else np.reshape(ax, (1, -1)), 1, count, (1.0 + 4.2 * count, 3.6))[0]
+    for panel, (kick, sizes) in zip(panels, result.thresholds.items(), strict=True):
+        fails = np.isfinite(sizes) & (sizes > 0)
+        if np.any(fails):
+            panel.hist(sizes[fails], bins=40, color=SKY, label="draws")
+            panel.axvline(
+                float(np.median(sizes[fails])), color=BLACK, linewidth=1, linestyle="--", label="median of these"
+            )
+            panel.legend(loc="best", fontsize="small")
+        shares = {
+            "fails at a kick": np.mean(fails),
+            "no kick fails": np.mean(np.isinf(sizes)),
+            "unstable": np.mean(sizes == 0),
+            "undecided, or no steady sliding": np.mean(np.isnan(sizes)),
+        }
+        words = [f"{name} {percent(float(share))}" for name, share in shares.items() if share]
+        panel.set_title("\n".join(textwrap.wrap(", ".join(words), 48)), fontsize="small")
+        panel.set_xlabel(labelled(f"{kick} kick that is survived, {KICKS[kick].size}", "1"))
+        panel.set_ylabel("draws (1)")
+    return np.asarray(panels)

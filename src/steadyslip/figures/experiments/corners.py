@@ -57,6 +57,7 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
             if k == 0 and i:
                 panel.set_ylabel(scales[i].label, fontsize="small")
             panel.tick_params(labelsize="x-small", labelbottom=i == len(names) - 1, labelleft=k == 0 and i > 0)
+            panel.ticklabel_format(useOffset=False)
             panel.tick_params(axis="x", rotation=45)
             panel.locator_params(nbins=3)
             panel.axvline(scales[k].best, color=VERMILION, linewidth=0.8)

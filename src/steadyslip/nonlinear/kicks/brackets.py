@@ -12,7 +12,7 @@ from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, Number, checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
-from steadyslip.nonlinear.kicks.kicks import Kicked
+from steadyslip.nonlinear.kicks.kicks import KICKS, Kicked
 from steadyslip.nonlinear.kicks.spans import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
@@ -96,7 +96,8 @@ def threshold_map(
         return found.size if found.size.ndim else float(found.size)
     import xarray as xr
 
-    return xr.DataArray(found.size, dims=dims, coords=coords, name=f"{kick}_threshold", attrs={"units": "1"})
+    about = {"units": "1", "long_name": f"{kick} kick that is survived, {KICKS[kick].size}"}
+    return xr.DataArray(found.size, dims=dims, coords=coords, name=f"{kick}_threshold", attrs=about)
 
 
 def threshold_brackets(

@@ -37,22 +37,26 @@ class Kick:
         Of `amount`.
     low, high : float
         Range of sizes that is searched.
+    size : str
+        What a size without unit counts.
+    doc : str
     """
 
     name: str
     unit: str
     low: float
     high: float
+    size: str
     doc: str
 
 
 KICKS = {
     kick.name: kick
     for kick in (
-        Kick("velocity", "m/s", 1e-3, 25.0, "step of the load-point velocity; size ln(new/old)"),
-        Kick("displacement", "m", 1e-4, 1e5, "step of the load point; size in natural lengths (d_c)"),
-        Kick("normal-stress", "Pa", 1e-6, 1e2, "step of the normal stress; size as a share of the steady one"),
-        Kick("impulse", "Pa s", 1e-4, 1e12, "blow on a block with mass; size as change of velocity over the drive's"),
+        Kick("velocity", "m/s", 1e-3, 25.0, "ln(new/old velocity)", "step of the load-point velocity"),
+        Kick("displacement", "m", 1e-4, 1e5, "natural lengths (d_c)", "step of the load point"),
+        Kick("normal-stress", "Pa", 1e-6, 1e2, "share of the steady one", "step of the normal stress"),
+        Kick("impulse", "Pa s", 1e-4, 1e12, "change of velocity over the drive's", "blow on a block with mass"),
     )
 }
 

@@ -12,8 +12,10 @@ import steadyslip as ss
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model import Contact, Model, Variable, build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
+from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import reduce_model
 from steadyslip.model.scales import natural_scales, posed, weights
+from steadyslip.model.steady import steady_equation
 from steadyslip.model.taylor import system
 from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare
@@ -149,6 +151,38 @@ def test_two_contacts_have_the_eigenvalues_of_their_modes(masses):
     assert len(terms.unknowns) == len(model.variables) + 2 + 6
     with pytest.raises(ss.NotAvailable, match="2 contacts"):
         _ = model.contact
+
+
+def test_each_contact_has_its_own_steady_normal_stress():
+    """An operating point knows all of them, over varied parameters and in parts; what needs one contact says so."""
+    model = two_blocks(False)
+    alone = operating_point(RIG).named()
+    numbers = {name: alone.get(name.partition(".")[2], 0.7e9) for name in model.parameters}
+    loads = np.array([3e6, 5e6, 7e6])
+    numbers["2.contact.preload"] = loads
+    point = OperatingPoint(model, tuple(numbers.values()), (3,), lambda array, *_: array)
+    expected = operating_point(RIG, {"contact.preload": loads}).sigma
+    assert point.sigmas[0] == pytest.approx(float(operating_point(RIG).sigma), rel=1e-15)
+    assert point.sigmas[1] == pytest.approx(expected, rel=1e-15)
+    assert len(set(point.sigmas[1])) == 3
+    pair = [contact.sigma_ss for contact in model.contacts]
+    assert point.evaluate(model.function([pair[1] / pair[0]]))[0] == pytest.approx(expected / point.sigmas[0])
+    last = point.part(slice(1, 3))
+    assert np.array_equal(last.sigmas[1], point.sigmas[1][1:])
+    asked = (lambda: point.sigma, lambda: point.all_stresses(), lambda: reduce_model(model), lambda: posed(point))
+    for ask in asked:
+        with pytest.raises(ss.NotAvailable, match="2 contacts"):
+            ask()
+
+
+def test_contacts_that_press_on_each_other_are_refused():
+    model = two_blocks(False)
+    first, second = model.contacts
+    pressed = replace(second, steady_stress=second.steady_stress + first.sigma_ss)
+    coupled = replace(model, contacts=(first, pressed))
+    with pytest.raises(ss.NotAvailable, match="press on each other"):
+        steady_equation(coupled, 1)
+    assert steady_equation(coupled, 0).affine
 
 
 def test_answers_are_the_same_for_everybody():

@@ -67,12 +67,18 @@ class OperatingPoint(Keeper):
         return self.named()["drive.velocity"]
 
     @cached_property
-    def sigma(self) -> Any:
-        """σss (Pa) of the contact over the varied parameters, NaN where steady sliding does not exist.
+    def sigmas(self) -> tuple[Any, ...]:
+        """σss (Pa) of every contact over the varied parameters, NaN where steady sliding does not exist.
 
         Where there are several solutions, the one of `branch`.
         """
-        return steady_stress(self.model, self.arguments, self.branch)
+        places = range(len(self.model.contacts))
+        return tuple(steady_stress(self.model, self.arguments, self.branch, place) for place in places)
+
+    @property
+    def sigma(self) -> Any:
+        """That of the contact of a model that has one; see `Model.contact`."""
+        return self.sigmas[self.model.contacts.index(self.model.contact)]
 
     @property
     def axial_share(self) -> Any:
@@ -105,7 +111,7 @@ class OperatingPoint(Keeper):
     @cached_property
     def _numbers(self) -> tuple[Any, ...]:
         """`arguments` and `sigma` as NumPy's numbers and arrays."""
-        return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, self.sigma))
+        return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, *self.sigmas))
 
     def evaluate(self, function: Callable[..., list[Any]], *further: Any) -> list[Any]:
         """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
@@ -125,9 +131,10 @@ class OperatingPoint(Keeper):
         """Some rigs of a flat point; single numbers are for all of them."""
         if self.single:
             return self
-        cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, self.sigma)]
-        found = self.with_arguments(cut[:-1], np.broadcast_shapes(*map(np.shape, cut)))
-        found.__dict__["sigma"] = cut[-1]
+        cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, *self.sigmas)]
+        count = len(self.arguments)
+        found = self.with_arguments(cut[:count], np.broadcast_shapes(*map(np.shape, cut)))
+        found.__dict__["sigmas"] = tuple(cut[count:])
         return found
 
     def with_arguments(self, arguments: Iterable[Any], shape: tuple[int, ...] | None = None) -> OperatingPoint:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import array_function
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
@@ -38,17 +39,27 @@ class SteadyEquation:
 
 
 @question
-def steady_equation(model: Model) -> SteadyEquation:
-    """How a model determines its steady normal stress."""
-    contact = model.contact
+def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
+    """How a model determines the steady normal stress of a contact, by its place, or of the one it has.
+
+    Raises
+    ------
+    NotAvailable
+        If it depends on that of another contact: equations for several stresses at once are not solved yet. Or if no
+        place is named and there are several contacts.
+    """
+    contact = model.contact if place is None else model.contacts[place]
     sigma = contact.sigma_ss
+    others = {other.sigma_ss for other in model.contacts} - {sigma}
+    if others & contact.steady_stress.free_symbols:
+        raise NotAvailable("contacts that press on each other in steady sliding are not offered yet")
     slope = sp.diff(contact.steady_coupling, sigma)
     given = contact.steady_load is None
     # where σss is given, the contact hands back that parameter and sigma_ss does not occur
     load = contact.steady_stress if contact.steady_load is None else contact.steady_load
     arguments = list(model.parameters.values())
     affine = sigma not in slope.free_symbols and sigma not in load.free_symbols
-    residual = model.function([contact.steady_stress - sigma])
+    residual = array_function([*arguments, sigma], [contact.steady_stress - sigma])
     if not affine:
         return SteadyEquation(False, given, residual)
     offset = contact.steady_coupling.xreplace({sigma: sp.Integer(0)})
@@ -57,12 +68,12 @@ def steady_equation(model: Model) -> SteadyEquation:
     return SteadyEquation(True, given, residual, parts, solved, slope)
 
 
-def steady_stress(model: Model, arguments: Arguments, branch: int) -> Any:
-    """σss (Pa) as an array over the varied parameters, NaN where steady sliding does not exist.
+def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -> Any:
+    """σss (Pa) of a contact as an array over the varied parameters, NaN where steady sliding does not exist.
 
     Where there are several solutions, the one of number `branch`.
     """
-    equation = steady_equation(model)
+    equation = steady_equation(model, place)
     if equation.parts is None:
         return _by_search(equation, arguments, branch)
     load, offset, slope = equation.parts(*arguments)
@@ -71,18 +82,19 @@ def steady_stress(model: Model, arguments: Arguments, branch: int) -> Any:
 
 
 def beyond_floats(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
-    """Where the equation for σss leaves the range of floating point, so that nothing can be said."""
-    equation = steady_equation(model)
-    if equation.parts is None:
-        return np.zeros(shape, dtype=bool)
-    return ~np.isfinite(sum(np.broadcast_to(part, shape) for part in equation.parts(*arguments)))
+    """Where an equation for σss leaves the range of floating point, so that nothing can be said."""
+    found = np.zeros(shape, dtype=bool)
+    for equation in (steady_equation(model, place) for place in range(len(model.contacts))):
+        if equation.parts is not None:
+            found |= ~np.isfinite(sum(np.broadcast_to(part, shape) for part in equation.parts(*arguments)))
+    return found
 
 
 def steady_roots(model: Model, arguments: Arguments) -> list[float]:
-    """All positive σss of a single rig, rising."""
+    """All positive σss of a single rig with one contact, rising."""
     equation = steady_equation(model)
     if equation.affine:
-        sigma = float(steady_stress(model, arguments, 0))
+        sigma = float(steady_stress(model, arguments, 0, model.contacts.index(model.contact)))
         return [sigma] if sigma > 0 else []
     return _search(lambda sigma: equation.residual(*arguments, sigma)[0])
 

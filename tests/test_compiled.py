@@ -1,7 +1,6 @@
 """The compiled core: primitives, tableaus, convergence, the cache, and that machine code is what the text says."""
 
 import ast
-import ctypes
 import os
 import pickle
 import stat
@@ -29,6 +28,7 @@ from steadyslip.kernels.program import Program, program
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
+from tiny_kernel import ask, called, routine_at
 
 mpmath.mp.dps = 50
 
@@ -140,13 +140,6 @@ def fixed_step(machine, jobs, until, steps):
     return work[layout.state : layout.state + layout.size].copy()
 
 
-def routine_at(address):
-    """A routine of machine code as a Python function."""
-    pointer = ctypes.POINTER(ctypes.c_double)
-    function = ctypes.CFUNCTYPE(None, pointer, ctypes.c_double, pointer)(address)
-    return lambda record, number, array: function(record.ctypes.data_as(pointer), number, array.ctypes.data_as(pointer))
-
-
 HEAVY = {"stiffness": 2e10, "radiation_damping": 2e10, "mass": 3e11}
 ORDERS = {
     # method, order, inputs vary, rig, end, counts of steps
@@ -241,13 +234,6 @@ def test_all_printers_agree():
         np.testing.assert_allclose(together[:, lane], alone, rtol=1e-15, atol=1e-16)
 
 
-def called(address, record, number=0.0):
-    """Call machine code from here."""
-    scratch = np.zeros(8)
-    routine_at(address)(record, number, scratch)
-    return scratch
-
-
 def test_a_program_has_no_branches():
     program = Straight("step")
     with pytest.raises(TypeError, match="select"):
@@ -303,25 +289,6 @@ def test_machine_code_equals_the_text(branch):
 
 
 # -- the cache
-
-
-def tiny(factor):
-    """A program as small as they come."""
-    program = Straight("step")
-    program.store(0, factor * program.load(0))
-    return program
-
-
-def ask(factor):
-    """Value of the little kernel, routine and driver, both made anew."""
-    import numba
-
-    build._loaded.clear()
-    record = np.ones(1)
-    called(build.machine_code([tiny(factor)], 1)["step"], record)
-    function = numba.njit(lambda x: x * 1.0)
-    file = build._file(build._key(f"{factor} times"), "advance")
-    return build.compiled_once(function, numba.float64(numba.float64), file)(record[0])
 
 
 @pytest.fixture
@@ -498,7 +465,7 @@ def test_cache_that_cannot_be_written(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_concurrent_writers(folder):
     """Several processes compile the same kernel at once; all are right, and one sound file remains."""
-    script = "from test_compiled import ask; print(ask(11), ask(12))"
+    script = "from tiny_kernel import ask; print(ask(11), ask(12))"
     paths = [os.path.dirname(__file__), os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
 

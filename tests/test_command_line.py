@@ -180,13 +180,17 @@ def shell(line: str, **options) -> subprocess.CompletedProcess[str]:
 def test_an_answer_that_cannot_be_written_is_an_error(command):
     done = shell(f"steadyslip {command} > /dev/full")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "No space left" in done.stderr
+    assert "cannot write to the standard output: No space left" in done.stderr
+
+
+def test_an_answer_that_nobody_can_get_is_none():
+    done = shell(f"steadyslip analyze {EXAMPLE} --json >&-")
+    assert (done.returncode, done.stderr) == (2, "error: there is no standard output to write the answer to\n")
 
 
 def test_a_closed_pipe_is_no_error_message():
     done = shell(f"steadyslip analyze {EXAMPLE} --json | true; exit ${{PIPESTATUS[0]}}")
     assert (done.returncode, done.stderr) == (141, "")
-    assert shell(f"steadyslip analyze {EXAMPLE} >&-").stderr == ""
 
 
 def test_a_deleted_working_folder_is_said(tmp_path):

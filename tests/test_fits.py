@@ -627,6 +627,9 @@ def test_bad_records_are_named():
     held = lab.record(lab.rig(), lab.HOLD, count=400).between(70, 300)
     with pytest.raises(ss.ParameterError, match="starts from steady sliding"):
         ss.fit(ss.lab_rig(), held)
+    flat = ss.record_from_arrays(record.time, friction=np.full(100, 0.9), displacement=record.displacement)
+    with pytest.raises(ss.ParameterError, match=r"friction is 0\.9 in all samples"):
+        ss.fit(ss.lab_rig(), flat)
     with pytest.raises(ss.ParameterError, match="allowed: a Record"):
         ss.fit(ss.lab_rig(), "record.csv")
     with pytest.raises(ss.ParameterError, match="allowed: a Slider"):

@@ -1,5 +1,6 @@
 """Numeric options of Python calls: whatever is given, an answer or one message of ours, and soon."""
 
+import inspect
 from itertools import count
 
 import numpy as np
@@ -9,7 +10,7 @@ import lab_records as lab
 import steadyslip as ss
 from fuzz_rigs import judged
 from rigs_of_theory import rig
-from steadyslip.core.options import Numbers, checked
+from steadyslip.core.options import Numbers, checked, role_of
 
 VALUES = {
     "none": None, "text": "abc", "empty": "", "nan": float("nan"), "inf": float("inf"), "minus inf": -float("inf"),
@@ -134,3 +135,40 @@ def test_a_default_given_by_name_is_allowed():
     assert end_of(3.0) == 3.0
     with pytest.raises(ss.ParameterError, match="until"):
         end_of("soon")
+
+
+DECLARE = {"parameter", "part", "parts", "option", "samples", "measure"}  # said once in the text of a law or a measure
+LEFT = {  # parameters that their functions check themselves, with words of their own
+    "protocol", "records", "record", "initial", "times", "between", "columns", "options", "changes", "present", "fits",
+    "paths", "over", "of", "x", "v", "step", "fixed", "free", "separate", "weights", "folder", "area", "conditions",
+    "candidates", "compute", "cluster", "normal_stress", "sampling", "rate", "time", "friction", "shear", "normal",
+    "displacement", "velocity", "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick",
+    "precision", "rtol", "amplitude", "doublings", "most_points", "method", "points",
+}  # fmt: skip
+PUBLIC = {
+    name: getattr(ss, name) for name in dir(ss) if inspect.isfunction(getattr(ss, name)) and name not in DECLARE
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name, function in PUBLIC.items() if inspect.signature(function).parameters])
+def test_every_public_function_is_checked_before_it_is_called(name):
+    """What is no rig, no fit, no mapping, no truth value where one belongs is named, whatever the function."""
+    function = PUBLIC[name]
+    parameters = inspect.signature(function).parameters
+    roles = {n: role for n, item in parameters.items() if (role := role_of(n, str(item.annotation))) is not None}
+    assert set(parameters) - set(roles) <= LEFT | {
+        n for n, item in parameters.items() if str(item.annotation).split(" ")[0] in ("int", "float")
+    }
+    needed = [n for n, item in parameters.items() if item.default is item.empty and item.kind != item.VAR_KEYWORD]
+    for wrong in roles:
+        with pytest.raises(ss.ParameterError, match=rf"{wrong}: got <object object"):
+            function(**dict.fromkeys(needed) | {wrong: object()})
+
+
+@pytest.mark.parametrize("kind", VALUES)
+def test_roles_take_any_value(kind):
+    """An answer or a message of ours, from every role that a public function has."""
+    for function in PUBLIC.values():
+        for name, item in inspect.signature(function).parameters.items():
+            if (role := role_of(name, str(item.annotation))) is not None:
+                assert not judged(lambda r=role: r.checked(VALUES[kind]))

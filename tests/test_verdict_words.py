@@ -90,7 +90,7 @@ def test_small_kicks_are_told_of_only_near_a_subcritical_edge():
     assert ss.hopf(near).kind == "subcritical"
     amplitude = float(ss.hopf(near).velocity_amplitude(near.stiffness))
     assert f"factor of about {np.exp(amplitude):.3g}" in text_of(near)
-    assert "too far from it to say" in text_of(far)
+    assert "too far from it to say how large it is" in text_of(far)
     assert "this rig is near" not in text_of(far)
 
 
@@ -146,3 +146,15 @@ def test_a_coefficient_of_either_sign_has_an_edge_at_zero():
     assert 0.0 in [edge.value for edge in edges]
     (zero,) = [edge for edge in edges if edge.value == 0.0]
     assert (zero.kind, zero.stable) == ("ill-posed", "below")
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e3])
+@pytest.mark.parametrize("b", [0.005, 0.01, -0.003])
+def test_without_stiffness_nothing_grows_or_dies(b, mass):
+    """The place of a block without a spring is neutral: one root is zero, and no verdict may say more."""
+    found = ss.analyze(rig(stiffness=0.0, mass=mass, radiation_damping=0.0).with_values({"a": 0.01, "b": b}))
+    text = " ".join(str(found).split())
+    assert found.on_edge
+    assert text.startswith("ON THE EDGE")
+    assert "nothing restores the block's place" in text
+    assert "stable at every stiffness" not in text

@@ -466,6 +466,8 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
             stream.reconfigure(errors="replace")
+    if sys.stdout is None:  # closed by who started this
+        sys.exit(_failed("there is no standard output to write the answer to", 2))
     sys.exit(_status(app))
 
 
@@ -510,8 +512,8 @@ def _system_fault(error: OSError) -> str:
         os.getcwd()
     except OSError:
         return "the working folder does not exist any more; change to one that does"
-    where = f"{str(error.filename)!r}: " if error.filename else ""
-    return f"{where}{error.strerror or error}"
+    where = repr(str(error.filename)) if error.filename else "cannot write to the standard output"
+    return f"{where}: {error.strerror or error}"
 
 
 def _failed(message: str, status: int, kind: str = "error") -> int:

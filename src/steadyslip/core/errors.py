@@ -9,6 +9,15 @@ from difflib import get_close_matches
 MOST_SHOWN = 120
 
 
+def one(name: str) -> str:
+    """A name with the article before it.
+
+    >>> one("Slider"), one("Evolution")
+    ('a Slider', 'an Evolution')
+    """
+    return f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
+
+
 def came(value: object) -> str:
     """What came, for a message: its repr, cut where it is long, and never a fault of its own.
 

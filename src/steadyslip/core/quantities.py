@@ -203,6 +203,10 @@ def parse(text: str, expected: str) -> float:
                 "; it is the total of a contact, and this is per unit area: add the contact's area to the rig file, "
                 "[slider] area = '0.01 m^2', or divide by it"
             )
+        elif is_per_area(expected):
+            message += (
+                f", or with the contact's area in the rig file, [slider] area = '0.01 m^2', {total_unit(expected)}"
+            )
         raise QuantityError(message)
     return _scaled(digits, factor)
 

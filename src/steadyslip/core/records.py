@@ -18,7 +18,7 @@ from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came, one
 from steadyslip.core.roles import Domain, Option, Parameter, Role, Series, Value, fault
 
 
@@ -49,7 +49,7 @@ class Part(Role):
 
     def allowed(self) -> str:
         known = ", ".join(law.__name__ for law in self.family.registry.values())
-        return f"a {self.family.__name__}" + (f" ({known})" if known else "")
+        return one(self.family.__name__) + (f" ({known})" if known else "")
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class Named(Role):
     def checked(self, value: Any) -> Mapping[str, Any]:
         if not isinstance(value, Mapping):
             raise self.refused(value)
-        for name, one in value.items():
-            if not (isinstance(one, self.family) or (self.listed and isinstance(one, (list, tuple)))):
-                raise ParameterError([Problem(name, f"got {came(one)}; allowed: a {self.family.__name__}")])
+        for name, found in value.items():
+            if not (isinstance(found, self.family) or (self.listed and isinstance(found, (list, tuple)))):
+                raise ParameterError([Problem(name, f"got {came(found)}; allowed: {one(self.family.__name__)}")])
         return dict(value)
 
     def allowed(self) -> str:

@@ -10,6 +10,7 @@ from os import PathLike
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_text
 from steadyslip.core.records import FrozenRecord, Part, given, resolve, role_of
 from steadyslip.core.roles import Parameter, positive
@@ -113,6 +114,7 @@ class Spec:
         return rig.with_values(dict.fromkeys(references, slow)), parts
 
 
+@checked()
 def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
     """Read the file of a fit.
 
@@ -159,6 +161,7 @@ def default_spec(evolution: str = "slip") -> Spec:
     return spec_from_text(f"[friction]\nevolution = {evolution!r}\n", "default")
 
 
+@checked()
 def lab_rig(
     evolution: str = "slip",
     *,
@@ -336,6 +339,7 @@ def _left_open(missing: set[str], settings: FitSettings, rig: Slider) -> list[Pr
     return [Problem(name, message) for name in sorted(absent)]
 
 
+@checked()
 def fit_files(
     paths: Sequence[str | PathLike[str]], spec: str | PathLike[str] | None = None, changes: Iterable[str] = (),
     *, skip_bad_lines: bool = False,

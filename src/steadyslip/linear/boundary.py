@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.options import BRANCH, LOW_AND_HIGH, checked
+from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.roles import Parameter
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.slider import Slider
@@ -48,7 +48,7 @@ class Margin:
     searched: tuple[float, float]
 
 
-@checked(branch=BRANCH, between=LOW_AND_HIGH)
+@checked(between=LOW_AND_HIGH)
 def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, branch: int = 0) -> tuple[Boundary, ...]:
     """Every value of a parameter at which stability of steady sliding changes.
 
@@ -81,7 +81,7 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, br
     return Search(rig, full, present_zeros(rig), branch).boundaries(limits)
 
 
-@checked(branch=BRANCH)
+@checked()
 def margins(rig: Slider, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first."""
     present = present_zeros(rig)

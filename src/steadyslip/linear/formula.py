@@ -8,6 +8,7 @@ from threading import Thread
 
 import sympy as sp
 
+from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
@@ -19,6 +20,7 @@ LONGEST = 4.0
 MU_SS = sp.Symbol("mu_ss", real=True)
 
 
+@checked()
 def formula(rig: Slider) -> sp.Eq:
     """Critical stiffness of a rig with one memory variable, as a SymPy equation.
 

@@ -17,6 +17,7 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import Num
+from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import quietly
@@ -159,6 +160,7 @@ def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Ex
     return b0, b1, b2, b3
 
 
+@checked()
 @quietly
 def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     """f, S, r, f1, μ and B0...B3 of a rig as numbers.

@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, UnknownNameError
+from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear.polynomials import Array
 from steadyslip.machine.slider import Slider
@@ -91,6 +92,7 @@ def _matrix_function(model: Model, outputs: tuple[str, ...]) -> Callable[..., li
     return model.function(entries)
 
 
+@checked()
 def state_space(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress", "normal_stress")) -> StateSpace:
     """The linearised rig as `scipy.signal.StateSpace`.
 
@@ -111,6 +113,7 @@ def state_space(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress",
     return StateSpace(*state_matrices(rig, outputs))
 
 
+@checked()
 def to_control(rig: Slider, outputs: Sequence[str] = ("x", "v", "shear_stress", "normal_stress")) -> Any:
     """The same as `state_space` for the ``control`` package, with named signals.
 

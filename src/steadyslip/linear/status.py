@@ -26,7 +26,10 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
 
 
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
-    """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits."""
+    """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits.
+
+    Without any stiffness nothing restores the place of the block: that is static stiffness zero, too.
+    """
     with np.errstate(all="ignore"):
         ratio = 0.5 * damping_measures(roots(characteristic(point)))[0]
         if has_closed_form(point.model):
@@ -35,5 +38,6 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         else:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
-        static = np.abs(sum(terms)) / sum(np.abs(term) for term in terms)
+        largest = sum(np.abs(term) for term in terms)
+        static = np.where(largest == 0, 0.0, np.abs(sum(terms)) / largest)
         return np.asarray((np.abs(ratio) <= ON_THE_EDGE) | (static <= ON_THE_EDGE))

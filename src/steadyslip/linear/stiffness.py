@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import array_function
+from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, quietly, roots, stable_set
@@ -28,6 +29,7 @@ from steadyslip.model.steady import steady_equation
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
 
 
+@checked()
 def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     """Critical stiffness: the edge of the stable set nearest to the rig's own stiffness.
 
@@ -57,6 +59,7 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     return point.wrap(in_chunks(point, _nearest_edge), "critical_stiffness", "Pa/m")
 
 
+@checked()
 def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
     """Stiffness over critical stiffness k/k_cr, a controller's gain kp counted with both.
 
@@ -80,6 +83,7 @@ def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
     return point.wrap(in_chunks(point, kernel), "safety_factor", "1")
 
 
+@checked()
 def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     """All stiffnesses k > 0 at which steady sliding is stable, as intervals.
 
@@ -100,6 +104,7 @@ def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     return point.wrap(intervals, "stable_stiffness", "Pa/m", ("interval", "end"))
 
 
+@checked()
 def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
     """Eigenvalues of small perturbations of steady sliding.
 
@@ -122,6 +127,7 @@ def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
     return point.wrap(in_chunks(point, kernel), "eigenvalues", "1/s", ("mode",))
 
 
+@checked()
 def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
     """Largest real part of the eigenvalues (1/s): positive grows, negative decays.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import SEED, checked
+from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import interrupts_held, progress_bar
 from steadyslip.core.results import ReadOnly
@@ -108,7 +108,7 @@ class Sensitivity(ReadOnly):
         return draw(self, ax=ax)
 
 
-@checked(seed=SEED)
+@checked()
 def sensitivity(
     rig: Slider,
     over: Mapping[str, Sequence[Any]],

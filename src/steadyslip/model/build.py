@@ -8,6 +8,7 @@ from typing import Any
 
 import sympy as sp
 
+from steadyslip.core.options import checked
 from steadyslip.core.records import parameters, shape_of, twin
 from steadyslip.core.roles import Parameter
 from steadyslip.laws.contact import Motion
@@ -24,6 +25,7 @@ _LETTERS = {
 _RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 
 
+@checked()
 def build_model(rig: Slider, present: Iterable[str] = ()) -> Model:
     """The model of a rig.
 

@@ -116,5 +116,6 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
         own = np.abs(value)
         scale = np.where(np.isfinite(scale) & (scale > 0), scale, np.where(own > 0, own, 1.0))
         scales[item.name] = np.minimum(scale, np.where(own > 0, np.maximum(own, scale * 1e-3), scale))
-    scales |= {item.name: x * x / drive for item in point.model.integrals}
-    return scales, drive**2 / x if point.model.inertial else scales["w"]
+    with np.errstate(all="ignore"):
+        scales |= {item.name: x * x / drive for item in point.model.integrals}
+        return scales, drive**2 / x if point.model.inertial else scales["w"]

@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
+from steadyslip.core.options import checked
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.core.questions import question
 from steadyslip.machine.slider import Slider
@@ -54,6 +55,7 @@ class SteadySliding:
         return "\n".join(rows)
 
 
+@checked()
 def steady_state(rig: Slider) -> SteadySliding:
     """The steady sliding of a rig.
 
@@ -70,6 +72,7 @@ def steady_state(rig: Slider) -> SteadySliding:
     return steady_states(rig)[0]
 
 
+@checked()
 def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
     """All states of steady sliding, by rising normal stress.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.questions import question
 from steadyslip.core.records import twin
 from steadyslip.kernels.formulation import Choice
@@ -204,6 +204,10 @@ def prepare(
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate)
     _refuse_endless(reduction, options.method)
+    if not own and np.isfinite(point.sigma):
+        scales, unknown = natural_scales(point, reduction)
+        if not all(np.all(np.isfinite(one)) for one in (*scales.values(), unknown)):
+            raise NotAvailable(OUT_OF_RANGE)
     start, velocity = initial_values(reduction, point, initial)
     size = max(len(point.stresses), len(segments.start), len(start), point.size, 1)
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)

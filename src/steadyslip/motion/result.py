@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name, totals
 from steadyslip.motion import store
@@ -114,6 +115,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         return draw(self, kind, ax=ax)
 
 
+@checked()
 def load_history(path: str | PathLike[str]) -> History:
     """Read a history that `History.save` wrote.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable, ParameterError, Problem
-from steadyslip.core.options import BRANCH, NAMES, checked
+from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.linear import formula as linear_formula
@@ -64,7 +64,7 @@ class Analysis(Findings):  # noqa: D101 -- its base has it
         return f"```\n{self}\n```"
 
 
-@checked(branch=BRANCH, kick=NAMES)
+@checked()
 def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:
     """Verdict on a rig.
 

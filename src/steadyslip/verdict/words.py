@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
-from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 
@@ -20,9 +19,12 @@ if TYPE_CHECKING:
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings
 
+NEXT_TO_IT = 1e-6  # change of a parameter that only its weak effect sets apart from the edge that the rig is on
+
 _ONSETS = {
     "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
-    "subcritical": "just on the stable side of the edge in stiffness, small kicks already start oscillation",
+    "subcritical": "on the stable side of the edge in stiffness an unstable oscillation surrounds steady sliding, the "
+    "smaller the nearer the edge; larger kicks do not die out",
     "degenerate": "at the edge in stiffness, small oscillations neither grow nor decay to lowest order",
 }
 
@@ -87,15 +89,16 @@ def reason(analysis: Findings) -> str:
     critical, side = analysis.critical_stiffness, analysis.critical_side
     if analysis.growth_rate == math.inf:
         return why_ill_posed(analysis)
+    own = float(operating_point(analysis.rig).named()["slider.stiffness"]) if own is None else own
+    gain = float(analysis.rig.drive.proportional())
     if critical is None:
+        if analysis.on_edge and own + gain == 0:
+            return "without stiffness nothing restores the block's place, so a disturbance neither grows nor dies"
         if analysis.stable_stiffness:
             if analysis.rig.drive.proportional():
                 return "with this controller sliding is stable whatever the stiffness beside it"
             return "sliding is stable at every stiffness" + why_all(analysis)
         return "no stiffness makes sliding stable" + why_none(analysis)
-    if own is None:
-        own = float(operating_point(analysis.rig).named()["slider.stiffness"])
-    gain = float(analysis.rig.drive.proportional())
     which = "stiffness and gain kp together, " if gain and own else "gain kp, " if gain else "stiffness "
     ratio = (own + gain) / (critical + gain)
     text = (
@@ -163,10 +166,9 @@ def _onset(onset: Onset) -> str:
     amplitude = float(onset.velocity_amplitude(own))
     if onset.is_near:
         return (
-            f"{text}; this rig is near: an unstable oscillation that changes velocity by a factor of about "
-            f"{math.exp(amplitude):.3g} surrounds steady sliding"
+            f"{text}; this rig is near: the oscillation changes velocity by a factor of about {math.exp(amplitude):.3g}"
         )
-    return f"{text}; this rig is too far from it to say" if math.isfinite(amplitude) else text
+    return f"{text}; this rig is too far from it to say how large it is" if math.isfinite(amplitude) else text
 
 
 def _survived(kick: Threshold) -> str:
@@ -210,7 +212,7 @@ def _stable_set(analysis: Findings) -> str:
     parts = []
     for low, high in analysis.stable_stiffness:
         if low == 0 and high == math.inf:
-            parts.append("every stiffness")
+            parts.append("every stiffness above zero" if analysis.on_edge else "every stiffness")
         elif high == math.inf:
             parts.append(f"stiffness above {_stiffness(analysis, low)}")
         elif low == 0:
@@ -252,7 +254,7 @@ def _margin_row(analysis: Findings, margin: Margin) -> tuple[str, str, str, str,
     else:
         change = f"{100 * margin.relative:+.4g} %"
     towards = "above" if margin.absolute > 0 or (margin.absolute == 0 and edge.stable == "below") else "below"
-    if analysis.on_edge and abs(margin.absolute) <= ON_THE_EDGE * abs(margin.value):
+    if analysis.on_edge and abs(margin.absolute) <= NEXT_TO_IT * abs(margin.value):
         change, words = "0", f"on the edge, stable {edge.stable} it" if edge.stable != "neither" else "on the edge"
     elif edge.stable == towards:
         words = "becomes stable"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
 from steadyslip.experiments.fitting.fit import fit, started_from
@@ -80,6 +81,7 @@ class LawComparison:
         return draw(self, ax=ax)
 
 
+@checked()
 def compare(fits: Mapping[str, Fit]) -> LawComparison:
     """Compare fits to the same records by information criteria.
 
@@ -110,6 +112,7 @@ def compare(fits: Mapping[str, Fit]) -> LawComparison:
     return LawComparison({label: fits[label] for label in order}, {label: criteria[label] for label in order})
 
 
+@checked()
 def compare_laws(rig: Slider, records: Any, laws: Sequence[str] | None = None, **options: Any) -> LawComparison:
     """Fit several rate-and-state laws to the same records.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.options import BY_NAME, NAME, NAMES, Number, checked, whole
+from steadyslip.core.options import NAMES, Number, checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
@@ -183,7 +183,7 @@ class Ranking:
         return draw(self, ax=ax)
 
 
-@checked(candidates=BY_NAME, parameter=NAME)
+@checked()
 def best_protocol(
     rig: Slider, candidates: Mapping[str, Any] | None = None, parameter: str = "alpha", **options: Any
 ) -> Ranking:

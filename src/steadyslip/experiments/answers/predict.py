@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import NAMES, checked, whole
+from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, percent, shown
 from steadyslip.core.results import ReadOnly
@@ -167,7 +167,7 @@ class Prediction(ReadOnly):
         return draw(self, kind, ax=ax)
 
 
-@checked(record=whole(0, 10**6), kick=NAMES)
+@checked(record=whole(0, 10**6), count=whole(2, 10**7))
 def predict(
     rig: Slider, fit: Fit | Draws, *, kick: str | Sequence[str] = (), transfer: Sequence[str] = (), record: int = 0,
     count: int = COUNT, seed: int = 0,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.core.options import NAME, SEED, THREADS, checked, whole
+from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly
@@ -114,7 +114,7 @@ class Draws(ReadOnly):
         return values.reshape(self.chains, -1)
 
 
-@checked(count=whole(1, 10**8), seed=SEED)
+@checked(count=whole(1, 10**8))
 def normal_draws(fit: Fit, count: int = 1000, seed: int = 0) -> Draws:
     """Draws from the covariance of a fit, in its coordinates.
 
@@ -136,7 +136,7 @@ def _draws(fit: Fit, kind: str, z: Array, details: dict[str, float], **about: An
     return Draws(fit, kind, {name: values[:, i].copy() for i, name in enumerate(fit.names)}, details, **about)
 
 
-@checked(count=whole(2, 10**7), block=whole(1), seed=SEED, threads=THREADS, kind=NAME)
+@checked(count=whole(2, 10**7), block=whole(1))
 def bootstrap(
     fit: Fit, count: int = 1000, kind: str = "auto", *, block: int | None = None, seed: int = 0,
     threads: int | None = None, progress: bool | None = None,
@@ -216,7 +216,7 @@ def _resampled(residuals: Array, block: int, many: int, generator: np.random.Gen
     return np.asarray(residuals[places])
 
 
-@checked(steps=whole(1, 10**9), walkers=whole(1, 10**6), seed=SEED, threads=THREADS)
+@checked(steps=whole(1, 10**9), walkers=whole(1, 10**6))
 def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, threads: int | None = None) -> Draws:
     """Sample the posterior with emcee.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import checked, whole
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.uncertainty import block_length
 from steadyslip.experiments.fitting.result import Fit
@@ -54,6 +55,7 @@ class CrossValidation(ReadOnly):
         )
 
 
+@checked(folds=whole(2, 10**5), block=whole(1))
 def cross_validate(
     fit: Fit, folds: int = 8, *, block: int | None = None, threads: int | None = None
 ) -> CrossValidation:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.options import THREADS, checked
+from steadyslip.core.options import checked
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.numbers import SearchStory
-from steadyslip.experiments.fitting.plan import Plan, check_width, make_plan
+from steadyslip.experiments.fitting.plan import Plan, check_friction, check_width, make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import MOST, Told, ordered, searched
 from steadyslip.experiments.fitting.settings import STARTS
@@ -26,7 +26,7 @@ Array = np.ndarray
 BETTER = 1e-6  # reduction of the sum of squares, as a share, that makes another minimum of it
 
 
-@checked(threads=THREADS)  # the others are declared as settings, for files too
+@checked()  # the others are declared as settings, for files too
 def fit(
     rig: Slider,
     records: Record | Sequence[Record],
@@ -118,6 +118,7 @@ def fit(
         trend_axis=trend_axis, offset=offset, lag=lag, loss=loss, width=width, weights=weights, errors=errors,
         starts=starts,
     )  # fmt: skip
+    check_friction(plan.records)
     if plan.loss != "linear" and plan.width is None:
         first, _, _ = searched(replace(plan, loss="linear"), starts, threads, progress)
         comparison = replace(plan, loss="linear").comparison(threads)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -299,6 +299,17 @@ def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[P
             return None
         found.append(row)
     return tuple(found)
+
+
+def check_friction(records: Iterable[Record]) -> None:
+    """Refuse measured friction that never changes, which is another column than that of friction."""
+    problems = [
+        Problem("record", f"{record.source}: friction is {record.friction[0]:.6g} in all samples; is it its column?")
+        for record in records
+        if np.ptp(record.friction) == 0
+    ]
+    if problems:
+        raise ParameterError(problems)
 
 
 def _check_records(plan: Plan) -> None:

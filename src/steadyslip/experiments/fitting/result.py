@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
+from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.numbers import FitNumbers
@@ -48,6 +49,7 @@ class Fit(FitNumbers):  # noqa: D101 -- its base has it
         return draw(self, kind, ax=ax)
 
 
+@checked()
 def load_fit(path: str | PathLike[str]) -> Fit:
     """Read a fit that `Fit.save` wrote.
 

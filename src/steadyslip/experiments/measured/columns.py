@@ -170,8 +170,9 @@ def assigned(
             continue
         candidates = _preferred(role, guesses.get(role, []), names)
         if len(candidates) > 1:
-            several = ", ".join(repr(names[i]) for i in candidates)
-            problems.append(Problem(role, f"several columns could be it: {several}; say which with {role}=NAME"))
+            several = ", ".join(f"{names[i]!r} (column {i + 1})" for i in candidates)
+            which = "NAME" if len({names[i] for i in candidates}) == len(candidates) else "NUMBER"
+            problems.append(Problem(role, f"several columns could be it: {several}; say which with {role}={which}"))
         elif candidates:
             chosen[role] = (candidates[0], chosen.get(role, (0, None))[1])
         elif role in chosen:
@@ -212,6 +213,10 @@ def _as_given(
         for known in (list(names), list(heads)):
             if known.count(value) == 1:
                 return known.index(value), stated, None
+            if value in known:
+                places = [i + 1 for i, name in enumerate(known) if name == value]
+                several = f"columns {', '.join(map(str, places[:-1]))} and {places[-1]} are named {value!r}"
+                return None, None, f"{several}; give the number of one"
         found = known_unit(value)
         if stated is None and found is not None and _fits(role, found):
             return None, found, None

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.options import checked
 from steadyslip.core.quantities import shown
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
@@ -22,6 +23,7 @@ AROUND = 25  # rows before and behind, from which that is told
 PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
 
 
+@checked()
 def read_record(
     path: str | PathLike[str],
     *,
@@ -161,6 +163,7 @@ def _said_unit(column: Column, area: float, assumed: bool) -> str:
     return text
 
 
+@checked()
 def record_from_arrays(
     time: Any, *, friction: Any = None, shear: Any = None, normal: Any = None, displacement: Any = None,
     velocity: Any = None, source: str = "arrays",

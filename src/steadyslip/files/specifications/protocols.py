@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from os import PathLike
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem
+from steadyslip.core.options import checked
 from steadyslip.files.specifications.changes import value_of
 from steadyslip.files.specifications.layout import selector
 from steadyslip.files.specifications.read import protocol_of, text_of
@@ -15,6 +16,7 @@ from steadyslip.files.specifications.toml import Table
 from steadyslip.protocol import Piece, Protocol
 
 
+@checked()
 def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Protocol | None:
     """Read the protocol of a rig file, or of a file that has the table ``[protocol]`` alone.
 
@@ -38,11 +40,13 @@ def read_protocol(path: str | PathLike[str], changes: Iterable[str] = ()) -> Pro
     return protocol_from_text(text_of(path), str(path), changes)
 
 
+@checked()
 def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Protocol | None:
     """Read the protocol of a rig file's text; see `read_protocol`."""
     return protocol_of(text, source, changes)
 
 
+@checked()
 def piece_from_text(text: str, area: float | None = None) -> Piece:
     """Read one piece of a protocol from a line of words, the kind first.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, RigFileError, came, unknown_name
+from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
@@ -19,6 +20,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
 
+@checked()
 def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
     """Read a rig file.
 
@@ -52,6 +54,7 @@ def text_of(path: str | PathLike[str]) -> str:
         raise _failed(name, error.reason) from error
 
 
+@checked()
 def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
     """Read a rig from TOML text; see `read_rig`."""
     return read_specification(_not_empty(text, source), source, changes).checked_rig()

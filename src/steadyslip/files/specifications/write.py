@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Named, key_of
 from steadyslip.core.roles import Value
 from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
@@ -16,6 +17,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
 
+@checked()
 def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None = None) -> None:
     """Write a rig file, with the protocol of an experiment if one is given; see `rig_to_text`.
 
@@ -29,6 +31,7 @@ def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None 
     Path(path).write_text(rig_to_text(rig, protocol), encoding="utf-8")
 
 
+@checked()
 def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
     """The rig as TOML, SI numbers with the unit as a comment; with an area, totals (N, N/m, kg).
 

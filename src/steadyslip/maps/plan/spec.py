@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
+from steadyslip.core.options import checked
 from steadyslip.core.records import parameters, resolve
 from steadyslip.files.specifications.layout import MAP, Section
 from steadyslip.files.specifications.read import Specification, read_specification, text_of
@@ -22,6 +23,7 @@ TABLE = Section(
 )
 
 
+@checked()
 def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
     """Read a rig file with a table ``[map]``.
 
@@ -44,6 +46,7 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
     return map_from_text(text_of(path), str(path), changes, Path(path).parent)
 
 
+@checked()
 def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), folder: Path = Path()) -> Map:
     """Read the text of such a file; see `read_map`."""
     spec = read_specification(text, source, changes, (TABLE,))

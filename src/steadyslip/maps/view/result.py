@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, shown_range
 from steadyslip.machine.slider import Slider
@@ -249,6 +250,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
+@checked()
 def open_map(path: str | PathLike[str]) -> MapResult:
     """Open a map that `run_map` made, finished or not.
 

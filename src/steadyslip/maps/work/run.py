@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import NAME, PATH, THREADS, checked
+from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.store.arrays import Store, check_path, open_or_create
@@ -25,7 +25,7 @@ from steadyslip.motion.engine import available_cores
 SHORT = 2.0  # seconds of work for which no processes are started
 
 
-@checked(path=PATH, workers=THREADS, cluster=NAME)
+@checked()
 def run_map(
     plan: Map,
     path: str | PathLike[str],
@@ -66,7 +66,7 @@ def run_map(
         If an argument is wrong.
     """
     target = Path(path)
-    _check(plan, cluster)
+    _check(cluster)
     check_path(target)
     store = open_or_create(target, plan)
     with store.held():
@@ -83,14 +83,10 @@ def run_map(
     return MapResult(store)
 
 
-def _check(plan: Map, cluster: str | None) -> None:
-    problems = []
-    if not isinstance(plan, Map):
-        problems.append(Problem("plan", f"got {plan!r}; allowed: a Map, such as read_map gives"))
+def _check(cluster: str | None) -> None:
     if cluster is not None and not (cluster == "local" or re.fullmatch(r"\w+://[^\s:/]+.*", cluster)):
-        problems.append(Problem("cluster", f"got {cluster!r}; allowed: 'local', or an address such as tcp://host:8786"))
-    if problems:
-        raise ParameterError(problems)
+        allowed = "'local', or an address such as tcp://host:8786"
+        raise ParameterError([Problem("cluster", f"got {cluster!r}; allowed: {allowed}")])
 
 
 def _remark(store: Store, plan: Map) -> None:

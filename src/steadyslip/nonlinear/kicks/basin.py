@@ -157,6 +157,7 @@ def _unstable_cycles(rig: Slider, along: str, branch: int, progress: bool | None
     return tuple(orbit(rig, cycle) for cycle in found.at(own) if not cycle.stable)
 
 
+@checked(periods=Number(0, 1e4))
 def orbit(rig: Slider, cycle: Cycle, periods: float = 1.0) -> History:
     """A cycle as a history, for drawing: simulated from its start.
 

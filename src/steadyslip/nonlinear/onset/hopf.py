@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable
+from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.search import Boundary
+from steadyslip.linear.status import UNKNOWN, status
 from steadyslip.linear.stiffness import characteristic, in_chunks, stiffness_polynomials
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -157,6 +158,8 @@ def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
     edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]
     oscillatory = [edge for edge in edges if edge.kind == "oscillatory"]
     if not oscillatory:
+        if status(operating_point(rig, branch=branch)) == UNKNOWN:
+            raise NotAvailable(OUT_OF_RANGE)
         found = "; ".join(str(edge) for edge in edges) or "stability does not change at all"
         raise NotAvailable(f"no oscillatory edge of stability along {name}: {found}")
     own = float(rig.parameters()[name].value)  # type: ignore[arg-type]  # boundary() refuses None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from os import PathLike
 from typing import Any
+
+import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.options import checked
@@ -22,7 +23,7 @@ from steadyslip.experiments.measured.read import read_record
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.settings import RecordSettings
 from steadyslip.files.specifications.layout import Section
-from steadyslip.files.specifications.read import read_specification, text_of
+from steadyslip.files.specifications.read import Specification, read_specification, read_tables, text_of
 from steadyslip.files.specifications.toml import Table
 from steadyslip.laws import contact as contact_laws, friction as friction_laws
 from steadyslip.laws.contact import ContactLaw
@@ -138,7 +139,10 @@ def read_spec(path: str | PathLike[str], changes: Iterable[str] = ()) -> Spec:
 def spec_from_text(text: str, source: str = "spec", changes: Iterable[str] = ()) -> Spec:
     """Read the text of such a file; see `read_spec`."""
     filled = _Filled()
-    found = read_specification(text, source, changes, TABLES, filled.complete)
+    return _spec(read_specification(text, source, changes, TABLES, filled.complete), filled)
+
+
+def _spec(found: Specification, filled: _Filled) -> Spec:
     record, settings = found.further.get("record"), found.further.get("fit")
     settings = settings if isinstance(settings, FitSettings) else FitSettings()
     missing = filled.missing - found.changed
@@ -185,13 +189,12 @@ def lab_rig(
         Rate at which mu_ref holds.
     """
     rate = _checked("v_ref", "m/s", v_ref)
-    words = f"evolution = {json.dumps(str(evolution))}\nv_ref = {rate!r}\n"
-    memory = f"[friction.normal_memory]\nlaw = {json.dumps(str(normal_memory))}\n"
-    count = json.dumps(states, default=int) if not isinstance(states, str) else json.dumps(states)
-    spec = spec_from_text(f"[friction]\n{words}{memory}[fit]\nstates = {count}\n", "lab_rig")
-    if stiffness is None:
-        return spec.rig
-    return replace(spec.rig, stiffness=_checked("stiffness", "Pa/m", stiffness))
+    friction = {"evolution": evolution, "v_ref": rate, "normal_memory": {"law": normal_memory}}
+    filled = _Filled()
+    count = int(states) if isinstance(states, np.integer) else states
+    tables = {"friction": friction, "fit": {"states": count}}
+    rig = _spec(read_tables(tables, {}, "lab_rig", further=TABLES, complete=filled.complete), filled).rig
+    return rig if stiffness is None else replace(rig, stiffness=_checked("stiffness", "Pa/m", stiffness))
 
 
 def _checked(name: str, unit: str, value: Any) -> float:

@@ -143,8 +143,16 @@ def read_specification(
         tables = tables_of(text)
     except NotToml as error:
         raise _failed(source, f"is not TOML: {error}") from error
+    return read_tables(tables, key_lines(text), source, changes, further, complete, rig_needed)
+
+
+def read_tables(
+    tables: Table, lines: dict[str, int], source: str, changes: Iterable[str] = (), further: Sequence[Section] = (),
+    complete: Callable[[Table], None] | None = None, rig_needed: bool = True,
+) -> Specification:  # fmt: skip
+    """The same of tables, with the lines on which their keys stand."""
     reader = _SpecificationReader(tables)
-    lines, names = key_lines(text), [section.name for section in further]
+    names = [section.name for section in further]
     every = [changes] if isinstance(changes, str) else list(changes)
     own = [change for change in every if split(change)[0].partition(".")[0] in names]
     for change in own:

@@ -198,3 +198,18 @@ def test_tables_say_how_they_change():
             rows = table.segments[0]
             k = np.flatnonzero((rows[:, 0] <= t) & (t < rows[:, 1]))[-1]
             assert table.input_rates[0, direction, k, 0] == pytest.approx(change, rel=0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("seed", "height", "later", "width"),
+    [(0, 2.7e-6, 0.15, 0.3), (1, -2.7e-6, 0.45, 0.2), (1, 4e-6, 0.3, 0.3), (2, 2.7e-6, 0.6, 0.2), (3, 4e-6, 0.3, 0.2)],
+)
+def test_a_glitch_at_a_step_does_not_hide_its_time(seed, height, later, width):
+    """The bottom of the glitch passes for a level of the sensor, and lines that meet there do so at another time."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 90.0, 0.02)
+    load = 3e-6 * time + 7e-6 * np.maximum(time - 30.263, 0.0) + 1.4e-7 * rng.standard_normal(len(time))
+    load += height * np.exp(-0.5 * ((time - 30.263 - later) / width) ** 2)
+    course = load_course(time, load)
+    assert len(course.changes) == 1
+    assert course.changes[0].earliest < 30.263 < course.changes[0].latest

@@ -17,6 +17,7 @@ from steadyslip.experiments.numerics.splitting import displacement_noise
 Array = np.ndarray
 RAMP = 40.0  # how much better a ramp must fit a displacement than a step, in units of its noise
 OUTLYING = 9.0  # squared deviation, in those units, from which on a sample weighs less
+BRIEF = 0.1  # of the samples of a run: a level of the sensor so short-lived may be the bottom of a glitch
 AT_REST = 1e-3  # of the highest rate: a hold
 MOST_CHANGES = 40  # beyond, and
 MOST_BETWEEN = 0.35  # share of the record that lies between runs: there is no piecewise-linear loading
@@ -91,6 +92,9 @@ class _Kink:
         self.levels = float(before.levels[-1]), float(after.levels[0])
         difference = after.rate - before.rate
         self.meet = self.origin + (self.levels[0] - self.levels[1]) / difference
+        self.meets = [
+            self.origin + (one - other) / difference for one in _levels(before, -1) for other in _levels(after, 0)
+        ]
         near = [[m for m, g in zip(run.members, run.groups, strict=True) if g == edge]
                 for run, edge in ((before, before.groups[-1]), (after, 0))]  # fmt: skip
         variance = 0.0
@@ -119,7 +123,8 @@ class _Kink:
         half = own + self.spacing + 0.5 * max(longest - shortest, 0.0) * (duration > 0)
         half = max(half, 0.5 * (self.zone[1] - self.zone[0]) - 0.5 * duration)
         start = self.meet - 0.5 * duration
-        return Change(start, duration, before, after, start - half, start + half, shortest, longest)
+        low, high = (start - half + end - self.meet for end in (min(self.meets), max(self.meets)))
+        return Change(start, duration, before, after, low, high + 2 * half, shortest, longest)
 
     def _vague(self, before: float, after: float, slack: float) -> Change:
         """The change where lines do not meet between the runs: a glitch hides it, or the sensor slipped meanwhile."""
@@ -128,7 +133,8 @@ class _Kink:
         hidden = first - 2 * length - slack <= self.meet <= last + 2 * length + slack
         middle = self.meet if hidden else 0.5 * (first + last)
         slack += 0.25 * length
-        low, high = min(first, middle) - slack, max(last, middle) + slack
+        near = [m for m in self.meets[1:] if first - 2 * length - slack <= m <= last + 2 * length + slack]
+        low, high = min(first, middle, *near) - slack, max(last, middle, *near) + slack
         return Change(middle, 0.0, before, after, low, high, 0.0, length)
 
     def _ramp(self) -> tuple[float, float, float]:
@@ -160,6 +166,15 @@ class _Kink:
         scale = max(self.strays, 1e-9 * float(np.ptp(self.displacement)))
         squares = ((self.displacement - model)[rows] / scale) ** 2
         return float(OUTLYING * np.sum(np.log1p(squares / OUTLYING)))
+
+
+def _levels(run: Run, edge: int) -> list[float]:
+    """Levels of the sensor that a run may have at one of its ends, 0 or -1: a short-lived one, and the next as well."""
+    counts = np.bincount(np.repeat(run.groups, [j - i for i, j in run.members]))
+    found = [float(run.levels[edge])]
+    if len(counts) > 1 and counts[edge] < BRIEF * np.sum(counts):
+        found.append(float(run.levels[1 if edge == 0 else -2]))
+    return found
 
 
 def _in_order(changes: list[Change]) -> list[Change]:

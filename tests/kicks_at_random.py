@@ -240,9 +240,9 @@ def bristle_excess(v, spring, sigma, z, p):
 
 @njit(cache=False)
 def bristle_speed(spring, sigma, z, p):
-    """v that balances forces, by bisection outwards from the drive."""
-    v = p[7]
-    step = 0.1 * p[7]
+    """v that balances forces, the first from p[16], by bisection outwards in the direction of the force."""
+    v = p[16]
+    step = 0.01 * p[7]
     at = bristle_excess(v, spring, sigma, z, p)
     if at == 0.0:
         return v
@@ -264,6 +264,29 @@ def bristle_speed(spring, sigma, z, p):
     return 0.5 * (low + high)
 
 
+@njit(cache=False)
+def jumps(start, end, rate_start, rate_end, span, p):
+    """Whether v changes at once between two states, followed by halves: a velocity that balances forces is lost."""
+    p = p.copy()
+    low, high, slow = 0.0, 1.0, p[16]
+    fast = bristle_speed(*stresses(end[0], p), end[-1], p)
+    first = abs(fast - slow)
+    if first < 0.05 * (abs(slow) + p[7]):
+        return False
+    for _ in range(40):
+        s = 0.5 * (low + high)
+        y = (start * (1 + 2 * s) + span * s * rate_start) * (1 - s) ** 2 + s**2 * (
+            end * (3 - 2 * s) - span * (1 - s) * rate_end
+        )
+        middle = bristle_speed(*stresses(y[0], p), y[-1], p)
+        if abs(middle - slow) > abs(fast - middle):
+            high, fast = s, middle
+        else:
+            low, slow = s, middle
+            p[16] = slow
+    return abs(fast - slow) > 0.2 * first
+
+
 class Reference:
     """One kicked motion; rate-and-state friction in units of d_c and v0."""
 
@@ -280,6 +303,7 @@ class Reference:
         p[7], sign = drive, case.size * case.direction
         if bristles:
             p[0] = LUGRE
+            p[16] = drive * np.exp(-sign) if (case.kick, case.reference) == ("velocity", "after") else drive
             p[10:16] = (friction.bristle_stiffness, friction.bristle_damping, friction.viscous, friction.mu_coulomb,
                         friction.mu_static, friction.v_stribeck)  # fmt: skip
         else:
@@ -339,10 +363,12 @@ class Reference:
         return y[1] if p[1] else massless_w(y[0], y[1:], p)
 
     def outcome(self, turns: float = 150.0, limit: float = 8.0) -> str:
-        """returns, blow-up, contact lost, oscillation; or ? where it cannot be told within `limit` seconds."""
+        """returns, blow-up, contact lost, oscillation, no solution; or ? where it cannot be told within `limit` seconds."""
         p, y = self.p, self.y
         if stresses(y[0], p)[1] <= 0:
             return "contact lost"
+        if p[0] == LUGRE and not p[1]:
+            p[16] = self.speed(y)  # which the kick itself may have changed at once
         stiff, begun = p[0] == LUGRE or p[1] > 0, process_time()
         times = np.linspace(0, turns * self.period + self.reload, 8001)
         if stiff:
@@ -353,10 +379,13 @@ class Reference:
             return self.massless(times, begun + limit)
         speeds, now = [], 0.0
         while solver.status == "running" and process_time() - begun < limit:
+            before = solver.y
             solver.step()
-            now, speed = solver.t, self.speed(solver.y)
             if stresses(solver.y[0], p)[1] <= 0:
                 return "contact lost"
+            if self.lost(before, solver):
+                return "no solution"
+            now, speed = solver.t, self.speed(solver.y)
             if p[0] != LUGRE and speed > 200:
                 return "blow-up"
             between = solver.dense_output()
@@ -369,6 +398,17 @@ class Reference:
         if solver.status == "failed" or now < self.reload + 30 * self.period:
             return "?"
         return judged(self.away(np.array(speeds))[int(len(times) * self.reload / times[-1]) :])
+
+    def lost(self, before: np.ndarray, solver: Radau) -> bool:
+        """Whether the velocity of a block of bristles without mass ceases to balance forces in the last step."""
+        p = self.p
+        if p[0] != LUGRE or p[1]:
+            return False
+        span = solver.t - (solver.t_old or 0.0)
+        if jumps(before, solver.y, rates(before, 0.0, p), rates(solver.y, 0.0, p), span, p):
+            return True
+        p[16] = self.speed(solver.y)
+        return False
 
     def massless(self, times: np.ndarray, limit: float) -> str:
         """The outcome where velocity may grow without bound: in a time that runs as fast as the block then."""
@@ -446,7 +486,7 @@ def simulated(case: Drawn, size: float | None = None, turns: float = 150.0) -> s
     try:
         run = ss.simulate(rig, piece, until=end, initial=initial, times=np.linspace(0, end, 8001), rtol=1e-9,
                           events=False, most_steps=3_000_000)  # fmt: skip
-    except ss.NoSteadySliding:  # at the velocity that a step starts from
+    except (ss.NoSteadySliding, ss.NotAvailable):  # at the velocity that a step starts from
         return "?"
     if run.status != "done":
         return run.status if run.status in ("blow-up", "contact lost") else "?"

@@ -117,9 +117,17 @@ def simulated_period(rig: ss.Slider, natural: float) -> float | str:
             if np.ptp(gaps, axis=0).max() < 1e-7 * gaps.sum(axis=1).min() and np.ptp(heights, axis=0).max() < 1e-6:
                 if np.log(size[-1] / rig.drive.velocity) < 1e-3:
                     return "settles"
-                return float(gaps.sum(axis=1)[-1])
+                return float(gaps.sum(axis=1)[-1]) / times_round(gaps[-1])
         until *= 3.0
     return "undecided"
+
+
+def times_round(gaps: np.ndarray) -> int:
+    """How often a shorter cycle is run through, where motion comes to it from both sides in turn."""
+    for k in range(len(gaps), 1, -1):
+        if len(gaps) % k == 0 and np.ptp(gaps.reshape(k, -1), axis=0).max() < 1e-4 * gaps.min():
+            return k
+    return 1
 
 
 def judged(branch: ss.CycleBranch | None, value: float, truth: float | str) -> tuple[str, float]:

@@ -337,7 +337,8 @@ class Reference:
         self.period = (
             (2 * np.pi / abs(rest) if np.isfinite(rest) else 100 * self.length / rig.drive.velocity) * speed / length
         )
-        self.reload = 3 * abs(x) / p[7]
+        thrown = abs(v - p[7]) * np.sqrt(p[1] / p[3])  # as far as the spring alone lets a block go
+        self.reload = 3 * (abs(x) + thrown) / p[7]
 
     def _rate_state(self, friction: ss.RateState) -> None:
         p, states = self.p, friction.states or (friction,)
@@ -363,7 +364,7 @@ class Reference:
         return y[1] if p[1] else massless_w(y[0], y[1:], p)
 
     def outcome(self, turns: float = 150.0, limit: float = 8.0) -> str:
-        """returns, blow-up, contact lost, oscillation, no solution; or ? where it cannot be told within `limit` seconds."""
+        """What comes of the kick, in the words of `OUTCOMES`; ? where it cannot be told within `limit` seconds."""
         p, y = self.p, self.y
         if stresses(y[0], p)[1] <= 0:
             return "contact lost"

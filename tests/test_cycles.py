@@ -19,7 +19,7 @@ from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.kicks.spans import constant_inputs
 from steadyslip.nonlinear.orbits import flow as flow_module
-from steadyslip.nonlinear.orbits.branch import SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, Runs
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import _cuts
@@ -406,6 +406,26 @@ def test_sheet_that_breaks_off_is_found_again_by_simulation(damped, monkeypatch)
     assert branch.to_dict()["gaps"][0]["before"] == branch.gaps[0]
 
 
+def test_cycles_on_sheets_of_their_own_are_found_where_they_are_asked_for():
+    """Two states, among irregular motion: one large slip event and two small ones, on no sheet from the edge."""
+    states = (ss.State(b=0.0185158760, d_c=8.909265618e-6), ss.State(b=0.0160886248, d_c=3.90524125e-5))
+    friction = ss.RateState(a=0.0151007230, mu_ref=0.6, v_ref=9.268313582e-7, states=states)
+    a_rig = ss.Slider(friction=friction, contact=ss.Constant(preload=1.38968961e7), stiffness=2e10,
+                      radiation_damping=5.337161414e8, drive=ss.Steady(9.268313582e-7))  # fmt: skip
+    edge = ss.hopf(a_rig).value
+    branch = ss.cycles(a_rig, between=(0.79 * edge, 1.01 * edge), doublings=0)
+    *unstable, cycle = branch.at(0.8 * edge)
+    assert cycle.stable
+    assert not any(one.stable for one in unstable)
+    start = {name: number for name, number in cycle.start.items() if name != "v"}  # which follows from memory
+    until = 60 * cycle.period
+    run = ss.simulate(a_rig.with_values({"stiffness": 0.8 * edge}), until=until, initial=start, rtol=1e-9)
+    peaks = np.array([event.time for event in run.events if event.kind == "velocity peak"])
+    assert len(peaks) == 3 * 60
+    assert np.diff(peaks[::3]) == pytest.approx(cycle.period, rel=1e-6)
+    assert not branch.at(1.005 * edge)  # motions settle there
+
+
 @pytest.mark.slow
 def test_lead_screw_is_followed_through_its_windings_to_sticking():
     """LuGre: the branch doubles, winds round one stiffness, and goes on from a simulated cycle as stick-slip."""
@@ -521,7 +541,7 @@ def test_ctrl_c_keeps_what_there_is_wherever_it_comes(damped, monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(Tracer, "_finished", broken)
-        patched.setattr(sys.modules["steadyslip.nonlinear.orbits.cycles"], "cycle_near", stop)
+        patched.setattr(sys.modules["steadyslip.nonlinear.orbits.search"], "cycle_near", stop)
         partial = ss.cycles(damped.rig, between=between)
     assert (len(partial) > 3, partial.end, partial.gaps) == (True, "interrupted by the user", ())
 
@@ -546,7 +566,7 @@ def test_no_small_cycle_at_the_edge_is_no_traceback(damped, monkeypatch):
     branch = ss.cycles(damped.rig, between=(0.4 * damped.onset.value, 1.1 * damped.onset.value))
     (cycle,), (same,) = branch.at(0.5 * damped.onset.value), damped.at(0.5 * damped.onset.value)
     assert cycle.period == pytest.approx(same.period, rel=1e-9)
-    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.orbits.cycles"], "cycle_near", lambda *_: None)
+    monkeypatch.setattr(sys.modules["steadyslip.nonlinear.orbits.search"], "cycle_near", lambda *_: None)
     nothing = ss.cycles(damped.rig)
     assert (len(nothing), nothing.at(damped.onset.value)) == (0, ())
     assert "no small cycle was found" in nothing.end

@@ -7,7 +7,8 @@ from steadyslip.nonlinear.kicks.brackets import threshold_map
 from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.onset.hopf_curve import HopfCurve, SpecialPoint, hopf_curve
-from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch, SpecialCycle
+from steadyslip.nonlinear.orbits.branch import CycleBranch
+from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
 __all__ = [

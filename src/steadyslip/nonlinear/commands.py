@@ -17,7 +17,8 @@ from steadyslip.files.specifications import read_rig
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
-from steadyslip.nonlinear.orbits.branch import Cycle, CycleBranch
+from steadyslip.nonlinear.orbits.branch import CycleBranch
+from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
 ENDINGS = (".nc", ".csv", *FIGURES)

@@ -23,7 +23,7 @@ from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import rest_of
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Budget, Judged
-from steadyslip.nonlinear.orbits.branch import Cycle
+from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
 Array = np.ndarray

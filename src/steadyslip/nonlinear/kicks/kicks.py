@@ -56,7 +56,7 @@ KICKS = {
         Kick("velocity", "m/s", 1e-3, 25.0, "ln(new/old velocity)", "step of the load-point velocity"),
         Kick("displacement", "m", 1e-4, 1e5, "natural lengths (d_c)", "step of the load point"),
         Kick("normal-stress", "Pa", 1e-6, 1e2, "share of the steady one", "step of the normal stress"),
-        Kick("impulse", "Pa s", 1e-4, 1e12, "change of velocity over the drive's", "blow on a block with mass"),
+        Kick("impulse", "Pa s", 1e-4, 1e10, "change of velocity over the drive's", "blow on a block with mass"),
     )
 }
 

@@ -1,4 +1,4 @@
-"""Cycles along a parameter: what is known of each, of special points, and of where a branch ends."""
+"""Cycles along a parameter, special ones among them, and where their branch ends."""
 
 from __future__ import annotations
 
@@ -13,89 +13,10 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, stress_name, total, totals
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.shooting import Orbit
+from steadyslip.nonlinear.orbits.cycle import UNITS, Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.values import attracting, cycles_at
 
 Array = np.ndarray
-UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "stress_drop": "Pa",
-         "lowest_normal_stress": "Pa", "highest_normal_stress": "Pa", "slip": "m", "growth": "1"}  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Cycle:
-    """One periodic motion.
-
-    Attributes
-    ----------
-    value : float
-        Of the parameter, SI units.
-    period : float
-        s.
-    peak_velocity, lowest_velocity : float
-        m/s, located.
-    amplitude : float
-        Half of ln(peak velocity/lowest velocity); infinite where the block stops or turns round.
-    stress_drop : float
-        Highest less lowest spring stress, Pa.
-    lowest_normal_stress, highest_normal_stress : float
-        Pa.
-    multipliers : tuple of complex
-        Floquet multipliers by falling size, the trivial one (1) left out.
-    trivial : float
-        The one that should be 1; its distance from 1 is a measure of precision.
-    stable : bool
-        Whether the cycle attracts: all multipliers inside the unit circle.
-    start : dict of str to float
-        State where the block, speeding up, is as fast as the load point: x, v and memory, SI units, for
-        ``simulate(rig, initial=...)``.
-    """
-
-    value: float
-    period: float
-    peak_velocity: float
-    lowest_velocity: float
-    amplitude: float
-    stress_drop: float
-    lowest_normal_stress: float
-    highest_normal_stress: float
-    multipliers: tuple[complex, ...]
-    trivial: float
-    stable: bool
-    start: dict[str, float]
-    _orbit: Orbit | None = field(default=None, repr=False)
-
-    @property
-    def growth(self) -> float:
-        """Size of the largest multiplier: factor by which a small deviation grows in one period."""
-        return max((abs(m) for m in self.multipliers), default=0.0)
-
-    @property
-    def slip(self) -> float:
-        """Slip per period, m: the load point's advance."""
-        return self.start["v"] * self.period
-
-
-@dataclass(frozen=True, eq=False)
-class SpecialCycle:
-    """A cycle at which the branch changes.
-
-    Attributes
-    ----------
-    kind : str
-        ``fold``, ``period doubling``, ``torus`` or ``range`` (the end of the range asked for).
-    cycle : Cycle
-    bracket : tuple of float
-        Values of the parameter on both sides (at a fold: of neighbouring cycles).
-    precision : float
-        Estimated error of the parameter's value there, relative.
-    index : int
-        Place in the branch: it lies before the cycle of this number.
-    """
-
-    kind: str
-    cycle: Cycle
-    bracket: tuple[float, float]
-    precision: float
-    index: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +68,25 @@ class CycleBranch:
         return np.array([getattr(cycle, name) for cycle in self.cycles])
 
     def at(self, value: float) -> tuple[Cycle, ...]:
-        """The cycles that exist at one value of the parameter, corrected to full precision."""
-        from steadyslip.nonlinear.orbits.cycles import cycles_at
+        """The cycles that exist at one value of the parameter, corrected to full precision.
 
-        return cycles_at(self, value)
+        If none of them attracts, on this branch or on those of its doublings, motions are simulated at the value, and
+        the stable cycle that one comes to, if it does, is the last: cycles of several slip events may lie on sheets of
+        their own, in windows among irregular motion.
+        """
+        found = self._followed(value)
+        levels, stable = self, any(cycle.stable for cycle in found)
+        while not stable and levels.doubled is not None:
+            levels = levels.doubled
+            stable = any(cycle.stable for cycle in levels._followed(value))
+        if stable:
+            return found
+        own = attracting(self.onset, self.steady, self.rtol, value, found)
+        return found if own is None else (*found, own)
+
+    def _followed(self, value: float) -> tuple[Cycle, ...]:
+        """Those of the branch itself."""
+        return cycles_at(self.onset, self.steady, self.rtol, value, self._stretches())
 
     def _stretches(self) -> list[list[Cycle]]:
         """Cycles from gap to gap, folds among them."""

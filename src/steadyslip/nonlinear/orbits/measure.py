@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.nonlinear.orbits.branch import Cycle
+from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.shooting import Shooting
 
 Array = np.ndarray

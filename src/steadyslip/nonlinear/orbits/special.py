@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure, Point
-from steadyslip.nonlinear.orbits.branch import Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.shooting import Shooting
 
 Array = np.ndarray

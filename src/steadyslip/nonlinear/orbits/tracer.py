@@ -11,7 +11,7 @@ from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.branch import Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut

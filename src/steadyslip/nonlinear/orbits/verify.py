@@ -15,7 +15,7 @@ import numpy as np
 
 from steadyslip.kernels.program import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
-from steadyslip.nonlinear.orbits.branch import Cycle
+from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.flow import FlowFailure, FlowSetting, Runs
 from steadyslip.nonlinear.orbits.measure import amplitude, measured
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
@@ -32,7 +32,9 @@ FIRST_SPAN = 60.0  # natural times
 MOST_STEPS = 40_000
 
 
-def cycle_near(runs: Runs, state: Array, value: float = 0.0, patience: int = 1) -> Cycle | None:
+def cycle_near(
+    runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False
+) -> Cycle | None:  # fmt: skip
     """The cycle that a motion is on, or comes to.
 
     Parameters
@@ -44,6 +46,8 @@ def cycle_near(runs: Runs, state: Array, value: float = 0.0, patience: int = 1) 
         Of the free parameter, where `runs` has one.
     patience : int
         How many stretches of some returns each to go on for, as long as no cycle is close enough.
+    attracts : bool
+        Whether to pass by cycles that are not stable.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def cycle_near(runs: Runs, state: Array, value: float = 0.0, patience: int = 1) 
         for seen in _stretches(runs, runs.setting(value), state, patience):
             for back in _candidates(runs, seen):
                 found = _solved(runs, value, seen, int(back))
-                if found is not None:
+                if found is not None and (found.stable or not attracts):
                     return found
     return None
 

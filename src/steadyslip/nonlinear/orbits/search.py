@@ -1,0 +1,126 @@
+"""Sheets of cycles that cannot be reached from the edge: looked for by simulation, and joined where they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from steadyslip.nonlinear.continuation import Failure, turned_round
+from steadyslip.nonlinear.orbits.cycle import Cycle
+from steadyslip.nonlinear.orbits.special import Known
+from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Sheet, Tracer
+from steadyslip.nonlinear.orbits.verify import cycle_near
+
+Array = np.ndarray
+SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a sheet broke off to the end of the range
+PATIENCE = 12  # stretches of motion within which it has to come to a cycle
+MET = 2e-3  # difference of logarithms of period and velocities within which cycles are the same
+
+
+def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
+    """Add sheets found by simulation, as long as the last one does not cross the unstable range."""
+    low, high = tracer.limits
+    onset = tracer.onset
+    limit = low if onset.stable == "above" else high
+    if not np.isfinite(limit):
+        limit = onset.value + np.sign(limit) * max(1.0, abs(onset.value))
+    for share in SEEDS:
+        last = sheets[-1]
+        if tracer.interrupted or _crossed(last, tracer):
+            return
+        here = last.known[-1].cycle if last.known else None
+        start = onset.value
+        if here is not None and (here.value - onset.value) * (limit - onset.value) > 0:
+            start = here.value
+        value = start * (limit / start) ** share if start * limit > 0 else start + share * (limit - start)
+        try:
+            seed = seed_at(tracer, value, [] if here is None else [here])
+        except KeyboardInterrupt:
+            tracer.interrupted = True
+            return
+        if seed is not None and not _met(sheets, seed):
+            _add_sheet(tracer, sheets, seed, np.sign(limit - onset.value))
+
+
+def _crossed(sheet: Sheet, tracer: Tracer) -> bool:
+    """Whether a sheet ends for good: for a reason in the matter, other than leaving the range on the stable side."""
+    if not sheet.whole or not sheet.known:
+        return False
+    if not sheet.end.startswith("end of the range"):
+        return True
+    return (sheet.known[-1].cycle.value < tracer.onset.value) == (tracer.onset.stable == "above")
+
+
+def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle], attracts: bool = False) -> Known | None:
+    """A cycle that motions at a value come to: from known cycles beside it, and from beside steady sliding.
+
+    With `attracts` only a stable one is taken, however close to another the motion comes on its way.
+    """
+    flow = tracer.flow
+    try:
+        steady = flow.steady(value)
+    except Failure:
+        return None
+    pushed = steady.copy()
+    pushed[0] -= 2.0 * flow.scales[0]
+    for state in (*(cycle._orbit.states[0] for cycle in near if cycle._orbit is not None), pushed):
+        found = cycle_near(flow, state, value, PATIENCE, attracts)
+        if found is None or found._orbit is None:
+            continue
+        try:
+            return tracer.resumed(found._orbit, 1.0)
+        except (Failure, np.linalg.LinAlgError):
+            continue
+    return None
+
+
+def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) -> None:
+    """Follow a cycle both ways: back to a sheet that is known, or the edge, and on."""
+    forth = seed if seed.point.tangent[-1] * away > 0 else replace(seed, point=turned_round(seed.point))
+    back = replace(forth, point=turned_round(forth.point))
+    step = 0.1 * LARGEST_STEP
+    behind = tracer.followed(back.shooting, back, step, met=lambda known: _met(sheets, known))
+    ahead = Sheet()
+    if not tracer.interrupted:
+        ahead = tracer.followed(forth.shooting, forth, step)
+    both = behind.reversed()
+    both.known.pop()  # the seed, which `ahead` begins with
+    both = both.joined(ahead) if ahead.known else behind.reversed()
+    near = behind.known[-1].cycle
+    if behind.end == "" and behind.whole:  # met
+        _cut_back(sheets[-1], near)
+        sheets[-1] = sheets[-1].joined(both)
+    elif behind.end.startswith("back") and abs(near.value / tracer.onset.value - 1) < 1e-3 and near.amplitude < 0.5:
+        sheets[-1] = both
+    else:
+        sheets.append(both)
+
+
+def _met(sheets: list[Sheet], known: Known) -> bool:
+    """Whether a cycle lies between two neighbours that are known."""
+    return any(_between_neighbours(a.cycle, b.cycle, known.cycle) for sheet in sheets for a, b in pairwise(sheet.known))
+
+
+def _between_neighbours(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
+    def looks(one: Cycle) -> Array:
+        return np.array(
+            [np.log(one.period), np.log(one.peak_velocity), np.arcsinh(one.lowest_velocity / one.start["v"])]
+        )
+
+    if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
+        return False
+    share = (cycle.value - a.value) / (b.value - a.value) if b.value != a.value else 0.5
+    spread = MET + 0.3 * np.abs(looks(b) - looks(a)).max() ** 2
+    return bool(np.abs(looks(a) * (1 - share) + looks(b) * share - looks(cycle)).max() < spread)
+
+
+def _cut_back(sheet: Sheet, meeting: Cycle) -> None:
+    """Leave out what lies behind the place at which another sheet met this one."""
+    for i in range(len(sheet.known) - 1):
+        if _between_neighbours(sheet.known[i].cycle, sheet.known[i + 1].cycle, meeting):
+            del sheet.known[i + 1 :]
+            sheet.special = [point for point in sheet.special if point.index <= i]
+            return

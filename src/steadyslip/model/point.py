@@ -61,7 +61,7 @@ class OperatingPoint(Keeper):
         """Values by dotted name."""
         return dict(zip(self.model.parameters, self.arguments, strict=True))
 
-    @property
+    @cached_property
     def drive(self) -> Any:
         """Velocity of the load point in steady sliding, m/s."""
         return self.named()["drive.velocity"]

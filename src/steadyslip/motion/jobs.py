@@ -204,13 +204,20 @@ def prepare(
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate)
     _refuse_endless(reduction, options.method)
-    if not own and np.isfinite(point.sigma):
-        scales, unknown = natural_scales(point, reduction)
-        if not all(np.all(np.isfinite(one)) for one in (*scales.values(), unknown)):
-            raise NotAvailable(OUT_OF_RANGE)
+    if not own and not _within_range(point, reduction):
+        raise NotAvailable(OUT_OF_RANGE)
     start, velocity = initial_values(reduction, point, initial)
     size = max(len(point.stresses), len(segments.start), len(start), point.size, 1)
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
+
+
+@question
+def _within_range(point: OperatingPoint, reduction: Reduction) -> bool:
+    """Whether the sizes of all variables are numbers, where there is steady sliding."""
+    if not np.isfinite(point.sigma):
+        return True
+    scales, unknown = natural_scales(point, reduction)
+    return all(bool(np.all(np.isfinite(one))) for one in (*scales.values(), unknown))
 
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:

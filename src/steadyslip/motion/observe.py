@@ -30,8 +30,11 @@ def observable_units(model: Model) -> dict[str, str]:
 
 def out_of_range(found: dict[str, Array]) -> Array:
     """Where any observable is infinite or no number."""
-    bad: Array = ~np.logical_and.reduce([np.isfinite(values) for values in found.values()])
-    return bad
+    first, *others = found.values()
+    good: Array = np.isfinite(first)
+    for values in others:
+        good &= np.isfinite(values)
+    return ~good
 
 
 @question

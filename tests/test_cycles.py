@@ -111,6 +111,33 @@ def test_continuation_does_not_jump_to_another_curve():
             break
 
 
+def corrected_by(steps, reach=np.inf):
+    """Newton's method where its steps are given, one after another; the last is taken again and again."""
+    left = list(steps)
+
+    def equations(u):
+        return np.array([left.pop(0) if len(left) > 1 else left[0]]), np.array([[1.0, 0.0]])
+
+    return Track(equations).corrected(np.zeros(2), np.array([0.0, 1.0]), 0.0, reach)
+
+
+def test_newton_ends_at_rounding_and_may_step_back_once():
+    """Steps no longer shrink where what is solved is noisy; next to the solution one may be larger than before."""
+    assert corrected_by([0.1, 1e-3, 4e-9, 3e-9]).iterations == 4  # tolerance 1e-9
+    assert corrected_by([0.1, 1e-3, 1e-5, 1e-7, 8e-6, 1e-10]).iterations == 6
+    for growing in ([0.1, 1e-2, 1e-3, 1e-6, 1e-3, 1e-10], [0.1, 1e-2, 1e-2, 0.3, 1e-10]):
+        with pytest.raises(Failure, match="no convergence"):
+            corrected_by(growing)
+
+
+def test_newton_must_end_near_the_guess_and_may_stray_a_little():
+    found = corrected_by([0.5, -0.45, 1e-10], reach=0.1)
+    assert np.abs(found.u).max() == pytest.approx(0.05)
+    for straying in ([0.3, 1e-10], [1.5, -1.5, 1e-10]):  # ends beyond reach; was ten times farther on the way
+        with pytest.raises(Failure, match="elsewhere"):
+            corrected_by(straying, reach=0.1)
+
+
 # -- the flow and its derivatives
 
 

@@ -4,7 +4,9 @@ Those of one slip event, or one turn, are looked for here; longer ones by `orbit
 
 The flow over one period and its derivative come from runs side by side: one from the state itself, two for each
 variable beside it (central differences). That is coarser than the variational equations of `flow`, enough to tell
-attraction from repulsion, and it needs no other kernel than the runs themselves.
+attraction from repulsion, and it needs no other kernel than the runs themselves. That is why this Newton's method
+stands beside that of `orbits.shooting`: it solves for dozens of runs in lanes, where that compiles a kernel with
+sensitivities for each model and takes one cycle after another.
 """
 
 from __future__ import annotations

@@ -135,7 +135,7 @@ def _solved(runs: Runs, value: float, seen: _Stretch, back: int) -> Cycle | None
     try:
         point = shooting.curve().corrected(guess, still, 0.0, NEAR * shooting.amplitude)
         seen_once = measured(shooting, point.u)
-    except Failure:
+    except (Failure, np.linalg.LinAlgError):
         return None
     cycle = seen_once.cycle
     shrunk = cycle.amplitude < 0.5 * seen.amplitude

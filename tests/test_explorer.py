@@ -1,6 +1,7 @@
 """The explorer: its equations say in JavaScript what they say in Python, and its page holds what it promises."""
 
 import json
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -11,10 +12,14 @@ import steadyslip as ss
 from explored import Explored, compared, library
 from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
-from rigs_of_theory import CONTACTS, SIGMA, V0, rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.roles import positive
 from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.motion import driver, motion_part
+from steadyslip.kernels.printers import javascript
+from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
+from steadyslip.model.point import operating_point
 
 FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
 BEFORE = [dict(family.registry) for family in FAMILIES]
@@ -176,3 +181,61 @@ def test_conditions_between_numbers_are_checked():
 def test_what_cannot_be_printed_is_refused_in_words():
     with pytest.raises(ss.NotAvailable, match=r"atan\(\.\.\.\)"):
         linear_part(rig(contact=Turning(preload=SIGMA)))
+
+
+# -- motion
+
+MOVING = {
+    "massless": rig(stiffness=9e9, friction=rate_state(evolution=ss.Aging())),
+    "stick-slip": rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e4, stiffness=3e9),
+    "with mass": rig(mass=1e3, stiffness=6e9),
+    "controller": rig(stiffness=None, drive=ss.PID(V0, kp=9e9, ki=1e8), mass=1e3),
+    "regularised": rig(friction=ONE_MEMORY[2], contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=1.2e10),
+    "solved": rig(friction=ONE_MEMORY[3], stiffness=2e10),
+    "users' law": rig(friction=VISCOUS, contact=Asperities(preload=SIGMA, share=0.3, pressure=2e6), stiffness=2e10),
+}
+DISTURBED = {
+    "velocity": (2.0, ss.VelocityStep(at=1.0, to=2 * V0)),
+    "push": (1e-7, ss.DisplacementStep(at=1.0, by=1e-7)),
+    "normal": (2e5, ss.NormalStressStep(at=1.0, by=2e5)),
+}
+
+
+def moved_on_a_page(own, kind, until):
+    """What the page's Motion makes of a disturbance, where its pauses take no time."""
+    text, facts = motion_part(own, 0)
+    web = files("steadyslip.explorer.web")
+    base = javascript.as_script(javascript.runtime(), web.joinpath("motion.js").read_text(encoding="utf-8"), driver())
+    made = f"new Motion({text}, {json.dumps(facts)}, {{ advance, observe }})"
+    script = Script(f"globalThis.setTimeout = (f) => f();\n{base}\nconst motion = {made};\nlet found = null;")
+    if script.context is None:
+        pytest.skip("Node starts anew for every question; this needs mini-racer")
+    kept = [name for name in present_zeros(own) if name not in facts["missing"]]
+    point = operating_point(own, None, kept)
+    run = "motion.set(values, sigma).run(kind, size, 1, until, () => false).then((r) => (found = r))"
+    asked = f"({run}, motion.refusal())"
+    values = [float(value) for value in point.arguments]
+    assert script(asked, values=values, sigma=float(point.sigma), kind=kind, size=DISTURBED[kind][0], until=until) == ""
+    return script("found")
+
+
+@pytest.mark.parametrize("kind", DISTURBED)
+@pytest.mark.parametrize("name", MOVING)
+def test_a_page_moves_as_python_does(name, kind):
+    """From the rig's numbers to slip events, all of it in JavaScript but the equations."""
+    own, until = MOVING[name], 20.0
+    found = moved_on_a_page(own, kind, until)
+    runs = [ss.simulate(own, DISTURBED[kind][1], until=until, rtol=rtol) for rtol in (1e-6, 1e-9)]
+    assert found["status"] == runs[0].status
+    begins, exact = ([event.begin for event in run.slip_events] for run in runs)
+    mine = [event["begin"] for event in found["events"]]
+    assert len(mine) == len(begins) == len(exact)
+    late = np.abs(np.array(begins) - exact).max(initial=0.0)
+    assert np.abs(np.array(mine) - begins).max(initial=0.0) <= 10 * late + 1e-7 * until
+    when = np.array([1.5, 0.3 * until, 0.6 * until])
+    when = when[when < 0.99 * runs[1].end]
+    for series, theirs in ((found["v"], "v"), (found["sigma"], "normal_stress"), (found["tau"], "shear_stress")):
+        here = np.interp(when, found["times"], series)
+        there = np.interp(when, runs[0]["t"], runs[0][theirs])
+        truth = np.interp(when, runs[1]["t"], runs[1][theirs])
+        assert np.all(np.abs(here - there) <= 10 * np.abs(there - truth) + 1e-2 * np.abs(truth))

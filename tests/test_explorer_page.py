@@ -10,7 +10,7 @@ import pytest
 import steadyslip as ss
 from browser import chromium, driver
 from command import run
-from rigs_of_theory import ONE_MEMORY, SIGMA, rig
+from rigs_of_theory import ONE_MEMORY, SIGMA, rate_state, rig
 
 pytestmark = pytest.mark.slow  # a browser works in processes of its own, whose seconds are not measured
 INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
@@ -58,6 +58,12 @@ class Visit:
     def type(self, name, text):
         self.field(name).fill(text)
         self.field(name).press("Tab")
+
+    def told(self, pattern):
+        """What the page says of a motion, once it is this."""
+        found = self.page.locator(".told", has_text=re.compile(pattern))
+        found.wait_for(state="attached")
+        return found.inner_text()
 
     def saved(self, button):
         with self.page.expect_download() as waiting:
@@ -117,14 +123,14 @@ def test_sliders_and_the_chart_work_by_keyboard_and_by_pointer(browser, file):
         assert visit.sentence().startswith("Stable")
         assert "GPa/m" in stiffness.get_attribute("aria-valuetext")
         visit.page.get_by_role("button", name="back to the rig").click()
-        chart = visit.page.locator("svg.chart")
+        chart = visit.page.locator("svg[role=application]")
         chart.focus()
         for _ in range(10):
             visit.page.keyboard.press("Shift+ArrowUp")
         assert visit.sentence().startswith("Stable")
         assert "Stable" in chart.get_attribute("aria-label")
         box = chart.bounding_box()
-        point = visit.page.locator("svg.chart .point")
+        point = visit.page.locator("svg .point")
         visit.page.mouse.move(*_middle(point))
         visit.page.mouse.down()
         visit.page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.8 * box["height"], steps=5)
@@ -264,6 +270,40 @@ def test_every_control_has_a_name(browser, file):
         assert visit.page.locator("h1").count() == 1
 
 
+def test_the_rig_moves_and_stops_when_asked(browser, tmp_path):
+    own = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=3e9)
+    ss.explore(own).save(tmp_path / "rig.html")
+    run = ss.simulate(own, ss.VelocityStep(at=10.0, to=2e-6), until=200.0, rtol=1e-6)
+    with Visit(browser, tmp_path / "rig.html") as visit:
+        visit.page.get_by_label("length of the run").fill("200 s")
+        visit.page.get_by_label("length of the run").press("Tab")
+        told = visit.told(f"^{len(run.slip_events)} slip events, the last two ")
+        assert f"{run.slip_events[-1].recurrence:.3g} s apart" in told
+        assert visit.page.locator(".strips .curve").count() == 2
+        visit.page.get_by_label("disturbance", exact=True).select_option("push")
+        visit.page.get_by_label("size of the disturbance").fill("1 m/s")
+        visit.page.get_by_label("size of the disturbance").press("Tab")
+        visit.told("wrong dimension")
+        visit.page.get_by_label("size of the disturbance").fill("1 nm")
+        visit.page.evaluate(STOP)
+        visit.told("^stopped$")
+        visit.type("slider.mass", "3 kg/m^2")
+        visit.told("has no slider.mass")
+
+
+STOP = """() => new Promise((done) => {
+  const [told, length] = [document.querySelector(".told"), document.querySelector("[aria-label='length of the run']")];
+  length.value = "100 yr";
+  length.dispatchEvent(new Event("change"));
+  const look = () => {
+    if (!told.textContent.startsWith("moving")) return setTimeout(look, 1);
+    [...document.querySelectorAll("button")].find((one) => one.textContent === "stop").click();
+    setTimeout(done, 100);
+  };
+  look();
+})"""
+
+
 RIGS = {
     "area": rig(area=0.01, stiffness=9e9),
     "axial": rig(contact=ss.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
@@ -282,6 +322,8 @@ def test_other_rigs_have_pages_too(browser, tmp_path, name):
         word = {None: "No steady sliding", True: "Stable", False: "Unstable"}[analysis.stable]
         assert visit.sentence().startswith(word)
         assert visit.page.inner_text(".notice") == ""
+        visit.told("slip event|runs away|No motion|ends at")
+        assert (visit.page.locator(".strips .curve").count() > 0) == (analysis.stable is not None)
         text = visit.saved("save as a rig file")
     again = ss.rig_from_text(text)
     assert ss.analyze(again).critical_stiffness == analysis.critical_stiffness

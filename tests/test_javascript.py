@@ -8,18 +8,13 @@ import pytest
 
 import steadyslip as ss
 from javascript import Script
+from moved import DRIVER, moved, slip_events
 from rigs_of_theory import ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.kernels import primitives
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program, primitive, select
 from steadyslip.kernels.printers import javascript, python
 from steadyslip.kernels.printers.transpile import module_text, transpiled
-from steadyslip.kernels.program import TALLY
-from steadyslip.motion.engine import run_single
-from steadyslip.motion.jobs import Options, prepare
-
-DRIVER = {"advance": "steadyslip.kernels.driver.lanes", "observe": "steadyslip.kernels.driver.states"}
 
 
 @pytest.fixture(scope="module")
@@ -195,43 +190,6 @@ def test_every_module_of_the_driver_can_be_written():
 
 # -- motion
 
-CALL = f"""
-function run(machine, tables, times) {{
-  const [constants, initial, settings, segments] = tables.map((t) => table(t.values, t.shape));
-  const {{ layout, routines }} = machine, size = layout[1];
-  const S = zeros(layout[30]), ids = zeros(1), cursor = zeros({len(Cursor)});
-  cursor[{Cursor.LAST_JOB}] = 1; cursor[{Cursor.BUSY}] = 1; cursor[{Cursor.PAUSED}] = -1;
-  const out = [zeros(1), zeros(1, {int(Final.STATE)} + size), zeros(1, {len(TALLY)}), zeros(1, times.length, size)];
-  const log = zeros(4000, {LOG_COLUMNS}), recorded = zeros(0, 2 + size);
-  const t = zeros(times.length); t.set(times);
-  const reason = advance(layout, routines, S, ids, cursor, constants, initial, settings, segments, t, ...out, log,
-    recorded, 1e9);
-  return {{ reason, status: out[0], final: out[1], tally: out[2], samples: out[3],
-    log: log.slice(0, cursor[{Cursor.LOGGED}]) }};
-}}
-"""
-
-
-@pytest.fixture(scope="module")
-def driver():
-    return javascript.as_script(javascript.runtime(), transpiled(DRIVER), CALL)
-
-
-def runs(driver, moving, protocol, until):
-    """The same tables through compiled kernels, with a finer tolerance too, and through JavaScript."""
-    times = np.linspace(0, until, 41)
-    outcomes = []
-    for rtol in (1e-7, 1e-9):
-        jobs = prepare(moving, protocol, until, {}, {}, Options(rtol=rtol), 0)
-        machine = jobs.program(lanes=1, dense=True)
-        outcomes.append(run_single(jobs, machine, times, watch=True, record=False))
-        if rtol == 1e-7:
-            tables = jobs.tables(machine, 0, 1, True, False)
-    script = Script(f"{driver}\nconst kernel = {javascript.machine(machine.kernel.programs, machine.kernel.layout)};")
-    given = [{"values": one, "shape": one.shape} for one in tables]
-    return *outcomes, script("run(kernel, tables, times)", tables=given, times=times)
-
-
 LUGRE = ONE_MEMORY[-1]
 MOVING = {
     "massless": (rig(stiffness=9e9), ss.VelocityStep(at=1.0, to=2e-6), 60.0),
@@ -250,18 +208,16 @@ MOVING = {
 
 
 @pytest.mark.parametrize("name", MOVING)
-def test_motion_is_that_of_the_compiled_kernels(driver, name):
+def test_motion_is_that_of_the_compiled_kernels(name):
     """Rounding differs, and with it the steps: by no more than what ten times the integration error allows."""
-    compiled, finer, found = runs(driver, *MOVING[name])
+    compiled, finer, found = moved(*MOVING[name])
     assert found["reason"] == 0
     assert found["status"][0] == compiled.status[0] == 1
     own, theirs, truth = np.array(found["samples"][0]), compiled.samples[0], finer.samples[0]
     size = np.abs(truth).max(axis=0) + 1e-300
     error = np.abs(theirs - truth).max(axis=0) / size
     assert np.all(np.abs(own - theirs).max(axis=0) / size <= 10 * error + 1e-9)
-    logs = [one[np.isin(one[:, 0], (Kind.SLIP_BEGINS, Kind.SLIP_ENDS))]
-            for one in (np.array(found["log"]).reshape(-1, LOG_COLUMNS), compiled.log, finer.log)]  # fmt: skip
-    assert logs[0][:, 0].tolist() == logs[1][:, 0].tolist() == logs[2][:, 0].tolist()
-    assert (len(logs[0]) > 0) == (name != "solved")
-    late = np.abs(logs[1][:, 1] - logs[2][:, 1]).max(initial=0.0)
-    assert np.abs(logs[0][:, 1] - logs[1][:, 1]).max(initial=0.0) <= 10 * late + 1e-9 * MOVING[name][2]
+    (kinds, times), (theirs_too, when), (finer_too, exact) = map(slip_events, (found["log"], compiled.log, finer.log))
+    assert kinds == theirs_too == finer_too
+    assert (len(kinds) > 0) == (name != "solved")
+    assert np.abs(times - when).max(initial=0.0) <= 10 * np.abs(when - exact).max(initial=0.0) + 1e-9 * MOVING[name][2]

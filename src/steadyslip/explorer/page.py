@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 import tempfile
 import webbrowser
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.quantities import outside
 from steadyslip.core.records import Address, twin
 from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.motion import driver, motion_part
 from steadyslip.files.output import whole_file
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
@@ -31,7 +33,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.analyze import linear_numbers
 
-MODULES = ("polynomials", "linear", "quantities", "rig", "chart", "page")
+MODULES = ("polynomials", "linear", "quantities", "rig", "chart", "motion", "page")
 """Modules of the page, each after those that it imports."""
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
@@ -108,10 +110,18 @@ def explore(rig: Slider, *, title: str = "rig", branch: int = 0) -> Explorer:
 def page(rig: Slider, title: str, branch: int) -> str:
     """The text of the file."""
     text, facts = linear_part(rig)
+    machine, driven, moving, still = "null", "", None, ""
+    try:
+        machine, moving = motion_part(rig, branch)
+        driven = driver()
+    except NotAvailable as refused:  # the verdict can be shown all the same
+        still = str(refused)
     web = files("steadyslip.explorer.web")
     modules = [web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in MODULES]
-    script = javascript.as_script(javascript.runtime(), *modules)
-    data = json.dumps(_data(rig, title, branch, facts), ensure_ascii=False, allow_nan=False)
+    script = _narrow(javascript.as_script(javascript.runtime(), *modules, driven))
+    machine, text = _narrow(machine), _narrow(text)
+    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still}
+    data = json.dumps(known, ensure_ascii=False, allow_nan=False)
     for letter in "<>&\u2028\u2029":  # nothing in a rig can end the element that its data are in
         data = data.replace(letter, f"\\u{ord(letter):04x}")
     style = web.joinpath("style.css").read_text(encoding="utf-8")
@@ -122,11 +132,17 @@ def page(rig: Slider, title: str, branch: int) -> str:
         f"<title>{html.escape(title)} – steadyslip</title>\n<style>\nbody {{ margin: 0; }}\n{style}</style>\n</head>\n"
         '<body>\n<div class="steadyslip-root"></div>\n'
         f'<script type="application/json" class="steadyslip-data">{data}</script>\n'
-        f'<script>\n"use strict";\n(() => {{\n{script}\nconst programs = {text};\n'
+        f'<script>\n"use strict";\n(() => {{\n{script}\nconst programs = {text};\nconst machine = {machine};\n'
+        f"const driver = {'{ advance, observe }' if driven else 'null'};\n"
         "const place = document.currentScript.previousElementSibling;\n"
-        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs);\n})();\n</script>\n"
-        "</body>\n</html>\n"
+        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs, machine, driver);\n"
+        "})();\n</script>\n</body>\n</html>\n"
     )
+
+
+def _narrow(text: str) -> str:
+    """Code without its indentation, a tenth of its length; no string goes over several lines."""
+    return re.sub(r"^ +", "", text, flags=re.M)
 
 
 def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -46,15 +46,20 @@ class Weights(ReadOnly):
     by_unknown: np.ndarray
 
 
-@question
-def _weights_function(model: Model) -> Callable[..., list[Any]]:
+def weighed(model: Model) -> list[sp.Expr]:
+    """What `Weights` holds: direct, by slip, by unknown, then of each memory its weight, its decay, itself."""
     contact = model.contact
     v, memory = contact.velocity, [item.symbol for item in model.memory]
     inlined = model.inlined(contact.balance)
     wanted = [v * sp.diff(contact.balance, v), sp.diff(inlined, contact.slip), sp.diff(inlined, contact.unknown)]
     wanted += [sp.diff(contact.balance, m) for m in memory]
     wanted += [sp.diff(model.rate_of[m], m) for m in memory]
-    return model.function(e.doit().xreplace(model.steady) for e in (*wanted, *memory))
+    return [e.doit().xreplace(model.steady) for e in (*wanted, *memory)]
+
+
+@question
+def _weights_function(model: Model) -> Callable[..., list[Any]]:
+    return model.function(weighed(model))
 
 
 @question

@@ -111,3 +111,37 @@ export function axis(box, scale, range, area, unit, label, upright) {
   group.append(svg("text", { ...where, "text-anchor": "middle", class: "label" }, text));
   return group;
 }
+
+/** One strip of a series over time, as elements: axes, curve. @param {ArrayLike<number>} times @param {ArrayLike<number>} values */
+export function strip(box, times, values, until, unit, label, last) {
+  let low = Infinity, high = -Infinity;
+  for (let i = 0; i < values.length; i++) {
+    low = Math.min(low, values[i]);
+    high = Math.max(high, values[i]);
+  }
+  const logarithmic = low > 0 && high / low > 30, pad = logarithmic ? 1.15 : 0;
+  if (!logarithmic) {
+    const room = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1;
+    [low, high] = [low - room, high + room];
+  } else [low, high] = [low / pad, high * pad];
+  const up = logarithmic ? { at: (t) => low * (high / low) ** t, of: (v) => Math.log(v / low) / Math.log(high / low) }
+    : { at: (t) => low + t * (high - low), of: (v) => (v - low) / (high - low) };
+  const along = { at: (t) => t * until, of: (v) => v / until }, group = svg("g", {});
+  group.append(axis(box, up, [low, high], 1, unit, label, true));
+  if (last) group.append(axis(box, along, [0, until], 1, "s", "time", false));
+  let path = "", column = -1, least = 0, most = 0;
+  const put = (x, y) => (path += `${path ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`);
+  for (let i = 0; i < times.length; i++) { // lowest and highest of each column of pixels
+    const x = box.left + along.of(times[i]) * box.width, y = box.top + (1 - up.of(values[i])) * box.height;
+    if (Math.floor(x) !== column) {
+      if (column >= 0 && most > least) put(column + 0.5, least), put(column + 0.5, most);
+      [column, least, most] = [Math.floor(x), y, y];
+      put(x, y);
+    } else {
+      [least, most] = [Math.min(least, y), Math.max(most, y)];
+      if (times.length < 3 * box.width) put(x, y);
+    }
+  }
+  group.append(svg("rect", { x: box.left, y: box.top, width: box.width, height: box.height, class: "frame" }), svg("path", { class: "curve", d: path }));
+  return group;
+}

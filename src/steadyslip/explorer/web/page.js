@@ -1,6 +1,7 @@
 // The page: verdict, sliders with painted tracks, chart, eigenvalues, edges; all of it from one rig and its answers.
-import { CLASSES, axis, regions, svg } from "./chart.js";
+import { CLASSES, axis, regions, strip, svg } from "./chart.js";
 import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { DISTURBANCES, Motion } from "./motion.js";
 import { digits, display, parse, shown } from "./quantities.js";
 import { Rig, inside, rangeOf, scaleOf } from "./rig.js";
 
@@ -20,10 +21,11 @@ function make(name, properties = {}, ...children) {
 }
 
 class Page {
-  /** @param {HTMLElement} root @param {any} data @param {any} programs */
-  constructor(root, data, programs) {
+  /** @param {HTMLElement} root @param {any} data @param {any} programs @param {any} machine @param {any} driver */
+  constructor(root, data, programs, machine, driver) {
     this.root = root;
     this.rig = new Rig(data, programs);
+    this.mover = machine && new Motion(machine, data.motion, driver);
     this.past = /** @type {number[][]} */ ([]);
     this.future = /** @type {number[][]} */ ([]);
     this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // several pages may share a document
@@ -34,7 +36,7 @@ class Page {
     this.rig.values = this.rig.fromHash(location.hash);
     this.box = root.clientWidth < 600 ? NARROW : WIDE;
     root.classList.add("steadyslip");
-    root.replaceChildren(this.head(), this.verdict(), make("main", {}, this.controls(), this.chart(), this.facts()), this.foot());
+    root.replaceChildren(this.head(), this.verdict(), make("main", {}, this.controls(), make("div", { className: "middle" }, this.chart(), this.motion()), this.facts()), this.foot());
     this.redraw();
     new ResizeObserver(() => {
       const box = root.clientWidth < 600 ? NARROW : WIDE;
@@ -42,6 +44,7 @@ class Page {
       this.box = box;
       this.painted = "";
       this.showChart();
+      this.showMotion();
     }).observe(root);
     window.addEventListener("hashchange", () => {
       if (location.hash !== this.rig.hash()) this.change(this.rig.fromHash(location.hash));
@@ -154,10 +157,31 @@ class Page {
       make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: "one parameter changed, the others as they are; press to go there" }), this.near);
   }
 
+  motion() {
+    const section = make("section", { className: "motion", "aria-label": "motion" }, make("h2", { textContent: "What does it do?" }));
+    this.told = make("p", { className: "told", role: "status" });
+    this.strips = svg("svg", { class: "chart strips", role: "img" });
+    if (!this.mover) {
+      section.append(make("p", { className: "told", textContent: `No motion on this page: ${this.rig.data.still}.` }));
+      return section;
+    }
+    this.disturbance = make("select", { "aria-label": "disturbance" }, ...Object.entries(DISTURBANCES).map(([value, textContent]) => make("option", { value, textContent })));
+    this.size = make("input", { type: "text", "aria-label": "size of the disturbance", size: 9 });
+    this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself" });
+    this.halt = make("button", { type: "button", textContent: "stop", disabled: true, onclick: () => this.stop() });
+    this.disturbance.addEventListener("change", () => {
+      this.size.value = "";
+      this.moveSoon();
+    });
+    for (const field of [this.size, this.length]) field.addEventListener("change", () => this.moveSoon());
+    section.append(make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt), this.told, this.strips);
+    return section;
+  }
+
   foot() {
     const many = this.rig.data.checks.length;
     const words = this.differs.length ? "" : `This browser agrees with ${many} answers of Python that came with the page. `;
-    return make("footer", {}, `${words}Everything is computed here; the page asks for nothing from outside. Small disturbances only: a large kick may still start an oscillation.`);
+    return make("footer", {}, `${words}Everything is computed here; the page asks for nothing from outside. The verdict is on small disturbances: a large kick may still start an oscillation.`);
   }
 
   // -- changes
@@ -291,6 +315,7 @@ class Page {
     this.rig.data.parameters.forEach((one, i) => this.showRow(one, i));
     this.showChart();
     this.showFacts(answer);
+    this.moveSoon();
     this.undoButton.disabled = !this.past.length;
     this.redoButton.disabled = !this.future.length;
     const hash = this.rig.hash();
@@ -420,6 +445,94 @@ class Page {
     }));
   }
 
+  // -- motion
+
+  /** Move the rig once the page is drawn and values rest. */
+  moveSoon() {
+    if (!this.mover) return;
+    this.token = {};
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => this.move_(this.token), this.sliding ? 150 : 30);
+  }
+
+  async move_(token) {
+    const refused = this.refusal();
+    this.course = null;
+    if (refused) {
+      this.told.textContent = `No motion: ${refused}.`;
+      this.strips.replaceChildren();
+      return;
+    }
+    try {
+      const { size, at, until } = this.asked();
+      this.halt.disabled = false;
+      this.told.textContent = "moving …";
+      const found = await this.mover.run(this.disturbance.value, size, at, until, () => this.token !== token);
+      if (found === null) return; // stopped, or another run has begun
+      this.course = { ...found, until: found.status === "done" ? until : found.end };
+      this.told.textContent = this.words(found);
+      this.showMotion();
+    } catch (error) {
+      this.told.textContent = error instanceof Error ? error.message : String(error);
+    }
+    this.halt.disabled = true;
+  }
+
+  stop() {
+    this.token = {};
+    this.halt.disabled = true;
+    this.told.textContent = "stopped";
+  }
+
+  refusal() {
+    const { answer, mover } = this, { motion, parameters, facts } = this.rig.data;
+    const own = (name) => this.rig.values[parameters.findIndex((one) => one.name === name)];
+    if (answer.status === ABSENT || answer.status === UNKNOWN) return "there is no steady sliding to start from";
+    const added = motion.missing.find((name) => own(name) > 0);
+    if (added) return `the rig of the file has no ${added}; write it there, and make the page anew`;
+    if (this.disturbance.value === "push" && ["slider.damping", "drive.kd"].some((name) => own(name) > 0)) return "a sudden push through a dashpot is an infinite force";
+    const model = Array.from(this.rig.set(this.rig.values).R);
+    mover.set(motion.parameters.map((name) => model[facts.parameters.indexOf(name)]), answer.sigma);
+    return mover.refusal();
+  }
+
+  /** Size, begin and length as they stand in the fields, or what shows most. */
+  asked() {
+    const { eigenvalues, sigma } = this.answer, lead = eigenvalues.find((s) => s.im > 0) ?? eigenvalues[0], kind = this.disturbance.value;
+    const scale = Math.abs(lead.im > 0 ? (2 * Math.PI) / lead.im : 5 / (lead.re || 1)), { area } = this.rig.data;
+    const until = this.length.value ? parse(this.length.value, "s", "s") : 12 * scale, unit = { velocity: "1", push: "m", normal: area === null ? "Pa" : "N" }[kind];
+    const usual = { velocity: 2, push: this.mover.scales.x, normal: 0.05 * sigma * (area ?? 1) }[kind];
+    const size = this.size.value ? parse(this.size.value.replace(/^×\s*/, ""), unit, unit) : usual;
+    if (!(until > 0)) throw new Error("the length of a run is above 0 s");
+    if (kind === "velocity" && !(size > 0)) throw new Error("the velocity is multiplied by a number above 0");
+    this.size.placeholder = kind === "velocity" ? "× 2" : shown(usual, unit, 3);
+    this.length.placeholder = shown(12 * scale, "s", 3);
+    return { size: kind === "normal" ? size / (area ?? 1) : size, at: until / 20, until };
+  }
+
+  words({ events, status, end, v }) {
+    if (status === "blow-up") return `It runs away at ${shown(end, "s")}: neither mass nor damping limits the velocity.`;
+    const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${status}.`;
+    if (!events.length) return `No slip event; velocity ${shown(v.reduce((a, b) => Math.min(a, b)), "m/s", 3)} to ${shown(v.reduce((a, b) => Math.max(a, b)), "m/s", 3)}.${ended}`;
+    const last = events[events.length - 1], before = events[events.length - 2];
+    const every = before ? `, the last two ${shown(last.begin - before.begin, "s", 3)} apart` : "";
+    return `${events.length} slip event${events.length > 1 ? "s" : ""}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, stress drop ${this.quantity(last.drop, "Pa")}.${ended}`;
+  }
+
+  showMotion() {
+    if (!this.course) return;
+    const { until } = this.course, most = 1e6 * this.mover.drive, fast = this.course.status === "blow-up" ? this.course.v.findIndex((one) => one > most) : -1;
+    const [times, v, tau, sigma] = [this.course.times, this.course.v, this.course.tau, this.course.sigma].map((all) => (fast < 0 ? all : all.subarray(0, fast)));
+    const { left, width } = this.box, { area } = this.rig.data, high = 105;
+    const friction = tau.map((one, i) => one / sigma[i]), spread = sigma.reduce((a, b) => Math.max(a, b)) / sigma.reduce((a, b) => Math.min(a, b)) - 1;
+    const series = [[v, "m/s", "velocity"], [friction, "1", "friction"]];
+    if (spread > 1e-6) series.push([sigma.map((one) => one * (area ?? 1)), area === null ? "Pa" : "N", area === null ? "normal stress" : "normal force"]);
+    const parts = series.map(([values, unit, label], n) => strip({ left, width, top: 8 + n * (high + 14), height: high }, times, values, until, unit, label, n === series.length - 1));
+    this.strips.setAttribute("viewBox", `0 0 ${left + width + 14} ${8 + series.length * (high + 14) + 40}`);
+    this.strips.setAttribute("aria-label", `velocity and friction over time: ${this.told.textContent}`);
+    this.strips.replaceChildren(...parts);
+  }
+
   // -- what leaves the page
 
   link() {
@@ -455,7 +568,7 @@ class Page {
   }
 }
 
-/** Fill an element with the page of one rig. @param {HTMLElement} root @param {any} data @param {any} programs */
-export function mount(root, data, programs) {
-  return new Page(root, data, programs);
+/** Fill an element with the page of one rig. @param {HTMLElement} root @param {any} data @param {any} programs @param {any} machine @param {any} driver */
+export function mount(root, data, programs, machine, driver) {
+  return new Page(root, data, programs, machine, driver);
 }

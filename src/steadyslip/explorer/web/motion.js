@@ -1,0 +1,121 @@
+// What a rig does after a disturbance: the generated kernel under the transpiled driver, in slices, so that it can be
+// stopped. Settings are those of steadyslip/motion/jobs.py, scales those of steadyslip/model/scales.py.
+import { zeros } from "../../kernels/printers/runtime.js";
+
+const SLICE = 2000, MOST_STEPS = 100000;
+/** @type {Record<string, string>} */
+export const DISTURBANCES = { velocity: "step of the drive velocity", push: "push of the load point", normal: "step of the normal stress" };
+
+/** The sizes that matter in steady sliding: of slip, velocity variable and memory, and of the unknown. */
+function scales(facts, found, drive) {
+  const many = facts.memory.length, [direct, bySlip, byUnknown] = found, size = Math.abs(direct);
+  const byMemory = found.slice(3, 3 + many), decay = found.slice(3 + many, 3 + 2 * many), memory = found.slice(3 + 2 * many);
+  const distances = [...decay.map((rate) => drive / Math.abs(rate)), size / Math.abs(bySlip)].filter((d) => Number.isFinite(d) && d > 0);
+  const x = distances.length ? Math.min(...distances) : Math.abs(drive), w = facts.linear ? drive : 1;
+  const of = new Map([["x", x], ["w", w], ...facts.memory.map((name, i) => {
+    const weight = size / Math.abs(byMemory[i]), own = Math.abs(memory[i]);
+    const scale = Number.isFinite(weight) && weight > 0 ? weight : own > 0 ? own : 1;
+    return [name, own > 0 ? Math.min(scale, Math.max(own, scale * 1e-3)) : scale];
+  })]);
+  const sizes = facts.names.map((name, i) => (facts.kinds[i] === "integral" ? (x * x) / drive : of.get(name)));
+  const share = facts.eliminated === null ? 1 : Math.abs(byMemory[facts.eliminated] / direct);
+  return { x, sizes, unknown: facts.inertial ? (drive * drive) / x : w, posed: byUnknown > 0, share };
+}
+
+export class Motion {
+  /** @param {any} machine @param {any} facts @param {any} driver */
+  constructor(machine, facts, driver) {
+    this.machine = machine;
+    this.facts = facts;
+    this.driver = driver;
+    this.R = new Float64Array(facts.parameters.length + 1);
+    this.y = new Float64Array(Math.max(facts.constants, 3 + 3 * facts.memory.length, facts.kept + 1) + 1);
+  }
+
+  ask(name, many) {
+    this.machine[name](this.R, 0, this.y);
+    return Array.from(this.y.subarray(0, many));
+  }
+
+  /** Parameters and steady normal stress. @param {ArrayLike<number>} values @param {number} sigma */
+  set(values, sigma) {
+    this.R.set(values);
+    this.R[this.R.length - 1] = sigma;
+    this.drive = this.R[this.facts.parameters.indexOf("drive.velocity")];
+    this.scales = scales(this.facts, this.ask("weights", 3 + 3 * this.facts.memory.length), this.drive);
+    return this;
+  }
+
+  /** Why the rig cannot be moved at these values; empty if it can. */
+  refusal() {
+    if (!this.scales.posed) return "the motion is ill-posed here";
+    if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";
+    return "";
+  }
+
+  /** The arrays that the driver takes: constants, start, settings, segments. */
+  tables(disturbance, size, at, until) {
+    const { facts, scales: own } = this, sigma = this.R[this.R.length - 1], constants = zeros(1, facts.all);
+    constants[0].set(this.ask("constants", facts.constants));
+    const found = this.ask("start", facts.kept + 1), start = zeros(1, facts.kept), many = facts.settings.ATOL;
+    start[0].set(found.slice(0, facts.kept));
+    const settings = zeros(1, many + facts.names.length), given = {
+      RTOL: facts.rtol, MOST_STEPS, V_HIGH: this.drive * facts.blowUp, V_LOW: this.drive * facts.arrest,
+      SIGMA_LOW: facts.contactShare * sigma, WATCH: 1, RECORD: 1, GUESS: facts.inertial ? 0 : found[facts.kept],
+      Z_SCALE: own.unknown, FIRST_STEP: own.x / this.drive, V_DRIVE: this.drive,
+    };
+    for (const [name, value] of Object.entries(given)) settings[0][facts.settings[name]] = value;
+    own.sizes.forEach((scale, i) => (settings[0][many + i] = facts.rtol * scale));
+    const segments = zeros(1, 2, 9), v = disturbance === "velocity" ? this.drive * size : this.drive;
+    segments[0][0].set([0, at, 0, this.drive, 0, 0, 0, 0, 0]);
+    segments[0][1].set([at, until, disturbance === "push" ? size : 0, v, 0, disturbance === "normal" ? size : 0, 0, 0, 0]);
+    return [constants, start, settings, segments];
+  }
+
+  /**
+   * Move the rig, slice by slice; what there is when `stopped` says so, or at the end.
+   * @param {string} disturbance @param {number} size @param {number} at @param {number} until
+   * @param {() => boolean} stopped
+   */
+  async run(disturbance, size, at, until, stopped) {
+    const { facts, machine, driver } = this, { layout, routines } = machine, c = facts.cursor;
+    const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows);
+    cursor[c.LAST_JOB] = cursor[c.BUSY] = 1;
+    cursor[c.PAUSED] = -1;
+    const out = [zeros(1), zeros(1, facts.final + facts.names.length), zeros(1, facts.tally), zeros(1, 0, facts.names.length)];
+    const log = zeros(64, facts.logged), recorded = zeros(1024, 2 + facts.names.length), ids = zeros(1);
+    for (;;) {
+      const reason = driver.advance(layout, routines, S, ids, cursor, ...tables, zeros(0), ...out, log, recorded, SLICE);
+      if (reason === 0) break;
+      if (reason === 1) {
+        log.push(...zeros(log.length, facts.logged));
+        recorded.push(...zeros(recorded.length, 2 + facts.names.length));
+      } else {
+        await new Promise((resolve) => setTimeout(resolve));
+        if (stopped()) return null;
+      }
+    }
+    return this.observed(tables, recorded.slice(0, cursor[c.RECORDED]), log.slice(0, cursor[c.LOGGED]), out);
+  }
+
+  /** Series over time, slip events and how it ended. */
+  observed(tables, recorded, log, out) {
+    const { facts, machine } = this, many = recorded.length, o = facts.out;
+    const states = recorded.map((row) => row.subarray(2)), own = zeros(many), values = zeros(8 + facts.kept, many);
+    const segment = Float64Array.from(recorded, (row) => row[1]), times = Float64Array.from(recorded, (row) => row[0]);
+    states.shape = [many, facts.names.length];
+    const [constants, , settings, segments] = tables;
+    this.driver.observe(machine.layout, machine.routines, constants, settings, segments, states, own, segment, times, values);
+    const events = [], { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind;
+    let open = null;
+    for (const [kind, time, v, , , stress] of Array.from(log).sort((a, b) => a[1] - b[1])) {
+      if (kind === SLIP_BEGINS) open = { begin: time, peak: v, stress };
+      else if (open && kind === PEAK) open.peak = Math.max(open.peak, v);
+      else if (open && kind === SLIP_ENDS) {
+        events.push({ begin: open.begin, end: time, peak: open.peak, drop: open.stress - stress });
+        open = null;
+      }
+    }
+    return { times, v: values[o.V], sigma: values[o.SIGMA], tau: values[o.TAU], events, status: facts.statuses[out[0][0]], end: out[1][0][0] };
+  }
+}

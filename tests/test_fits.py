@@ -136,6 +136,12 @@ def test_every_lane_solves_its_own_problem():
     np.testing.assert_allclose(held.coordinates[:, 1], start[:, 0] ** 2, rtol=1e-5, atol=1e-7)
 
 
+def test_no_problems_have_no_minima():
+    found = minimise(lambda z, _: 1 / 0, np.empty((0, 3)), np.full(3, -1.0), np.full(3, 1.0))
+    assert found.coordinates.shape == (0, 3)
+    assert found.distinct(2)[0].shape == (0, 3)
+
+
 def test_a_problem_that_cannot_be_computed_is_left_alone():
     def broken(z, _):
         r = np.where(z[:, :1] > 0, z - 1.0, np.nan)

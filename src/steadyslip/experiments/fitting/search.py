@@ -141,6 +141,7 @@ class _Search:
     def polished(self) -> Minima:
         """The best of the promising brought to their end on all samples, the best first."""
         begin = self.best.coordinates if self.few is self.whole else self.best.distinct(NEAREST)[0]
+        begin = begin if len(begin) else self.rough.sorted().coordinates[:1]
         found = self._on_all(begin)
         inside = _released(self.whole.space, found.coordinates[0], self.low, self.high)
         return (found + self._refined(inside)).sorted() if len(inside) else found

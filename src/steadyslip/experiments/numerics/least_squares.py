@@ -112,6 +112,8 @@ def minimise(
         Called after every iteration with what is known by then.
     """
     count, size = start.shape
+    if not count:
+        return Minima.at(start)
     z = np.clip(start, low, high)
     held = np.zeros((count, size), dtype=bool) if held is None else held
     everyone = np.arange(count)

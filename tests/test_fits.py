@@ -142,6 +142,21 @@ def test_no_problems_have_no_minima():
     assert found.distinct(2)[0].shape == (0, 3)
 
 
+def test_steps_that_follow_each_other_along_one_line_are_stretched():
+    """The textbook's case of Gauss and Newton's slow way: residuals x + 1 and λx² + x − 1, each step λ of the last."""
+    pace = np.array([0.5, 0.9, 0.97])
+
+    def textbook(z, lanes):
+        x, share = z[:, 0], pace[lanes]
+        slopes = np.stack([np.ones_like(x), 2 * share * x + 1], axis=1)
+        return np.stack([x + 1, share * x**2 + x - 1], axis=1), -slopes[:, None, :]
+
+    found = minimise(textbook, np.full((3, 1), 0.1), np.array([-1.0]), np.array([1.0]), most=300)
+    assert np.all(found.converged)
+    np.testing.assert_allclose(found.ssq, 2.0, rtol=1e-8)
+    assert np.all(found.iterations < 20)  # 13, 58 and 131 one by one
+
+
 def test_a_problem_that_cannot_be_computed_is_left_alone():
     def broken(z, _):
         r = np.where(z[:, :1] > 0, z - 1.0, np.nan)

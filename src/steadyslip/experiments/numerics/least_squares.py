@@ -18,6 +18,8 @@ CONVERGED = 1e-10  # reduction of the sum of squares that is still to be had, as
 STALLED = 1e-7  # the same, where no step succeeds any more: below this the sum is at its rounding
 STILL = 1e-9  # the same, of a step however short that failed: at a kink, no direction leads down
 MOST_RAISED = 64.0  # times the damping rises from one step that fails to the next
+ALONG = 0.95  # cosine of the angle between two steps along one line
+MOST_SHARE = 0.95  # of the step before that a step may be: it is stretched up to twenty times
 HOPE = 2.0  # times the best sum of squares: rough minima beyond have no chance
 NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
@@ -124,6 +126,7 @@ def minimise(
     found.ssq[:] = ssq
     damping, raised, scale = np.full(count, 1e-2), np.full(count, 2.0), np.zeros((count, size))
     stuck = np.zeros(count, dtype=bool)
+    last, plain = np.zeros((count, size)), np.zeros(count, dtype=bool)  # the step before, if it was not stretched
     earlier = ssq.copy()
     active = everyone[np.isfinite(ssq)]
     keep = np.isfinite(ssq)
@@ -153,6 +156,8 @@ def minimise(
             if not len(active):
                 break
         step = _step(normal, gradient, free, damping[active], scale[active])
+        stretch = _stretch(step, last[active], scale[active]) * plain[active]
+        step *= np.maximum(stretch, 1.0)[:, None]
         step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
         trial = np.clip(z + step, low, high)
         hoped, expected = _expected(normal, gradient, step), _expected(normal, gradient, trial - z)
@@ -162,10 +167,12 @@ def minimise(
         good = after < found.ssq[active]
         with np.errstate(all="ignore"):
             ratio = np.where(expected > 0, (found.ssq[active] - after) / expected, 0.0)
-        stuck[active] = ~good & (hoped <= STILL * found.ssq[active])
-        factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), raised[active])
+        tried = ~good & (stretch > 1)  # in vain, which says nothing of the step itself
+        stuck[active] = ~good & ~tried & (hoped <= STILL * found.ssq[active])
+        factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), np.where(tried, 1.0, raised[active]))
         damping[active] = np.clip(damping[active] * factor, 1e-12, None)
-        raised[active] = np.where(good, 2.0, np.minimum(2 * raised[active], MOST_RAISED))
+        raised[active] = np.where(good | tried, 2.0, np.minimum(2 * raised[active], MOST_RAISED))
+        last[active], plain[active] = trial - z, good & (stretch <= 1)
         better = active[good]
         found.coordinates[better], found.ssq[better] = trial[good], after[good]
         found.iterations[active] = iteration
@@ -173,6 +180,17 @@ def minimise(
         if told is not None:
             told(found)
     return found
+
+
+def _stretch(step: Array, last: Array, scale: Array) -> Array:
+    """How much longer steps may be where they follow each other along one line, each the same share of the last.
+
+    Far from a perfect fit steps shrink by a constant factor: their sum is one step, divided by one less that factor.
+    """
+    both, own, other = (np.einsum("mi,mi,mi->m", a, b, scale) for a, b in ((step, last), (step, step), (last, last)))
+    with np.errstate(all="ignore"):
+        share, straight = both / other, both / np.sqrt(own * other)
+    return np.where((straight > ALONG) & (share < 1), 1 / (1 - np.clip(share, 0.0, MOST_SHARE)), 1.0)
 
 
 def _squares(r: Array) -> Array:

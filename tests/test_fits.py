@@ -516,7 +516,7 @@ def test_sepiolite_strengthens():
     fit = ss.fit(ss.lab_rig("aging"), ss.read_record(SEPIOLITE), trend=2)
     assert fit.search.converged
     assert fit["b"].high < 0
-    assert fit.ssq == pytest.approx(1.5890e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
+    assert fit.ssq == pytest.approx(1.5842e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
     assert 0.7 < fit.noise[0].lag1 < 0.9
 
 

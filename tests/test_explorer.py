@@ -213,7 +213,7 @@ def moved_on_a_page(own, kind, until):
     kept = [name for name in present_zeros(own) if name not in facts["missing"]]
     point = operating_point(own, None, kept)
     run = "motion.set(values, sigma).run(kind, size, 1, until, () => false).then((r) => (found = r))"
-    asked = f"({run}, motion.refusal())"
+    asked = f"({run}, motion.refusal(kind))"
     values = [float(value) for value in point.arguments]
     assert script(asked, values=values, sigma=float(point.sigma), kind=kind, size=DISTURBED[kind][0], until=until) == ""
     return script("found")
@@ -239,3 +239,11 @@ def test_a_page_moves_as_python_does(name, kind):
         there = np.interp(when, runs[0]["t"], runs[0][theirs])
         truth = np.interp(when, runs[1]["t"], runs[1][theirs])
         assert np.all(np.abs(here - there) <= 10 * np.abs(there - truth) + 1e-2 * np.abs(truth))
+
+
+def test_a_push_through_a_dashpot_is_refused_as_in_python():
+    own = rig(damping=1e6)
+    with pytest.raises(ss.ParameterError, match="infinite force"):
+        ss.simulate(own, DISTURBED["push"][1], until=2.0)
+    with pytest.raises(AssertionError, match="infinite force"):
+        moved_on_a_page(own, "push", 2.0)

@@ -58,9 +58,10 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
         program(model, "constants", list(kernel.constants.symbols)),
         program(model, "weights", weighed(model)),
         program(model, "start", _start(reduction)),
+        program(model, "dashpot", [-sp.diff(model.definitions[model.contact.spring], model.contact.velocity)]),
     ]
     functions = "".join(javascript.text(one) for one in programs)
-    text = f"(() => {{\n{functions}return {{ constants, weights, start, ...{kernel_text} }};\n}})()"
+    text = f"(() => {{\n{functions}return {{ constants, weights, start, dashpot, ...{kernel_text} }};\n}})()"
     return text, _facts(reduction, kernel, eliminate, set(present_zeros(rig)) - set(kept))
 
 

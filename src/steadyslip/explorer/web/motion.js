@@ -46,8 +46,9 @@ export class Motion {
     return this;
   }
 
-  /** Why the rig cannot be moved at these values; empty if it can. */
-  refusal() {
+  /** Why the rig cannot be moved so at these values; empty if it can. @param {string} disturbance */
+  refusal(disturbance) {
+    if (disturbance === "push" && this.ask("dashpot", 1)[0] !== 0) return "a sudden push through a dashpot is an infinite force";
     if (!this.scales.posed) return "the motion is ill-posed here";
     if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";
     return "";

@@ -53,6 +53,7 @@ class Page {
 
   /** The parameter, other than one, whose edge is nearest: the first that a user will want to see. */
   urgent(besides) {
+    this.tracks = this.rig.data.parameters.map((_, i) => this.track(i));
     const edges = this.edges().filter((edge) => edge.i !== besides);
     return edges.length ? edges[0].i : besides === 0 ? 1 : 0;
   }
@@ -295,11 +296,10 @@ class Page {
     const found = [];
     this.rig.data.parameters.forEach((one, i) => {
       const scale = this.scale(i), value = this.rig.values[i];
-      const cuts = this.track(i).slice(0, -1).map((part, n, all) => ({ part, next: n }));
-      const parts = this.track(i);
+      const parts = this.tracks[i];
       let best = null;
-      cuts.forEach(({ part, next }) => {
-        const at = scale.at(part.to), other = parts[next + 1].status, away = at > value;
+      parts.slice(0, -1).forEach((part, n) => {
+        const at = scale.at(part.to), other = parts[n + 1].status, away = at > value;
         const beyond = away ? other : part.status, distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
         const landing = scale.at(Math.min(1, Math.max(0, part.to + (away ? 1e-4 : -1e-4))));
         if (best === null || distance < best.distance || (!value && at < best.at)) best = { i, at, distance: value ? distance : 1e6, beyond, landing };
@@ -311,6 +311,7 @@ class Page {
 
   redraw() {
     const answer = (this.answer = this.rig.assess());
+    this.tracks = this.rig.data.parameters.map((_, i) => this.track(i));
     this.showVerdict(answer);
     this.rig.data.parameters.forEach((one, i) => this.showRow(one, i));
     this.showChart();
@@ -396,7 +397,7 @@ class Page {
       fault.textContent = "";
     }
     name.classList.toggle("changed", !Object.is(value, one.value));
-    const stops = this.track(i).flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));
+    const stops = this.tracks[i].flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));
     slider.style.setProperty("--track", `linear-gradient(to right, ${stops.join(", ")})`);
   }
 
@@ -406,7 +407,7 @@ class Page {
     const others = this.rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...this.ranges[i], ...this.ranges[j]).join();
     if (others !== this.painted) { // the point alone may move: then the regions stay
       this.painted = others;
-      const rows = this.sliding || !this.rig.data.facts.affine ? 36 : 60;
+      const rows = this.sliding || !this.rig.data.facts.affine ? 24 : 60;
       const { paths, outline } = regions((a, b) => this.rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
       const inner = svg("g", { transform: `translate(${box.left} ${box.top})` });
       for (const [name, path] of Object.entries(paths)) inner.append(svg("path", { class: `region ${name}`, d: path }));
@@ -490,10 +491,9 @@ class Page {
     if (answer.status === ABSENT || answer.status === UNKNOWN) return "there is no steady sliding to start from";
     const added = motion.missing.find((name) => own(name) > 0);
     if (added) return `the rig of the file has no ${added}; write it there, and make the page anew`;
-    if (this.disturbance.value === "push" && ["slider.damping", "drive.kd"].some((name) => own(name) > 0)) return "a sudden push through a dashpot is an infinite force";
     const model = Array.from(this.rig.set(this.rig.values).R);
     mover.set(motion.parameters.map((name) => model[facts.parameters.indexOf(name)]), answer.sigma);
-    return mover.refusal();
+    return mover.refusal(this.disturbance.value);
   }
 
   /** Size, begin and length as they stand in the fields, or what shows most. */

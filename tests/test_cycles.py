@@ -18,7 +18,7 @@ from steadyslip.files.specifications import read_rig
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.kicks.spans import constant_inputs
-from steadyslip.nonlinear.orbits import flow as flow_module
+from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_module
 from steadyslip.nonlinear.orbits.cycle import SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, Runs
 from steadyslip.nonlinear.orbits.measure import measured
@@ -714,3 +714,13 @@ def test_auto_itself_agrees(tmp_path):
     for ratio, period in found.items():
         (cycle,) = branch.at(ratio * branch.onset.value)
         assert cycle.period == pytest.approx(period, rel=1e-8)
+
+
+def test_work_is_bounded_and_what_it_found_is_kept(monkeypatch):
+    """A rig whose steps are tiny is not followed for minutes; as far as it goes, cycles are the same."""
+    whole = ss.cycles(unit_rig("slip", 0.5, 0.6), most_points=60)
+    monkeypatch.setattr(tracer_module, "MOST_STEPS", 20_000)
+    part = ss.cycles(unit_rig("slip", 0.5, 0.6), most_points=60)
+    assert 0 < len(part) < len(whole)
+    assert part.end.startswith("0.02 million steps of integration taken")
+    assert [cycle.period for cycle in part] == [cycle.period for cycle in whole][: len(part)]

@@ -99,6 +99,8 @@ class Runs:
         Their natural sizes, at the rig's own parameter.
     time : float
         Natural time, s.
+    steps : int
+        Taken so far, with sensitivities.
 
     Raises
     ------
@@ -120,6 +122,7 @@ class Runs:
         self.finest = self.noise / self.options.rtol
         self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
         self.sensitive = _with_sensitivities(self.reduction, method)
+        self.steps = 0
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
         own = jobs.point.part(slice(which, which + 1))
         inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
@@ -200,6 +203,7 @@ class Runs:
         tables = (constants, np.ascontiguousarray(initial), settings, _rows(inputs, times))
         call = Call(machine, tables, len(times), np.empty(0))
         call.go(2**62)
+        self.steps += int(np.nansum(call.final[:, 2:4]))
         if np.any(call.status != DONE):
             raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
         return call.final[:, 4:]

@@ -27,6 +27,7 @@ CREEP = 60  # so many steps without growing, below a thousandth of the largest, 
 STANDING = 12  # so many cycles within a twentieth of each other, at one value but for rounding, are no progress
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
 TOO_UNSTABLE = 1e8
+MOST_STEPS = 15_000_000  # of integration for all sheets of a question: some ten seconds
 LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
 LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
 INTERRUPTED = "interrupted by the user"
@@ -200,6 +201,10 @@ class Tracer:
                     break
                 if len(sheet.known) >= self.most:
                     sheet.end = f"most_points = {self.most} reached"
+                    break
+                if self.flow.steps > MOST_STEPS:
+                    sheet.end = f"{MOST_STEPS / 1e6:g} million steps of integration taken, all that are spent "
+                    sheet.end += "on one question; ask for the rest with between=(low, high)"
                     break
             lost = {ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
             lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}

@@ -205,7 +205,7 @@ def _disturbance(analysis: Findings) -> str:
     if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
         text += f", oscillating with period {shown(analysis.period, 's')}"
         return text if analysis.on_edge else f"{text} (damping ratio {analysis.damping_ratio:.3g})"
-    return f"{text} without oscillating"
+    return text if analysis.on_edge else f"{text} without oscillating"
 
 
 def _stable_set(analysis: Findings) -> str:

@@ -17,6 +17,8 @@ def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
     if not equals or not name or not raw:
         return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = full_name(name, tables)
+    if problems:  # written into the tables it would be a fault of theirs, too
+        return problems
     *path, last = full.split(".")
     table: Any = tables
     for step in path:
@@ -26,17 +28,17 @@ def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
         elif isinstance(table, dict):
             table = table.setdefault(step, {})
         if not isinstance(table, (dict, list)):
-            return [*problems, Problem(name, "cannot be set: there is no such table in the file")]
+            return [Problem(name, "cannot be set: there is no such table in the file")]
     if isinstance(table, list):
         message = "cannot be set: name one value of one member, such as friction.states.1.b"
-        return [*problems, Problem(name, message)]
+        return [Problem(name, message)]
     try:
         table[last] = value_of(raw, name)
     except ParameterError as error:
-        return [*problems, *error.problems]
+        return list(error.problems)
     for key in [key for key in lines if key == full]:  # the fault is no longer on that line
         del lines[key]
-    return problems
+    return []
 
 
 def split(text: str) -> tuple[str, str, str]:

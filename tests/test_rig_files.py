@@ -222,7 +222,7 @@ def test_changes_override_and_complete_the_file():
     ("change", "words"),
     [
         ("contact.angel=1", "did you mean 'angle'?"),
-        ("angel=1", "unknown table 'angel'"),
+        ("angel=1", "unknown parameter 'angel'"),
         ("contact.angle", "write NAME=VALUE"),
         ("contact.angle=", "write NAME=VALUE"),
         ("contact.angle=5 MPa", "wrong dimension"),

@@ -20,10 +20,14 @@ function run(machine, tables, times) {{
   const S = zeros(layout[30]), ids = zeros(1), cursor = zeros({len(Cursor)});
   cursor[{Cursor.LAST_JOB}] = 1; cursor[{Cursor.BUSY}] = 1; cursor[{Cursor.PAUSED}] = -1;
   const out = [zeros(1), zeros(1, {int(Final.STATE)} + size), zeros(1, {len(TALLY)}), zeros(1, times.length, size)];
-  const log = zeros(40000, {LOG_COLUMNS}), recorded = zeros(0, 2 + size);
+  const log = zeros(4000, {LOG_COLUMNS}), recorded = zeros(0, 2 + size);
   const t = zeros(times.length); t.set(times);
-  const reason = advance(layout, routines, S, ids, cursor, constants, initial, settings, segments, t, ...out, log,
-    recorded, 1e9);
+  let reason = 1;
+  while (reason === 1) {{ // the log is full
+    reason = advance(layout, routines, S, ids, cursor, constants, initial, settings, segments, t, ...out, log,
+      recorded, 1e9);
+    if (reason === 1) log.push(...zeros(log.length, {LOG_COLUMNS}));
+  }}
   return {{ reason, status: out[0], final: out[1], tally: out[2], samples: out[3],
     log: log.slice(0, cursor[{Cursor.LOGGED}]) }};
 }}

@@ -120,7 +120,8 @@ def odd(a, n):
             last += 1.0
     if a[0]:
         total = max(total, a[0])
-    return total % 7.0, min(last, math.nan), 0.0 < total <= 5.0, int(-2.5), float(3), abs(-total) ** 0.5, SMALL
+    most, least, size = max(last, total), min(last, total), abs(-total) ** 0.5
+    return total % 7.0, min(last, math.nan), most, least, 0.0 < total <= 5.0, int(-2.5), float(3), size, SMALL
 """
 
 

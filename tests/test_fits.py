@@ -645,9 +645,9 @@ def test_bad_records_are_named():
     record = lab.record(lab.rig(), lab.STEP, count=100)
     with pytest.raises(ss.ParameterError, match="no column for the load point"):
         ss.fit(ss.lab_rig(), ss.record_from_arrays(record.time, friction=record.friction))
-    held = lab.record(lab.rig(), lab.HOLD, count=400).between(70, 300)
-    with pytest.raises(ss.ParameterError, match="starts from steady sliding"):
-        ss.fit(ss.lab_rig(), held)
+    backward = ss.record_from_arrays(record.time, friction=record.friction, displacement=-record.displacement)
+    with pytest.raises(ss.ParameterError, match="does not move forward"):
+        ss.fit(ss.lab_rig(), backward)
     flat = ss.record_from_arrays(record.time, friction=np.full(100, 0.9), displacement=record.displacement)
     with pytest.raises(ss.ParameterError, match=r"friction is 0\.9 in all samples"):
         ss.fit(ss.lab_rig(), flat)

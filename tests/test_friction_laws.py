@@ -102,7 +102,7 @@ def test_contract(law, check):
         (ONE | {"a": -0.01}, "a", "> 0"),
         ({"b": 0.016, "d_c": float("nan")}, "d_c", "> 0"),
         (ONE | {"mu_ref": True}, "mu_ref", "> 0"),
-        (ONE | {"evolution": "slip"}, "evolution", "allowed: a Evolution"),
+        (ONE | {"evolution": "slip"}, "evolution", "allowed: an Evolution"),
         (ONE | {"regularised": 1}, "regularised", "true or false"),
     ],
 )

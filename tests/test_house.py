@@ -56,7 +56,8 @@ def prose(tree):
 def test_only_laws_know_laws():
     """No class of a law imported, no parameter or private method of one used, no name of one compared."""
     classes, words, fields = laws_and_their_fields()
-    arguments = {("experiments/spec.py", name) for name in ("v_ref", "normal_memory")}  # of `lab_rig`, which makes a rig of the usual law
+    # arguments of `lab_rig`, which makes a rig of the usual law
+    arguments = {("experiments/spec.py", name) for name in ("v_ref", "normal_memory")}
     telling = {word for word in words | fields if {"_", "-"} & set(word)}  # others mean more than a law
     found = []
     for path, tree in trees().items():

@@ -185,7 +185,7 @@ def role_of(name: str, annotation: str) -> Role | None:
     if name in BY_WORD:
         return BY_WORD[name]
     plain = annotation.removesuffix(" | None")
-    if plain.startswith("Mapping["):
+    if plain.startswith("Mapping[") and " | " not in plain:
         return BY_NAME
     return Function() if plain.startswith("Callable[") else BY_ANNOTATION.get(plain)
 

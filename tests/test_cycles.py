@@ -723,3 +723,16 @@ def test_work_is_bounded_and_what_it_found_is_kept(monkeypatch):
     assert 0 < len(part) < len(whole)
     assert part.end.startswith("0.02 million steps of integration taken")
     np.testing.assert_array_equal(part["period"], whole["period"][: len(part)])
+
+
+def test_cycles_end_where_no_velocity_balances_the_forces():
+    """A pad that lifts with velocity, without mass: forces fold, and what lies beyond has no velocity to tell."""
+    friction = rate_state(evolution=ss.PRZ(), regularised=True)
+    lift = next(contact for contact in CONTACTS if contact.name == "lift")
+    branch = ss.cycles(
+        rig(friction=friction, contact=lift, stiffness=9e9, drive=ss.PD(1e-6, kp=2e10, kd=1e9)), doublings=0
+    )
+    assert branch.end == "the equations have no solution in part of the cycle"
+    assert len(branch) > 5
+    for name in ("peak_velocity", "lowest_velocity", "stress_drop"):
+        assert np.all(np.isfinite(branch[name]))

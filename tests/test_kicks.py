@@ -442,3 +442,14 @@ def test_random_kicks_equal_scipy(kind):
         assert found in (truth, "undecided") or truth == "?", str(case)
         told += found == truth
     assert told >= 2
+
+
+def test_where_the_balance_has_no_fold_no_state_is_at_one():
+    """Forces of a press with a controller rise with velocity everywhere; the answer has one entry a rig."""
+    press = next(contact for contact in CONTACTS if contact.name == "triaxial")
+    a_rig = rig(friction=rate_state(evolution=ss.PRZ(), regularised=True), contact=press, stiffness=9e9,
+                drive=ss.PD(1e-6, kp=2e10, kd=1e9))  # fmt: skip
+    jobs = prepare(a_rig, (), 1.0, {}, {}, Options())
+    assert jobs.reduction.unknown is not None
+    rest = rest_of(jobs, np.full(3, 1e-6), np.zeros(3))
+    assert at_fold(rest, rest.state).tolist() == [False] * 3

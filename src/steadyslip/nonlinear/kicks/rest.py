@@ -166,7 +166,7 @@ class Rest:
 
     def column(self, number: Any) -> Any:
         """A parameter as it broadcasts against (m, ...) arrays with one more axis."""
-        return number[:, None] if np.ndim(number) and len(number) > 1 else number
+        return number[:, None] if np.ndim(number) and len(number) != 1 else number
 
 
 def picked(array: Any, which: Array) -> Any:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.nonlinear.orbits.cycle import Cycle
+from steadyslip.nonlinear.orbits.flow import FlowFailure
 from steadyslip.nonlinear.orbits.shooting import Shooting
 
 Array = np.ndarray
@@ -42,7 +43,13 @@ class Measured:
 
 
 def measured(shooting: Shooting, u: Array) -> Measured:
-    """The cycle of some unknowns."""
+    """The cycle of some unknowns.
+
+    Raises
+    ------
+    FlowFailure
+        If the run meets states at which no velocity balances the forces.
+    """
     flow, orbit = shooting.flow, shooting.orbit(u)
     setting = flow.setting(orbit.value)
     trivial, others = shooting.multipliers(u)
@@ -62,6 +69,8 @@ def measured(shooting: Shooting, u: Array) -> Measured:
         if len(velocity) == 1:
             start = {name: float(seen[name][0]) for name in [v.name for v in flow.reduction.model.variables] + ["v"]}
     v, t, sigma = (np.concatenate(part) for part in (velocity, spring, normal))
+    if not np.all(np.isfinite([v, t, sigma])):  # forces do not balance at every state: the motion is none
+        raise FlowFailure("stuck")
     away = (np.vstack(back)[::-1] - orbit.states[0]) / np.hypot(flow.scales, orbit.states[0])
     same = np.flatnonzero(np.abs(away).max(axis=1) < SAME * shooting.amplitude)
     cycle = Cycle(

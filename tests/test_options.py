@@ -10,7 +10,7 @@ import lab_records as lab
 import steadyslip as ss
 from fuzz_rigs import judged
 from rigs_of_theory import rig
-from steadyslip.core.options import Numbers, checked, role_of
+from steadyslip.core.options import NUMBERS, checked, role_of
 
 VALUES = {
     "none": None, "text": "abc", "empty": "", "nan": float("nan"), "inf": float("inf"), "minus inf": -float("inf"),
@@ -127,7 +127,7 @@ def test_any_value_of_any_option(fitted, fresh):
 def test_a_default_given_by_name_is_allowed():
     """`until=None` means what leaving it out means: the end of the protocol."""
 
-    @checked(until=Numbers())
+    @checked(until=NUMBERS)
     def end_of(until: float | None = None) -> float | None:
         return until
 

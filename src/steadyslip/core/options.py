@@ -16,149 +16,56 @@ from steadyslip.core.errors import ParameterError, Problem, one
 from steadyslip.core.roles import Names, Option, Role, Text, Whole
 
 LARGEST = 1.7e308  # integers may be larger than any float
+MOST = 1e150  # whose square is finite
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 @dataclass(frozen=True)
-class Number(Role):
-    """A finite number above one and up to another; `closed`: from it on."""
+class Tested(Role):
+    """Whatever passes a test, and what that is in words."""
 
-    above: float
-    most: float = math.inf
-    closed: bool = False
-
-    def checked(self, value: Any) -> Any:
-        plain = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        if plain and (self.above < value or (self.closed and value == self.above)) and value <= min(self.most, LARGEST):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        end = "" if math.isinf(self.above) else f" {'from' if self.closed else 'above'} {self.above:g}"
-        return f"a finite number{end}" + (f", up to {self.most:g}" if math.isfinite(self.most) else "")
-
-
-@dataclass(frozen=True)
-class Numbers(Role):
-    """Numbers or arrays of them, at least one, up to `most` in size, so that their squares are finite."""
-
-    most: float = 1e150
+    words: str
+    passes: Callable[[Any], bool]
 
     def checked(self, value: Any) -> Any:
-        if type(value) is float and abs(value) <= self.most:
-            return value
-        try:
-            found = np.asarray(value)
-            good = found.dtype.kind in "iuf" and found.size > 0 and bool(np.all(np.abs(found) <= self.most))
-        except (TypeError, ValueError, OverflowError):
-            good = False
-        if not good:
+        if not self.passes(value):
             raise self.refused(value)
         return value
 
     def allowed(self) -> str:
-        return f"numbers, up to {self.most:g} in size"
+        return self.words
 
 
-class LowAndHigh(Role):
-    """Two values."""
+def finite(above: float, most: float = math.inf, *, closed: bool = False) -> Role:
+    """A finite number above one and up to another; `closed`: from it on."""
 
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, (tuple, list, np.ndarray)) and len(value) == 2:
-            return value
-        raise self.refused(value)
+    def passes(value: Any) -> bool:
+        plain = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+        return plain and (above < value or (closed and value == above)) and bool(value <= min(most, LARGEST))
 
-    def allowed(self) -> str:
-        return "two values, low and high"
-
-
-class ByName(Role):
-    """Values by name."""
-
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "a mapping of names to values"
+    least = "" if math.isinf(above) else f" {'from' if closed else 'above'} {above:g}"
+    return Tested(f"a finite number{least}" + (f", up to {most:g}" if math.isfinite(most) else ""), passes)
 
 
-class Several(Role):
-    """A list of whatever the function says."""
-
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, (list, tuple)):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "a list"
-
-
-class Flag(Role):
-    """A truth value."""
-
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, (bool, np.bool_)):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "True or False"
+def _all_numbers(value: Any) -> bool:
+    """At least one, of a size whose square is finite."""
+    if type(value) is float:
+        return abs(value) <= MOST
+    try:
+        found = np.asarray(value)
+        return found.dtype.kind in "iuf" and found.size > 0 and bool(np.all(np.abs(found) <= MOST))
+    except (TypeError, ValueError, OverflowError):
+        return False
 
 
-class Function(Role):
-    """Something to call."""
-
-    def checked(self, value: Any) -> Any:
-        if callable(value):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "a function"
-
-
-class Place(Role):
-    """The path of a file or folder."""
-
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, (str, os.PathLike)) and os.fspath(value):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "a path"
-
-
-class Content(Role):
-    """What a file says, which may be nothing."""
-
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, str):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "the text of a file"
-
-
-@dataclass(frozen=True)
-class Made(Role):
+def _made(names: str, maker: str) -> Role:
     """An object of one of some classes, by name, which `maker` gives."""
-
-    names: tuple[str, ...]
-    maker: str
-
-    def checked(self, value: Any) -> Any:
-        if any(kind.__name__ in self.names for kind in type(value).__mro__):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return f"{one(' or '.join(self.names))}, such as {self.maker} gives"
+    wanted = names.split(" | ")
+    return Tested(
+        f"{one(' or '.join(wanted))}, such as {maker} gives",
+        lambda value: any(kind.__name__ in wanted for kind in type(value).__mro__),
+    )
 
 
 def whole(least: int, most: int = 2**31) -> Whole:
@@ -168,15 +75,22 @@ def whole(least: int, most: int = 2**31) -> Whole:
 
 BRANCH, THREADS, SEED = whole(0, 1000), whole(1, 10_000), whole(0, 2**63)
 NAME, NAMES, SIGN = Text(""), Names(""), Option((1, -1), "")
-LOW_AND_HIGH, BY_NAME, SEVERAL = LowAndHigh(), ByName(), Several()
+NUMBERS = Tested(f"numbers, up to {MOST:g} in size", _all_numbers)
+LOW_AND_HIGH = Tested("two values, low and high", lambda v: isinstance(v, (tuple, list, np.ndarray)) and len(v) == 2)
+BY_NAME = Tested("a mapping of names to values", lambda value: isinstance(value, Mapping))
+SEVERAL = Tested("a list", lambda value: isinstance(value, (list, tuple)))
+FLAG = Tested("True or False", lambda value: isinstance(value, (bool, np.bool_)))
+FUNCTION = Tested("a function", callable)
+PLACE = Tested("a path", lambda value: isinstance(value, (str, os.PathLike)) and bool(os.fspath(value)))
+CONTENT = Tested("the text of a file", lambda value: isinstance(value, str))
 MAKERS = {
     "Slider": "read_rig", "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
     "Cycle": "cycles",
 }  # fmt: skip
-BY_WORD: dict[str, Role] = {"branch": BRANCH, "threads": THREADS, "workers": THREADS, "seed": SEED, "text": Content()}
+BY_WORD: dict[str, Role] = {"branch": BRANCH, "threads": THREADS, "workers": THREADS, "seed": SEED, "text": CONTENT}
 BY_ANNOTATION: dict[str, Role] = {
-    "bool": Flag(), "str": NAME, "Sequence[str]": NAMES, "str | Sequence[str]": NAMES, "Vary": BY_NAME,
-    "str | PathLike[str]": Place(), **{name: Made(tuple(name.split(" | ")), made) for name, made in MAKERS.items()},
+    "bool": FLAG, "str": NAME, "Sequence[str]": NAMES, "str | Sequence[str]": NAMES, "Vary": BY_NAME,
+    "str | PathLike[str]": PLACE, **{names: _made(names, maker) for names, maker in MAKERS.items()},
 }  # fmt: skip
 
 
@@ -187,7 +101,7 @@ def role_of(name: str, annotation: str) -> Role | None:
     plain = annotation.removesuffix(" | None")
     if plain.startswith("Mapping[") and " | " not in plain:
         return BY_NAME
-    return Function() if plain.startswith("Callable[") else BY_ANNOTATION.get(plain)
+    return FUNCTION if plain.startswith("Callable[") else BY_ANNOTATION.get(plain)
 
 
 def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:

@@ -183,7 +183,7 @@ def parse(text: str, expected: str) -> float:
     cleaned = text.translate(_MICRO).strip()
     match = _NUMBER.match(cleaned) if len(text) <= MOST_TEXT else None
     if match is None:
-        raise QuantityError(f"{came(text)} is not a number with a unit; write for example {example(expected)}")
+        raise QuantityError(f"{came(text)} is not {described(expected)}; write for example {example(expected)}")
     digits, name = match.group(), cleaned[match.end() :].strip()
     _, wanted = unit(expected)
     if not name:
@@ -293,7 +293,7 @@ _EXAMPLES = {
 def example(expected: str) -> str:
     """A quoted example of a quantity of this unit."""
     if expected == "1":
-        return "0.5 (a number without unit)"
+        return "0.5"
     return repr(_EXAMPLES.get(expected, f"1 {expected}"))
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
-from steadyslip.core.options import SEVERAL, Number, checked, whole
+from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
@@ -107,7 +107,7 @@ class Refined(ReadOnly):
         return draw(self, ax=ax)
 
 
-@checked(rounds=whole(1, MOST_ROUNDS), level=Number(-math.inf), compute=SEVERAL)
+@checked(rounds=whole(1, MOST_ROUNDS), level=finite(-math.inf), compute=SEVERAL)
 def refine(
     found: MapResult,
     rounds: int = 3,

@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Together, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.core.options import Number, Numbers, checked, whole
+from steadyslip.core.options import NUMBERS, checked, finite, whole
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
@@ -114,7 +114,7 @@ class Ensemble(ReadOnly):
 
 
 @checked(
-    until=Number(0), arrest=Number(0, 1, closed=True), times=Numbers(), rtol=Number(0, 0.1), most_steps=whole(1, 10**12)
+    until=finite(0), arrest=finite(0, 1, closed=True), times=NUMBERS, rtol=finite(0, 0.1), most_steps=whole(1, 10**12)
 )
 def simulate_many(
     rig: Slider,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import Number, Numbers, checked, whole
+from steadyslip.core.options import NUMBERS, checked, finite, whole
 from steadyslip.kernels.program import Program
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
@@ -25,7 +25,7 @@ from steadyslip.protocol.inputs import segment_of
 
 
 @checked(
-    until=Number(0), arrest=Number(0, 1, closed=True), times=Numbers(), rtol=Number(0, 0.1), most_steps=whole(1, 10**12)
+    until=finite(0), arrest=finite(0, 1, closed=True), times=NUMBERS, rtol=finite(0, 0.1), most_steps=whole(1, 10**12)
 )
 def simulate(
     rig: Slider,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.options import Number, checked, whole
+from steadyslip.core.options import checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range
 from steadyslip.core.records import resolve
@@ -177,7 +177,7 @@ def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str
     return f"from {condition} {whole} the mean changes by {change}"
 
 
-@checked(scale=Number(0, 100), count=whole(100, 10**6))
+@checked(scale=finite(0, 100), count=whole(100, 10**6))
 def population(
     fits: Mapping[str, Fit] | Sequence[Fit], names: Sequence[str] | None = None, *,
     conditions: str | Mapping[str, Sequence[float]] | None = None, scale: float = 1.0, count: int = 4000, seed: int = 0,

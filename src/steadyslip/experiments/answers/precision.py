@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.options import NAMES, Number, checked, whole
+from steadyslip.core.options import NAMES, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
@@ -74,7 +74,7 @@ class Precision(ReadOnly):
         return "\n".join(lines)
 
 
-@checked(free=NAMES, fixed=NAMES, noise=Number(0, 1e100), until=Number(0), samples=whole(2, 10**7), trend=whole(0, 20))
+@checked(free=NAMES, fixed=NAMES, noise=finite(0, 1e100), until=finite(0), samples=whole(2, 10**7), trend=whole(0, 20))
 def precision(
     rig: Slider, protocol: Any, *, free: Sequence[str] | None = None, fixed: Sequence[str] = (), noise: float = 2e-4,
     until: float | None = None, samples: int = SAMPLES, trend: int = 0,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from steadyslip.core.options import NAME, THREADS, Number, checked, whole
+from steadyslip.core.options import NAME, THREADS, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
@@ -103,7 +103,7 @@ class Profile(ReadOnly):
         return draw(self, ax=ax)
 
 
-@checked(reach=Number(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
+@checked(reach=finite(0, 1e6), count=whole(2, 10**5), threads=THREADS, name=NAME)
 def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads: int | None = None) -> Profile:
     """Profile of a parameter: all others fitted anew at each value, side by side.
 

@@ -15,6 +15,7 @@ from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
+from steadyslip.experiments.numerics.sampling import walked
 
 Array = np.ndarray
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
@@ -239,10 +240,6 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     NotAvailable
         If emcee is not installed.
     """
-    try:
-        import emcee
-    except ImportError as error:
-        raise NotAvailable("posterior sampling needs the package emcee; install steadyslip[lab]") from error
     comparison = fit.plan.comparison(threads)
     low, high = fit.bounds
     stretch = _stretch(fit)
@@ -261,10 +258,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     generator = np.random.default_rng(seed)
     width = np.sqrt(np.minimum(np.diag(fit.covariance), 0.25))
     begin = np.clip(fit.coordinates + 0.5 * width * generator.standard_normal((walkers, size)), low, high)
-    sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True)
-    sampler._random = np.random.RandomState(seed)
-    sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
-    time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+    sampler, time = walked(log_probability, begin, steps, seed, "posterior sampling")
     cut = {"discard": steps // 3, "thin": max(1, int(time / 2))}
     kept = sampler.get_chain(**cut).swapaxes(0, 1).reshape(-1, size)  # one walker after another
     probable = sampler.get_log_prob(**cut).T.ravel()

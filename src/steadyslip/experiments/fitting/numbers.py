@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
-from steadyslip.core.options import Number, checked
+from steadyslip.core.options import checked, finite
 from steadyslip.core.quantities import shown, shown_error, shown_range
 from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly, read_only
@@ -161,7 +161,7 @@ class FitNumbers(ReadOnly):
         deviation = np.sqrt(np.diag(self.covariance)) * self.space.slopes(self.coordinates)
         return {name: float(error) for name, error in zip(self.names, deviation, strict=True)}
 
-    @checked(level=Number(0, 1))
+    @checked(level=finite(0, 1))
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
         """Interval of a parameter; of a positive one symmetric in its logarithm.
 

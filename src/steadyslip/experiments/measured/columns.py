@@ -202,7 +202,8 @@ def _as_given(
     elif isinstance(value, (tuple, list)) and len(value) == 2:
         value, stated = value
     if stated is not None and (not isinstance(stated, str) or known_unit(stated) is None):
-        return None, None, f"got unit {stated!r}; allowed: a unit such as that of {example(ROLES[role])}"
+        wanted = ROLES[role]
+        return None, None, f"got unit {stated!r}; allowed: that of {described(wanted)}, such as {example(wanted)}"
     if value is None:
         return None, stated, None
     if isinstance(value, int) and not isinstance(value, bool):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable
+from steadyslip.experiments.numerics.sampling import walked
 
 Array = np.ndarray
 LEAST = -16.0  # logarithm of a spread, in units of the prior: below, it is none
@@ -108,10 +108,6 @@ def pooled(told: list[Told], size: int, scale: Array, count: int, seed: int) -> 
     NotAvailable
         If emcee is not installed.
     """
-    try:
-        import emcee
-    except ImportError as error:
-        raise NotAvailable("a population needs the package emcee; install steadyslip[lab]") from error
 
     def log_probability(u: Array) -> Array:
         found = np.full(len(u), -np.inf)
@@ -123,11 +119,8 @@ def pooled(told: list[Told], size: int, scale: Array, count: int, seed: int) -> 
 
     generator = np.random.default_rng(seed)
     walkers = max(WALKERS, 2 * size + 2)
-    sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True)
-    sampler._random = np.random.RandomState(seed % 2**32)
     begin = np.log(_scatter(told, size, scale) / scale) + 0.5 * generator.standard_normal((walkers, size))
-    sampler.run_mcmc(np.clip(begin, LEAST + 1, 3.0), STEPS, skip_initial_state_check=True)
-    time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+    sampler, time = walked(log_probability, np.clip(begin, LEAST + 1, 3.0), STEPS, seed, "a population")
     kept = sampler.get_chain(discard=BURN).reshape(-1, size)
     spread = scale * np.exp(kept[generator.choice(len(kept), count, replace=len(kept) < count)])
     return _given(told, spread, time, generator)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import BRANCH, NAME, THREADS, Number, Numbers, checked
+from steadyslip.core.options import BRANCH, NAME, NUMBERS, THREADS, checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
@@ -71,9 +71,9 @@ class Basin(ReadOnly):
 
 
 @checked(
-    x=Numbers(),
-    v=Numbers(),
-    rtol=Number(0, 0.1),
+    x=NUMBERS,
+    v=NUMBERS,
+    rtol=finite(0, 0.1),
     threads=THREADS,
     branch=BRANCH,
     along=NAME,
@@ -157,7 +157,7 @@ def _unstable_cycles(rig: Slider, along: str, branch: int, progress: bool | None
     return tuple(orbit(rig, cycle) for cycle in found.at(own) if not cycle.stable)
 
 
-@checked(periods=Number(0, 1e4))
+@checked(periods=finite(0, 1e4))
 def orbit(rig: Slider, cycle: Cycle, periods: float = 1.0) -> History:
     """A cycle as a history, for drawing: simulated from its start.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, Number, checked
+from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, checked, finite
 from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
@@ -46,8 +46,8 @@ class Brackets:
 
 
 @checked(
-    precision=Number(1e-13, 0.1),
-    rtol=Number(0, 0.1),
+    precision=finite(1e-13, 0.1),
+    rtol=finite(0, 0.1),
     threads=THREADS,
     branch=BRANCH,
     kick=NAME,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import BRANCH, NAME, SIGN, Number, checked
+from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_states
@@ -114,8 +114,8 @@ class Threshold:
 
 
 @checked(
-    precision=Number(0, 0.1),
-    rtol=Number(0, 0.1),
+    precision=finite(0, 0.1),
+    rtol=finite(0, 0.1),
     branch=BRANCH,
     kick=NAME,
     reference=NAME,
@@ -342,7 +342,7 @@ class KickMargin:
                 "threshold": self.threshold.to_dict()}  # fmt: skip
 
 
-@checked(precision=Number(0, 0.1), branch=BRANCH)
+@checked(precision=finite(0, 0.1), branch=BRANCH)
 def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
     """Distance of an expected disturbance from the smallest that is not survived, and what comes of itself.
 

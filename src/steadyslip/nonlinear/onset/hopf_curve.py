@@ -14,7 +14,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import Number, checked
+from steadyslip.core.options import checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range
 from steadyslip.core.results import ReadOnly
@@ -107,7 +107,7 @@ class HopfCurve(ReadOnly):
         return "\n".join(lines)
 
 
-@checked(spacing=Number(1e-4, 10, closed=True))
+@checked(spacing=finite(1e-4, 10, closed=True))
 def hopf_curve(
     rig: Slider,
     first: str,

@@ -9,7 +9,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.options import BRANCH, LOW_AND_HIGH, NAME, Number, checked, whole
+from steadyslip.core.options import BRANCH, LOW_AND_HIGH, NAME, checked, finite, whole
 from steadyslip.core.quantities import shown
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure
@@ -24,10 +24,10 @@ Array = np.ndarray
 
 
 @checked(
-    amplitude=Number(0, 0.1),
+    amplitude=finite(0, 0.1),
     most_points=whole(1),
     doublings=whole(0, 100),
-    rtol=Number(0, 0.1),
+    rtol=finite(0, 0.1),
     between=LOW_AND_HIGH,
     branch=BRANCH,
     along=NAME,

@@ -1,0 +1,45 @@
+"""Walkers that sample a probability density, by emcee; the one place that knows the package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+
+Array = np.ndarray
+
+
+def walked(log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str) -> tuple[Any, float]:
+    """Let walkers go.
+
+    Parameters
+    ----------
+    log_density : callable
+        Points (m, p) to logarithms of the density (m,), up to a constant.
+    begin : ndarray (walkers, p)
+    steps : int
+    seed : int
+    what : str
+        Needs the package, where it is missing.
+
+    Returns
+    -------
+    emcee.EnsembleSampler, float
+        With the chains, and the longest autocorrelation time in steps.
+
+    Raises
+    ------
+    NotAvailable
+        If emcee is not installed.
+    """
+    try:
+        import emcee
+    except ImportError as error:
+        raise NotAvailable(f"{what} needs the package emcee; install steadyslip[lab]") from error
+    sampler = emcee.EnsembleSampler(*begin.shape, log_density, vectorize=True)
+    sampler._random = np.random.RandomState(seed % 2**32)
+    sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
+    return sampler, float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))

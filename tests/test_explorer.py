@@ -20,6 +20,8 @@ from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
 from steadyslip.model.point import operating_point
+from steadyslip.model.reduction import reduce_model
+from steadyslip.model.scales import natural_scales, posed
 
 FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
 BEFORE = [dict(family.registry) for family in FAMILIES]
@@ -198,28 +200,40 @@ DISTURBED = {
     "velocity": (2.0, ss.VelocityStep(at=1.0, to=2 * V0)),
     "push": (1e-7, ss.DisplacementStep(at=1.0, by=1e-7)),
     "normal": (2e5, ss.NormalStressStep(at=1.0, by=2e5)),
+    "pull": (1e5, ss.DisturbanceStep(at=1.0, by=1e5)),
+    "hold": (3.0, ss.Hold(at=1.0, duration=3.0)),
+    "blow": (10.0, None),
 }
 
 
-def moved_on_a_page(own, kind, until):
+def motion_text():
+    return javascript.as_script(files("steadyslip.explorer.web").joinpath("motion.js").read_text(encoding="utf-8"))
+
+
+def moved_on_a_page(own, kind, until, stop=""):
     """What the page's Motion makes of a disturbance, where its pauses take no time."""
     text, facts = motion_part(own, 0)
-    web = files("steadyslip.explorer.web")
-    base = javascript.as_script(javascript.runtime(), web.joinpath("motion.js").read_text(encoding="utf-8"), driver())
+    base = f"{javascript.as_script(javascript.runtime(), driver())}\n{motion_text()}"
     made = f"new Motion({text}, {json.dumps(facts)}, {{ advance, observe }})"
-    script = Script(f"globalThis.setTimeout = (f) => f();\n{base}\nconst motion = {made};\nlet found = null;")
+    script = Script(f"{base}\nconst motion = {made};\nlet found = null;\nconst pause = async () => {{}};")
     if script.context is None:
         pytest.skip("Node starts anew for every question; this needs mini-racer")
     kept = [name for name in present_zeros(own) if name not in facts["missing"]]
     point = operating_point(own, None, kept)
-    run = "motion.set(values, sigma).run(kind, size, 1, until, () => false).then((r) => (found = r))"
+    asked = "{ disturbance: kind, size, at: 1, until }"
+    run = f"motion.set(values, sigma).run({asked}, () => stop, pause).then((r) => (found = r))"
     asked = f"({run}, motion.refusal(kind))"
     values = [float(value) for value in point.arguments]
-    assert script(asked, values=values, sigma=float(point.sigma), kind=kind, size=DISTURBED[kind][0], until=until) == ""
+    assert (
+        script(
+            asked, values=values, sigma=float(point.sigma), kind=kind, size=DISTURBED[kind][0], until=until, stop=stop
+        )
+        == ""
+    )
     return script("found")
 
 
-@pytest.mark.parametrize("kind", DISTURBED)
+@pytest.mark.parametrize("kind", [kind for kind, (_, piece) in DISTURBED.items() if piece])
 @pytest.mark.parametrize("name", MOVING)
 def test_a_page_moves_as_python_does(name, kind):
     """From the rig's numbers to slip events, all of it in JavaScript but the equations."""
@@ -227,6 +241,11 @@ def test_a_page_moves_as_python_does(name, kind):
     found = moved_on_a_page(own, kind, until)
     runs = [ss.simulate(own, DISTURBED[kind][1], until=until, rtol=rtol) for rtol in (1e-6, 1e-9)]
     assert found["status"] == runs[0].status
+    compare_runs(found, runs, until)
+
+
+def compare_runs(found, runs, until):
+    """Slip events and series of a page beside those of Python, whose own error the second run shows."""
     begins, exact = ([event.begin for event in run.slip_events] for run in runs)
     mine = [event["begin"] for event in found["events"]]
     assert len(mine) == len(begins) == len(exact)
@@ -235,10 +254,47 @@ def test_a_page_moves_as_python_does(name, kind):
     when = np.array([1.5, 0.3 * until, 0.6 * until])
     when = when[when < 0.99 * runs[1].end]
     for series, theirs in ((found["v"], "v"), (found["sigma"], "normal_stress"), (found["tau"], "shear_stress")):
-        here = np.interp(when, found["times"], series)
+        here = np.interp(when, found["times"], np.array(series, dtype=float))
         there = np.interp(when, runs[0]["t"], runs[0][theirs])
         truth = np.interp(when, runs[1]["t"], runs[1][theirs])
         assert np.all(np.abs(here - there) <= 10 * np.abs(there - truth) + 1e-2 * np.abs(truth))
+
+
+def test_a_blow_changes_the_velocity_at_the_start():
+    own, until = MOVING["with mass"], 10.0
+    runs = [ss.simulate(own, until=until, rtol=rtol, initial={"v": 10 * V0}) for rtol in (1e-6, 1e-9)]
+    compare_runs(moved_on_a_page(own, "blow", until), runs, until)
+    with pytest.raises(AssertionError, match="needs a mass"):
+        moved_on_a_page(MOVING["massless"], "blow", until)
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_scales_of_a_page_are_those_of_python(name):
+    own = MOVING[name]
+    text, facts = motion_part(own, 0)
+    script = Script(f"{library()}\n{motion_text()}\nconst motion = new Motion({text}, {json.dumps(facts)}, null);")
+    kept = [one for one in present_zeros(own) if one not in facts["missing"]]
+    point = operating_point(own, None, kept)
+    reduction = reduce_model(point.model, facts["eliminated"])
+    scales, unknown = natural_scales(point, reduction)
+    values = [float(value) for value in point.arguments]
+    found = script("motion.set(values, sigma).scales", values=values, sigma=float(point.sigma))
+    assert np.allclose(found["sizes"], [np.ravel(scales[n])[0] for n in reduction.names], rtol=1e-14, atol=0)
+    assert found["unknown"] == pytest.approx(np.ravel(unknown)[0], rel=1e-14)
+    assert found["x"] == pytest.approx(np.ravel(scales["x"])[0], rel=1e-14)
+    assert found["posed"] == bool(posed(point)[0])
+
+
+def test_a_page_that_stops_a_motion_keeps_what_there_is():
+    own = MOVING["stick-slip"]
+    whole = moved_on_a_page(own, "velocity", 4000.0)
+    cut = moved_on_a_page(own, "velocity", 4000.0, stop="stopped")
+    assert cut["status"] == "stopped"
+    assert 0 < cut["end"] < whole["end"]
+    count = len(cut["events"])
+    assert whole["events"][:count] == cut["events"]
+    assert cut["times"] == whole["times"][: len(cut["times"])]
+    assert moved_on_a_page(own, "velocity", 4000.0, stop="unwanted") is None
 
 
 def test_a_push_through_a_dashpot_is_refused_as_in_python():

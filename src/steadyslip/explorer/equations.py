@@ -32,8 +32,8 @@ def model_of(rig: Slider) -> Model:
     return build_model(rig, present_zeros(rig))
 
 
-def program(model: Model, name: str, expressions: Sequence[Any]) -> Program:
-    """Expressions in the Model's parameters and σss as a program.
+def program(model: Model, name: str, expressions: Sequence[Any], number: sp.Symbol | None = None) -> Program:
+    """Expressions in the Model's parameters, σss and perhaps one number more as a program.
 
     Raises
     ------
@@ -42,9 +42,12 @@ def program(model: Model, name: str, expressions: Sequence[Any]) -> Program:
     """
     made = Program(name)
     names = {symbol: f"p{i}" for i, symbol in enumerate(model.arguments)}
+    if number is not None:
+        names[number] = "number"
     formulas = Formulas(expressions, names)
     used = {s.name for e in (*formulas.results, *(e for _, e in formulas.temporaries)) for s in e.free_symbols}
-    values = {n: made.load(i) for i, n in enumerate(names.values()) if n in used}
+    values = {n: made.load(i) for i, n in enumerate(names.values()) if n in used and n != "number"}
+    values["number"] = made.number
     for place, value in enumerate(formulas(values)):
         made.store(place, value, "y")
     return made

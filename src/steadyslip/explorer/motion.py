@@ -24,6 +24,8 @@ from steadyslip.model.scales import LEAST_WEIGHT, eliminable, posed, weighed
 from steadyslip.motion.jobs import BLOW_UP, CONTACT_SHARE, Options, automatic_method
 
 RTOL = 1e-6
+BLOW = sp.Symbol("blow", positive=True)
+"""Velocity of the block at the start over that of steady sliding."""
 DRIVER = {"advance": "steadyslip.kernels.driver.lanes", "observe": "steadyslip.kernels.driver.states"}
 
 
@@ -57,7 +59,7 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
     programs = [
         program(model, "constants", list(kernel.constants.symbols)),
         program(model, "weights", weighed(model)),
-        program(model, "start", _start(reduction)),
+        program(model, "start", _start(reduction), BLOW),
         program(model, "dashpot", [-sp.diff(model.definitions[model.contact.spring], model.contact.velocity)]),
     ]
     functions = "".join(javascript.text(one) for one in programs)
@@ -66,10 +68,10 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
 
 
 def _start(reduction: Reduction) -> list[sp.Expr]:
-    """Variables that jumps leave alone in steady sliding, and behind them the velocity variable."""
+    """Variables that jumps leave alone, and behind them the velocity variable: of steady sliding, but for a blow."""
     model = reduction.model
     steady = {item.symbol: sp.sympify(model.steady[item.symbol]) for item in model.memory}
-    speed = reduction.w_of_v.xreplace(steady | {model.contact.velocity: model.parameters["drive.velocity"]})
+    speed = reduction.w_of_v.xreplace(steady | {model.contact.velocity: BLOW * model.parameters["drive.velocity"]})
     found = steady | {W: speed}
     return [*(found.get(symbol, sp.Integer(0)) for symbol in reduction.continuous), speed]
 

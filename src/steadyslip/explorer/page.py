@@ -23,6 +23,7 @@ from steadyslip.core.quantities import outside
 from steadyslip.core.records import Address, twin
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import driver, motion_part
+from steadyslip.explorer.sketch import sketch
 from steadyslip.files.output import whole_file
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
@@ -33,11 +34,18 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.analyze import linear_numbers
 
-MODULES = ("polynomials", "linear", "quantities", "rig", "chart", "motion", "page")
+MODULES = (
+    "dom", "quantities", "polynomials", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map", "locus",
+    "facts", "mover", "sketch", "course", "leaving", "page",
+)  # fmt: skip
 """Modules of the page, each after those that it imports."""
+LIBRARY = ("motion",)
+"""Modules that a worker needs too, with the runtime and the driver: the page hands it their text."""
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+    "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data:; worker-src blob:; "
+    "base-uri 'none'; form-action 'none'"
 )
+"""What the page may ask for: nothing but itself; workers and pictures are made of its own text."""
 _SENTINEL = 1.2345678901e-211  # first of the numbers that stand for values in the template of a rig file
 
 
@@ -109,40 +117,68 @@ def explore(rig: Slider, *, title: str = "rig", branch: int = 0) -> Explorer:
 
 def page(rig: Slider, title: str, branch: int) -> str:
     """The text of the file."""
+    return document(f"{title} – steadyslip", style(), fragment(rig, title, branch))
+
+
+def document(title: str, styles: str, body: str) -> str:
+    """A file that asks for nothing from outside."""
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{html.escape(title)}</title>\n<style>\nbody {{ margin: 0; }}\n{styles}</style>\n</head>\n"
+        f"<body>\n{body}</body>\n</html>\n"
+    )
+
+
+def style() -> str:
+    """The style of a `fragment`."""
+    return _web("style.css")
+
+
+def fragment(rig: Slider, title: str, branch: int) -> str:
+    """The explorer as a part of a document; several may be in one.
+
+    Raises
+    ------
+    NotAvailable
+        If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
+    """
     text, facts = linear_part(rig)
-    machine, driven, moving, still = "null", "", None, ""
+    machine, driven, moving, still = "null", "const advance = null, observe = null;", None, ""
     try:
         machine, moving = motion_part(rig, branch)
         driven = driver()
     except NotAvailable as refused:  # the verdict can be shown all the same
         still = str(refused)
-    web = files("steadyslip.explorer.web")
-    modules = [web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in MODULES]
-    script = _narrow(javascript.as_script(javascript.runtime(), *modules, driven))
-    machine, text = _narrow(machine), _narrow(text)
-    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still}
+    modules = [_web(f"{name}.js") for name in MODULES]
+    library = [_web(f"{name}.js") for name in LIBRARY]
+    script = _narrow(javascript.as_script(javascript.runtime(), *modules))
+    worker = _narrow(javascript.as_script(javascript.runtime(), *library, driven))
+    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still, "sketch": sketch(rig)}
     data = json.dumps(known, ensure_ascii=False, allow_nan=False)
     for letter in "<>&\u2028\u2029":  # nothing in a rig can end the element that its data are in
         data = data.replace(letter, f"\\u{ord(letter):04x}")
-    style = web.joinpath("style.css").read_text(encoding="utf-8")
     return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{html.escape(title)} – steadyslip</title>\n<style>\nbody {{ margin: 0; }}\n{style}</style>\n</head>\n"
-        '<body>\n<div class="steadyslip-root"></div>\n'
+        '<div class="steadyslip-root"></div>\n'
         f'<script type="application/json" class="steadyslip-data">{data}</script>\n'
-        f'<script>\n"use strict";\n(() => {{\n{script}\nconst programs = {text};\nconst machine = {machine};\n'
-        f"const driver = {'{ advance, observe }' if driven else 'null'};\n"
+        f'<script>\n"use strict";\n(() => {{\n{script}\nconst programs = {_narrow(text)};\n'
+        f"const library = () => {{\n{worker}\nconst machine = {_narrow(machine)};\n"
+        "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
         "const place = document.currentScript.previousElementSibling;\n"
-        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs, machine, driver);\n"
-        "})();\n</script>\n</body>\n</html>\n"
+        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs, library);\n"
+        "})();\n</script>\n"
     )
 
 
+def _web(name: str) -> str:
+    return files("steadyslip.explorer.web").joinpath(name).read_text(encoding="utf-8")
+
+
 def _narrow(text: str) -> str:
-    """Code without its indentation, a tenth of its length; no string goes over several lines."""
-    return re.sub(r"^ +", "", text, flags=re.M)
+    """Code without indentation and lines of comment, a fifth of its length; no string goes over several lines."""
+    bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
+    return re.sub(r"^ +", "", bare, flags=re.M)
 
 
 def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -63,16 +63,22 @@ export class Linear {
     return found;
   }
 
-  /** ABSENT, STABLE, UNSTABLE (ill-posed too) or UNKNOWN: what charts and tracks are painted with. */
+  /** ABSENT, STABLE, UNSTABLE (ill-posed too) or UNKNOWN: what charts and tracks are painted with, so it makes no arrays. */
   status(branch = 0) {
-    if (this.ask("allowed", 1)[0] !== 1) return UNKNOWN;
-    const { found, lost } = this.stresses();
-    if (lost) return UNKNOWN;
-    if (!(found.length > branch)) return ABSENT;
-    this.R[this.count] = found[branch];
-    this.programs.coefficients(this.R, 0, this.c);
-    for (const value of this.c) if (!Number.isFinite(value)) return UNKNOWN;
-    return isHurwitz(this.c) ? STABLE : UNSTABLE;
+    const { R, c, y, programs } = this;
+    programs.allowed(R, 0, y);
+    if (y[0] !== 1) return UNKNOWN;
+    let sigma = NaN;
+    if (this.facts.affine) {
+      programs.steady(R, 0, y);
+      if (!Number.isFinite(y[1]) || !Number.isFinite(y[2])) return UNKNOWN;
+      if (branch === 0) sigma = y[0];
+    } else sigma = this.searched()[branch];
+    if (!(sigma > 0)) return ABSENT;
+    R[this.count] = sigma;
+    programs.coefficients(R, 0, c);
+    for (let i = 0; i < c.length; i++) if (!Number.isFinite(c[i])) return UNKNOWN;
+    return isHurwitz(c) ? STABLE : UNSTABLE;
   }
 
   /** The whole answer at the parameters that are set. */
@@ -93,7 +99,7 @@ export class Linear {
     const fixed = p[0] + own * q[0], statics = Math.abs(fixed) / (Math.abs(p[0]) + Math.abs(own * q[0]));
     const observed = this.ask("observables", this.facts.observed.length);
     return {
-      ...answer, eigenvalues, intervals, critical, share, gain, stiffness: own,
+      ...answer, eigenvalues, intervals, ends, p, q, critical, share, gain, stiffness: own,
       illPosed: isIllPosed(c),
       side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
       frequency: critical === null ? null : edgewise,
@@ -117,7 +123,7 @@ export class Linear {
 }
 
 const NOTHING = {
-  eigenvalues: /** @type {Complex[]} */ ([]), intervals: /** @type {Interval[]} */ ([]), critical: null, side: null,
+  eigenvalues: /** @type {Complex[]} */ ([]), intervals: /** @type {Interval[]} */ ([]), ends: [], p: [], q: [], critical: null, side: null,
   frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false,
   observed: /** @type {Record<string, number>} */ ({}),
 };

@@ -3,8 +3,16 @@
 import { zeros } from "../../kernels/printers/runtime.js";
 
 const SLICE = 2000, MOST_STEPS = 100000;
-/** @type {Record<string, string>} */
-export const DISTURBANCES = { velocity: "step of the drive velocity", push: "push of the load point", normal: "step of the normal stress" };
+
+/** A channel's new value behind the moment of the disturbance, or how long it lasts; a blow changes the start. */
+const SEGMENTS = {
+  velocity: (at, size, until, drive) => [[at, until, 0, drive * size, 0, 0]],
+  hold: (at, size, until, drive) => (at + size < until ? [[at, at + size, 0, 0, 0, 0], [at + size, until, 0, drive, 0, 0]] : [[at, until, 0, 0, 0, 0]]),
+  push: (at, size, until, drive) => [[at, until, size, drive, 0, 0]],
+  normal: (at, size, until, drive) => [[at, until, 0, drive, 0, size]],
+  pull: (at, size, until, drive) => [[at, until, 0, drive, size, 0]],
+  blow: () => [],
+};
 
 /** The sizes that matter in steady sliding: of slip, velocity variable and memory, and of the unknown. */
 function scales(facts, found, drive) {
@@ -32,8 +40,8 @@ export class Motion {
     this.y = new Float64Array(Math.max(facts.constants, 3 + 3 * facts.memory.length, facts.kept + 1) + 1);
   }
 
-  ask(name, many) {
-    this.machine[name](this.R, 0, this.y);
+  ask(name, many, number = 0) {
+    this.machine[name](this.R, number, this.y);
     return Array.from(this.y.subarray(0, many));
   }
 
@@ -49,6 +57,7 @@ export class Motion {
   /** Why the rig cannot be moved so at these values; empty if it can. @param {string} disturbance */
   refusal(disturbance) {
     if (disturbance === "push" && this.ask("dashpot", 1)[0] !== 0) return "a sudden push through a dashpot is an infinite force";
+    if (disturbance === "blow" && !this.facts.inertial) return "a blow needs a mass: without it the block takes any velocity at once";
     if (!this.scales.posed) return "the motion is ill-posed here";
     if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";
     return "";
@@ -58,7 +67,7 @@ export class Motion {
   tables(disturbance, size, at, until) {
     const { facts, scales: own } = this, sigma = this.R[this.R.length - 1], constants = zeros(1, facts.all);
     constants[0].set(this.ask("constants", facts.constants));
-    const found = this.ask("start", facts.kept + 1), start = zeros(1, facts.kept), many = facts.settings.ATOL;
+    const found = this.ask("start", facts.kept + 1, disturbance === "blow" ? size : 1), start = zeros(1, facts.kept), many = facts.settings.ATOL;
     start[0].set(found.slice(0, facts.kept));
     const settings = zeros(1, many + facts.names.length), given = {
       RTOL: facts.rtol, MOST_STEPS, V_HIGH: this.drive * facts.blowUp, V_LOW: this.drive * facts.arrest,
@@ -67,40 +76,45 @@ export class Motion {
     };
     for (const [name, value] of Object.entries(given)) settings[0][facts.settings[name]] = value;
     own.sizes.forEach((scale, i) => (settings[0][many + i] = facts.rtol * scale));
-    const segments = zeros(1, 2, 9), v = disturbance === "velocity" ? this.drive * size : this.drive;
-    segments[0][0].set([0, at, 0, this.drive, 0, 0, 0, 0, 0]);
-    segments[0][1].set([at, until, disturbance === "push" ? size : 0, v, 0, disturbance === "normal" ? size : 0, 0, 0, 0]);
+    const rows = disturbance === "blow" ? [[0, until, 0, this.drive, 0, 0]] : [[0, at, 0, this.drive, 0, 0], ...SEGMENTS[disturbance](at, size, until, this.drive)];
+    const segments = zeros(1, rows.length, 9);
+    rows.forEach((row, i) => segments[0][i].set(row));
     return [constants, start, settings, segments];
   }
 
   /**
-   * Move the rig, slice by slice; what there is when `stopped` says so, or at the end.
-   * @param {string} disturbance @param {number} size @param {number} at @param {number} until
-   * @param {() => boolean} stopped
+   * Move the rig, slice by slice. Stopped, there is what there was; where it is not wanted any more, nothing.
+   * @param {{disturbance: string, size: number, at: number, until: number}} asked
+   * @param {() => string} stopped empty, "stopped" or "unwanted"; asked between slices
+   * @param {() => Promise<void>} pause between slices
+   * @param {(time: number) => void} [told] how far it has come
    */
-  async run(disturbance, size, at, until, stopped) {
+  async run({ disturbance, size, at, until }, stopped, pause, told = () => {}) {
     const { facts, machine, driver } = this, { layout, routines } = machine, c = facts.cursor;
     const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows);
     cursor[c.LAST_JOB] = cursor[c.BUSY] = 1;
     cursor[c.PAUSED] = -1;
     const out = [zeros(1), zeros(1, facts.final + facts.names.length), zeros(1, facts.tally), zeros(1, 0, facts.names.length)];
     const log = zeros(64, facts.logged), recorded = zeros(1024, 2 + facts.names.length), ids = zeros(1);
+    const done = (status, end) => this.observed(tables, recorded.slice(0, cursor[c.RECORDED]), log.slice(0, cursor[c.LOGGED]), status, end);
     for (;;) {
       const reason = driver.advance(layout, routines, S, ids, cursor, ...tables, zeros(0), ...out, log, recorded, SLICE);
-      if (reason === 0) break;
+      if (reason === 0) return done(facts.statuses[out[0][0]], out[1][0][0]);
       if (reason === 1) {
-        log.push(...zeros(log.length, facts.logged));
-        recorded.push(...zeros(recorded.length, 2 + facts.names.length));
-      } else {
-        await new Promise((resolve) => setTimeout(resolve));
-        if (stopped()) return null;
+        for (const buffer of [log, recorded]) for (const row of zeros(buffer.length, buffer[0].length)) buffer.push(row);
+        continue;
       }
+      const reached = cursor[c.RECORDED] ? recorded[cursor[c.RECORDED] - 1][0] : 0;
+      told(reached);
+      await pause();
+      const why = stopped();
+      if (why === "unwanted") return null;
+      if (why) return done("stopped", reached);
     }
-    return this.observed(tables, recorded.slice(0, cursor[c.RECORDED]), log.slice(0, cursor[c.LOGGED]), out);
   }
 
   /** Series over time, slip events and how it ended. */
-  observed(tables, recorded, log, out) {
+  observed(tables, recorded, log, status, end) {
     const { facts, machine } = this, many = recorded.length, o = facts.out;
     const states = recorded.map((row) => row.subarray(2)), own = zeros(many), values = zeros(8 + facts.kept, many);
     const segment = Float64Array.from(recorded, (row) => row[1]), times = Float64Array.from(recorded, (row) => row[0]);
@@ -117,6 +131,39 @@ export class Motion {
         open = null;
       }
     }
-    return { times, v: values[o.V], sigma: values[o.SIGMA], tau: values[o.TAU], events, status: facts.statuses[out[0][0]], end: out[1][0][0] };
+    const x = values[o.W_SLOPE], load = values[o.ADVANCE]; // of what follows the outputs, slip is first
+    return { times, v: values[o.V], sigma: values[o.SIGMA], tau: values[o.TAU], x, load, events, status, end };
   }
+}
+
+/**
+ * Wait for what is to be moved, from the page that this worker belongs to.
+ * @param {any} scope @param {(facts: any) => Motion} begin
+ */
+export function serve(scope, begin) {
+  const { port1, port2 } = new MessageChannel();
+  let motion = /** @type {any} */ (null), wanted = 0, halted = false;
+  const pause = () => new Promise((done) => {
+    port1.onmessage = () => done(undefined);
+    port2.postMessage(0);
+  });
+  scope.onmessage = async ({ data: { facts, stop, id, values, sigma, asked } }) => {
+    if (facts) motion = begin(facts);
+    else if (stop) halted = true;
+    else {
+      [wanted, halted] = [id, false];
+      let last = Date.now();
+      const told = (time) => {
+        if (Date.now() < last + 200) return;
+        last = Date.now();
+        scope.postMessage({ id, reached: time });
+      };
+      try {
+        const course = await motion.set(values, sigma).run(asked, () => (wanted !== id ? "unwanted" : halted ? "stopped" : ""), pause, told);
+        if (course) scope.postMessage({ id, course });
+      } catch (error) {
+        scope.postMessage({ id, fault: error instanceof Error ? error.message : String(error) });
+      }
+    }
+  };
 }

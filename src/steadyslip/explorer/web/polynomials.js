@@ -156,6 +156,8 @@ export function roots(given) {
   return found.sort((a, b) => b.re - a.re || b.im - a.im);
 }
 
+let upper = new Float64Array(16), lower = new Float64Array(16); // rows of Routh's array
+
 /** Whether the highest coefficient is positive and all roots have negative real parts (Routh). @param {ArrayLike<number>} c */
 export function isHurwitz(c) {
   const n = c.length - 1;
@@ -163,14 +165,19 @@ export function isHurwitz(c) {
   while (d >= 0 && c[d] === 0) d--;
   if (d < Math.max(n - 1, 0)) return false; // the equations have lost more than their inertia: ill-posed
   for (let i = 0; i <= d; i++) most = Math.max(most, Math.abs(c[i]));
-  let upper = [], lower = [];
-  for (let i = d; i >= 0; i -= 2) upper.push(c[i] / most);
-  for (let i = d - 1; i >= 0; i -= 2) lower.push(c[i] / most);
+  if (d + 2 > upper.length) [upper, lower] = [new Float64Array(d + 2), new Float64Array(d + 2)];
+  const width = (d >> 1) + 1;
+  for (let i = 0; i < width; i++) {
+    upper[i] = c[d - 2 * i] / most;
+    lower[i] = d - 1 - 2 * i >= 0 ? c[d - 1 - 2 * i] / most : 0;
+  }
+  lower[width] = 0;
   for (let row = 0; row <= d; row++) {
     if (!(upper[0] > 0)) return false;
-    const ratio = upper[0] / lower[0], following = [];
-    for (let i = 1; i < upper.length; i++) following.push(upper[i] - ratio * (lower[i] || 0));
-    [upper, lower] = [lower, following];
+    const ratio = upper[0] / lower[0];
+    for (let i = 1; i < width; i++) upper[i - 1] = upper[i] - ratio * lower[i];
+    upper[width - 1] = 0;
+    [upper, lower] = [lower, upper];
   }
   return true;
 }

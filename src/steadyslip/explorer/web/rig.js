@@ -18,16 +18,17 @@ export class Rig {
     this.linear = new Linear(programs, data.facts);
     this.values = data.parameters.map((one) => one.value);
     this.vector = new Float64Array(data.facts.parameters.length);
+    this.trial = new Float64Array(data.parameters.length);
+    this.spring = data.facts.parameters.indexOf("slider.stiffness");
   }
 
-  /** The Model's parameters for some values of the page's. @param {number[]} values */
+  /** The Model's parameters for some values of the page's. @param {ArrayLike<number>} values */
   set(values) {
     const { places, fixed, axial } = this.data, model = this.vector;
-    places.forEach((from, i) => (model[i] = from >= 0 ? values[from] : fixed[i]));
+    for (let k = 0; k < model.length; k++) model[k] = places[k] >= 0 ? values[places[k]] : fixed[k];
     this.linear.set(model);
     if (axial >= 0) {
-      const k = this.data.facts.parameters.indexOf("slider.stiffness");
-      model[k] = values[axial] * this.linear.ask("stiffness", 1)[0];
+      model[this.spring] = values[axial] * this.linear.ask("stiffness", 1)[0];
       this.linear.set(model);
     }
     return this.linear;
@@ -42,11 +43,10 @@ export class Rig {
   status(i, x, j = -1, y = 0) {
     const parameter = this.data.parameters[i];
     if (!inside(parameter, x) || (j >= 0 && !inside(this.data.parameters[j], y))) return UNKNOWN;
-    const values = this.trial ??= this.values.slice();
-    for (let k = 0; k < values.length; k++) values[k] = this.values[k];
-    values[i] = x;
-    if (j >= 0) values[j] = y;
-    return this.set(values).status(this.data.branch);
+    this.trial.set(this.values);
+    this.trial[i] = x;
+    if (j >= 0) this.trial[j] = y;
+    return this.set(this.trial).status(this.data.branch);
   }
 
   /** Where the status changes between two positions of a scale, to rounding of the position. */

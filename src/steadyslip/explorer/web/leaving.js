@@ -1,0 +1,61 @@
+// What leaves the page: links, rig files, tables, pictures.
+import { button, make } from "./dom.js";
+
+const LOOK = ["fill", "stroke", "stroke-width", "font-size", "font-family", "opacity", "stroke-opacity", "stroke-dasharray", "display"];
+const PIXELS = 2; // of a picture to one of the page
+
+/** The buttons. @param {import("./page.js").Page} page */
+export function leaving(page) {
+  const { title } = page.rig.data;
+  const save = (name, type, content) => {
+    const address = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+    make("a", { href: address, download: `${title}-${name}` }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 1000);
+  };
+  const canvas = () => page.chart.canvas;
+  return [
+    button("link", "copy a link to these values", () => link(page)),
+    button("TOML", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())),
+    button("SVG", "save the chart as a drawing", () => save("chart.svg", "image/svg+xml", drawing(canvas()))),
+    button("PNG", "save the chart as a picture", () => picture(canvas()).then((blob) => save("chart.png", "image/png", blob), () => (page.banner.notice.textContent = "This browser cannot make a picture of the chart; save the drawing (SVG)."))),
+    button("CSV", "save values and edges as a table", () => save("edges.csv", "text/csv", listed(page))),
+  ];
+}
+
+function link(page) {
+  const text = location.href.split("#")[0] + page.rig.hash(), { notice } = page.banner;
+  const done = () => (notice.textContent = "The link is copied.");
+  const failed = () => (notice.textContent = text);
+  if (navigator.clipboard) navigator.clipboard.writeText(text).then(done, failed);
+  else failed();
+}
+
+/** An SVG with its colours written out. @param {any} canvas */
+function drawing(canvas) {
+  const copy = canvas.cloneNode(true), live = canvas.querySelectorAll("*");
+  copy.querySelectorAll("*").forEach((element, n) => {
+    const style = getComputedStyle(live[n]);
+    for (const name of LOOK) element.setAttribute(name, style.getPropertyValue(name));
+  });
+  const [, , width, height] = canvas.getAttribute("viewBox").split(" ");
+  const paper = copy.insertBefore(canvas.ownerDocument.createElementNS("http://www.w3.org/2000/svg", "rect"), copy.firstChild);
+  for (const [name, value] of Object.entries({ width, height, fill: getComputedStyle(canvas.parentElement).backgroundColor })) paper.setAttribute(name, value);
+  for (const [name, value] of Object.entries({ width, height, xmlns: "http://www.w3.org/2000/svg" })) copy.setAttribute(name, value);
+  return new XMLSerializer().serializeToString(copy);
+}
+
+/** The same as pixels. @param {any} canvas @returns {Promise<Blob>} */
+async function picture(canvas) {
+  const image = new Image(), [, , width, height] = canvas.getAttribute("viewBox").split(" ").map(Number);
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(drawing(canvas))}`;
+  await image.decode();
+  const pixels = make("canvas", { width: PIXELS * width, height: PIXELS * height });
+  pixels.getContext("2d").drawImage(image, 0, 0, pixels.width, pixels.height);
+  return new Promise((done, failed) => pixels.toBlob((blob) => (blob ? done(blob) : failed()), "image/png"));
+}
+
+function listed(page) {
+  const edges = new Map(page.edges().map((edge) => [edge.i, edge.at])), quoted = (text) => `"${String(text).replace(/"/g, '""')}"`;
+  const rows = page.rig.data.parameters.map((one, i) => [quoted(one.name), page.rig.values[i] * one.factor, edges.has(i) ? edges.get(i) * one.factor : "", quoted(one.unit)].join(","));
+  return ["parameter,value,nearest edge,unit", ...rows, ""].join("\n");
+}

@@ -1,0 +1,83 @@
+// The chart of stability over two parameters, with the rig's point in it.
+import { regions } from "./chart.js";
+import { make, svg } from "./dom.js";
+import { axis } from "./plot.js";
+import { shown } from "./quantities.js";
+
+const ROWS = 60, ROWS_SEARCHED = 24; // where steady sliding has to be searched for, each point takes long
+const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+export class Chart {
+  /** @param {import("./page.js").Page} page @param {[number, number]} axes which parameters at first */
+  constructor(page, axes) {
+    this.page = page;
+    this.axes = axes;
+    this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // several pages may share a document
+    const { parameters } = page.rig.data;
+    this.choices = [0, 1].map((which) => {
+      const select = make("select", { "aria-label": which ? "parameter upwards" : "parameter across" },
+        ...parameters.map((one, i) => make("option", { value: String(i), textContent: one.name })));
+      select.addEventListener("change", () => {
+        const chosen = Number(select.value);
+        if (chosen === this.axes[1 - which]) this.axes[1 - which] = this.axes[which];
+        this.axes[which] = chosen;
+        this.show();
+      });
+      return select;
+    });
+    this.canvas = svg("svg", { class: "chart", tabindex: "0", role: "application" });
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      this.drag(event, false);
+    });
+    this.canvas.addEventListener("pointermove", (event) => this.canvas.hasPointerCapture(event.pointerId) && this.drag(event, true));
+    for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => page.rest());
+    this.canvas.addEventListener("keydown", (event) => this.nudge(event));
+    const key = make("p", { className: "key" }, ...[["stable", "stable"], ["unstable", "unstable"], ["none", "no steady sliding"], ["unknown", "no rig"]]
+      .map(([name, words]) => make("span", {}, make("i", { className: name }), words)));
+    this.box = make("section", { className: "map", "aria-label": "chart of stability" }, make("h2", { textContent: "Where is it stable?" }),
+      make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys" })),
+      this.canvas, key);
+  }
+
+  drag(event, same) {
+    const place = this.canvas.getBoundingClientRect(), { size } = this.page, unit = (size.left + size.width + 14) / place.width;
+    const x = ((event.clientX - place.left) * unit - size.left) / size.width;
+    this.page.move(this.axes, [x, 1 - ((event.clientY - place.top) * unit - size.top) / size.height], same);
+  }
+
+  nudge(event) {
+    const steps = NUDGES[event.key], { rig } = this.page;
+    if (!steps) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const far = event.shiftKey ? 0.05 : 0.01;
+    this.page.move(this.axes, this.axes.map((i, which) => this.page.scale(i).of(rig.values[i]) + far * steps[which]), false);
+  }
+
+  show() {
+    const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
+    const x = this.page.scale(i), y = this.page.scale(j);
+    this.choices.forEach((select, which) => (select.value = String(this.axes[which])));
+    const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
+    if (others !== this.painted) { // the point alone may move: then the regions stay
+      this.painted = others;
+      const rows = facts.affine ? ROWS : ROWS_SEARCHED;
+      const { paths, outline } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
+      const inner = svg("g", { transform: `translate(${box.left} ${box.top})` });
+      for (const [name, path] of Object.entries(paths)) inner.append(svg("path", { class: `region ${name}`, d: path }));
+      const stripes = svg("pattern", { id: this.stripes, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("line", { x1: 0, y1: 0, x2: 0, y2: 8, class: "stripe" }));
+      inner.append(stripes, svg("path", { d: paths.none, fill: `url(#${this.stripes})` }), svg("path", { class: "outline", d: outline }));
+      this.point = svg("circle", { r: 8, class: "point" });
+      this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
+      this.canvas.replaceChildren(inner,
+        axis(box, x, ranges[i], parameters[i].factor, parameters[i].unit, parameters[i].name, false),
+        axis(box, y, ranges[j], parameters[j].factor, parameters[j].unit, parameters[j].name, true), this.point);
+    }
+    const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
+    this.point.setAttribute("cx", String(box.left + at[0] * box.width));
+    this.point.setAttribute("cy", String(box.top + (1 - at[1]) * box.height));
+    const words = [i, j].map((n) => `${parameters[n].name} ${shown(rig.values[n] * parameters[n].factor, parameters[n].unit)}`);
+    this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
+  }
+}

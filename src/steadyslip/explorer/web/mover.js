@@ -1,0 +1,74 @@
+// Runs motions away from the page, in a worker made of this page's own text; in slices here where there is none.
+const LATEST = "unwanted", HERE = 8; // ms that the page computes at a time where it has to do it itself
+
+export class Mover {
+  /** @param {() => any} library what makes the functions that a worker needs @param {any} facts */
+  constructor(library, facts) {
+    this.own = library().begin(facts);
+    this.id = 0;
+    this.halted = false;
+    this.heard = /** @type {any} */ (null);
+    try {
+      const address = URL.createObjectURL(new Blob([`"use strict";\nconst made = (${library})();\nmade.serve(self, made.begin);\n`], { type: "text/javascript" }));
+      this.worker = new Worker(address);
+      this.worker.onmessage = ({ data }) => this.hear(data);
+      this.worker.onerror = (event) => { // a policy that allows none
+        event.preventDefault();
+        this.worker = null;
+        if (this.last) this.here(this.last);
+      };
+      this.worker.postMessage({ facts });
+    } catch {
+      this.worker = null;
+    }
+  }
+
+  hear({ id, reached, course, fault }) {
+    if (id !== this.id || !this.heard) return;
+    if (reached !== undefined) this.heard.told(reached);
+    else if (fault) this.heard.failed(new Error(fault));
+    else this.heard.done(course);
+  }
+
+  /**
+   * What comes of a disturbance; never, where another has been asked for since.
+   * @param {ArrayLike<number>} values @param {number} sigma @param {any} asked @param {(time: number) => void} told
+   */
+  run(values, sigma, asked, told) {
+    this.id++;
+    this.halted = false;
+    return new Promise((done, failed) => {
+      this.heard = { done, failed, told };
+      this.last = { id: this.id, values: Array.from(values), sigma, asked };
+      if (this.worker) this.worker.postMessage(this.last);
+      else this.here(this.last);
+    });
+  }
+
+  /** What was asked for is not wanted any more. */
+  forget() {
+    this.id++;
+    this.heard = null;
+    this.worker?.postMessage({ stop: true });
+  }
+
+  stop() {
+    this.halted = true;
+    this.worker?.postMessage({ stop: true });
+  }
+
+  async here({ id, values, sigma, asked }) {
+    let began = performance.now();
+    const pause = async () => {
+      if (performance.now() < began + HERE) return;
+      await new Promise((resume) => setTimeout(resume));
+      began = performance.now();
+    };
+    try {
+      const course = await this.own.set(values, sigma).run(asked, () => (this.id !== id ? LATEST : this.halted ? "stopped" : ""), pause, (reached) => this.hear({ id, reached }));
+      if (course) this.hear({ id, course });
+    } catch (error) {
+      this.hear({ id, fault: error instanceof Error ? error.message : String(error) });
+    }
+  }
+}

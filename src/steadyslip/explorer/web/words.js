@@ -1,0 +1,56 @@
+// What answers and motions are called: the sentences of the page.
+import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { digits, shown } from "./quantities.js";
+
+/** A stress, or a force where the rig has an area. */
+export function quantity(value, unit, area, many = 4) {
+  if (area !== null && unit === "Pa/m") return shown(value * area, "N/m", many);
+  return area !== null && unit === "Pa" ? shown(value * area, "N", many) : shown(value, unit, many);
+}
+
+/** What an answer is, in a word that style sheets know. */
+export function kindOf(answer) {
+  if (answer.status === ABSENT) return "none";
+  if (answer.status === UNKNOWN) return "unknown";
+  return answer.onEdge ? "edge" : answer.status === STABLE ? "stable" : "unstable";
+}
+
+/** The sentence. @param {number} drive m/s */
+export function headline(answer, drive) {
+  const speed = shown(drive, "m/s");
+  return {
+    none: `No steady sliding at ${speed}`, unknown: "Numbers outside what a rig can have", edge: `On the edge of stability at ${speed}`,
+    stable: `Stable: steady sliding at ${speed}`, unstable: `Unstable: steady sliding at ${speed}`,
+  }[kindOf(answer)];
+}
+
+/** Why. @param {any} answer @param {{area: number | null, axial: number}} data */
+export function reason(answer, data) {
+  if (answer.status === ABSENT) {
+    if (answer.slope >= 1) return `Lock-up: the pull raises friction by more than itself (1 − μ dσ/dτ is ${digits(1 - answer.slope)}, must be above 0).`;
+    return answer.load <= 0 ? "Lift-off: the motion takes away more normal stress than the contact has." : "No positive normal stress satisfies the contact law at the steady shear stress.";
+  }
+  if (answer.status === UNKNOWN) return "A number leaves its range, or breaks a condition that several obey together.";
+  if (answer.illPosed) return "The equations are ill-posed here: the model misses an inertia or a direct effect that matters.";
+  const { critical, gain, share } = answer, stiffness = (k) => quantity(k, "Pa/m", data.area);
+  if (critical === null) return answer.intervals.length ? "Stable at every stiffness." : "No stiffness makes this sliding stable.";
+  const total = answer.stiffness + gain, edge = critical + gain, what = gain ? "Stiffness and gain together, " : "The stiffness ";
+  const alone = answer.intervals.length === 1 && (answer.side === "above" ? answer.intervals[0].high === Infinity : answer.intervals[0].low === 0);
+  const period = answer.frequency ? `; there it oscillates with period ${shown((2 * Math.PI) / answer.frequency, "s")}` : "";
+  const along = data.axial >= 0 ? ` (${stiffness(edge / share)} along the axis)` : "";
+  const tail = alone ? `, ${answer.side} which sliding is stable${period}.` : `, the nearest edge of what is stable${period}.`;
+  return `${what}${stiffness(total)}${gain ? ", are" : " is"} ${digits(total / edge, 3)} times the critical ${stiffness(edge)}${along}${tail}`;
+}
+
+/** What came of a motion. @param {any} course @param {number | null} area */
+export function outcome({ events, status, end, v }, area) {
+  if (status === "blow-up") return `It runs away at ${shown(end, "s")}: neither mass nor damping limits the velocity.`;
+  const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${status}.`;
+  if (!events.length) {
+    const least = v.reduce((a, b) => Math.min(a, b), Infinity), most = v.reduce((a, b) => Math.max(a, b), -Infinity);
+    return `No slip event; velocity ${shown(least, "m/s", 3)} to ${shown(most, "m/s", 3)}.${ended}`;
+  }
+  const last = events[events.length - 1], before = events[events.length - 2];
+  const every = before ? `, the last two ${shown(last.begin - before.begin, "s", 3)} apart` : "";
+  return `${events.length} slip event${events.length > 1 ? "s" : ""}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, stress drop ${quantity(last.drop, "Pa", area)}.${ended}`;
+}

@@ -406,7 +406,7 @@ def test_interrupted_thresholds_keep_those_found(monkeypatch, tmp_path):
 def test_an_interrupted_answer_is_printed_with_its_status(capsys):
     import typer
 
-    from steadyslip import cli
+    from steadyslip.cli.answers import give
 
     class Answer:
         interrupted = True
@@ -415,6 +415,6 @@ def test_an_interrupted_answer_is_printed_with_its_status(capsys):
             return "what there is"
 
     with pytest.raises(typer.Exit) as left:
-        cli._given(Answer(), [], False, print)
+        give(Answer(), [], False, print)
     assert left.value.exit_code == 130
     assert capsys.readouterr().out == "what there is\n"

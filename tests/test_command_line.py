@@ -206,14 +206,14 @@ def test_help_shows_brackets_as_they_are():
 
 
 def test_every_end_has_its_status(capsys, monkeypatch):
-    from steadyslip import cli
+    from steadyslip.cli.ending import status_of
     from steadyslip.core import errors
 
     def ends(error):
         def command():
             raise error
 
-        return cli._status(command)
+        return status_of(command)
 
     monkeypatch.delenv("STEADYSLIP_DEBUG", raising=False)
     assert ends(errors.NotAvailable("no such thing")) == 2

@@ -1,4 +1,4 @@
-"""How a map is laid out on disk: its metadata, declared and sealed when it is made, compared with that when opened.
+"""How a map is laid out on disk: `MapLayout` says which arrays there are; they are made so, and compared when opened.
 
 Zarr format 3 only; element types and codecs are those listed here, so that nothing that is read can be more than
 numbers. The group's metadata hold those of all arrays, and a checksum of themselves.
@@ -10,6 +10,7 @@ import json
 import math
 import os
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.tables import fits_form
 from steadyslip.maps.plan.axes import COMPLETE, MOST_POINTS, SAMPLE, Generated
 from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
+from steadyslip.maps.plan.measures import NOT_DONE
 
 FORMAT = 2
 METADATA = 2**26  # bytes
@@ -32,8 +34,11 @@ _VERSIONS = ("numpy", "scipy", "numba", "zarr")
 _TEXTS = ("title", "rig", "definition", "dims", "results", "steadyslip", "versions", "coordinates", "seal")
 _ARRAY = {"shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes",
           "dimension_names", "zarr_format", "node_type", "storage_transformers"}  # fmt: skip
-_TYPES = {"float64": "NaN", "int8": -1}  # with what they hold where nothing is computed
+_FILL = {"float64": np.nan, "int8": NOT_DONE, "uint64": 0}  # what they hold where nothing is computed
 _PACKED, _PLAIN = ("bytes", "blosc", "crc32c"), ("bytes",)
+
+
+Form = tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...]]
 
 
 class LayoutError(ValueError):
@@ -49,6 +54,10 @@ class StoredArray:
     shape: tuple[int, ...]
     chunks: tuple[int, ...]
     attributes: dict[str, Any]
+
+    @property
+    def form(self) -> Form:
+        return self.dims, self.shape, self.chunks
 
     @property
     def unpacked(self) -> int:
@@ -67,7 +76,7 @@ class MapLayout:
     dims, results, sampled, generated : tuple of str
         Dimensions, results, parameters along the sample dimension, and those of them written chunk by chunk.
     shape, chunks, grid : tuple of int
-    arrays : dict of str to Array
+    arrays : dict of str to StoredArray
     """
 
     definition: dict[str, Any]
@@ -81,8 +90,23 @@ class MapLayout:
     generated: tuple[str, ...]
     shape: tuple[int, ...]
     chunks: tuple[int, ...]
-    grid: tuple[int, ...]
     arrays: dict[str, StoredArray]
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        """Number of chunks along each dimension."""
+        return tuple(-(-n // c) for n, c in zip(self.shape, self.chunks, strict=True))
+
+    def form(self, name: str, extra: Sequence[tuple[str, int]] = ()) -> Form:
+        """Dimensions, shape and chunks of an array: a result with further dimensions, a parameter, or the marks."""
+        if name == COMPLETE:
+            return tuple(f"{dim}_chunk" for dim in self.dims), self.grid, (1,) * len(self.dims)
+        if name in self.results:
+            dims, sizes = (tuple(each) for each in zip(*extra, strict=True)) if extra else ((), ())
+            return (*self.dims, *dims), (*self.shape, *sizes), (*self.chunks, *sizes)
+        dim = SAMPLE if name in self.sampled else name
+        size, part = ((column[self.dims.index(dim)],) for column in (self.shape, self.chunks))
+        return (dim,), size, part if name in self.generated else size
 
 
 # -- reading
@@ -132,11 +156,12 @@ def _layout(document: Any) -> MapLayout:
     names = (*varied, *results, COMPLETE)
     _demand(len(set(names)) == len(names) and set(stored) == set(names), "its arrays are not those of its definition")
     arrays = {name: _array(name, stored[name], _PLAIN if name == COMPLETE else _PACKED) for name in names}
-    grid, chunks = arrays[COMPLETE].shape, arrays[results[0]].chunks[: len(dims)] if results else ()
+    _demand(results, "it has no results")
+    chunks = arrays[results[0]].chunks[: len(dims)]
+    _demand(len(chunks) == len(dims), f"{results[0]!r:.60} has {len(chunks)} dimensions")
     found = MapLayout(
         definition, _json(attributes, "versions", {str: str}), attributes["steadyslip"], attributes["title"],
-        attributes["rig"], dims, results, sampled, sampled if "method" in samples else (), tuple(sizes), chunks, grid,
-        arrays,
+        attributes["rig"], dims, results, sampled, sampled if "method" in samples else (), tuple(sizes), chunks, arrays,
     )  # fmt: skip
     _check_arrays(found)
     return found
@@ -161,8 +186,8 @@ def _array(name: str, stored: Any, codecs: tuple[str, ...]) -> StoredArray:
     demand(isinstance(stored, dict) and set(stored) == _ARRAY, "its metadata are others")
     demand((stored["zarr_format"], stored["node_type"], stored["storage_transformers"]) == (3, "array", []), "format")
     dtype = stored["data_type"]
-    expected = {"uint64": 0} if codecs == _PLAIN else _TYPES
-    demand(isinstance(dtype, str) and dtype in expected and stored["fill_value"] == expected[dtype], "element type")
+    demand(dtype in ("uint64",) if codecs == _PLAIN else dtype in ("float64", "int8"), "element type")
+    demand(stored["fill_value"] == ("NaN" if dtype == "float64" else _FILL[dtype]), "what it holds")
     kinds = [one.get("name") if isinstance(one, dict) else None for one in _listed(stored["codecs"])]
     demand(tuple(kinds) == codecs, f"codecs are {kinds!r:.60}, allowed: {', '.join(codecs)}")
     options = [one.get("configuration", {}) for one in stored["codecs"]]
@@ -191,24 +216,18 @@ def _listed(value: Any) -> list[Any]:
 def _check_arrays(layout: MapLayout) -> None:
     """Shapes follow from the definition, and none is larger than a map can be."""
     rank = len(layout.dims)
-    _demand(layout.results, "it has no results")
     _demand(math.prod(layout.shape) <= MOST_POINTS, f"it has more than {MOST_POINTS:.0e} points")
-    grid = tuple(-(-n // c) for n, c in zip(layout.shape, layout.chunks, strict=True))
-    _demand(layout.grid == grid and layout.arrays[COMPLETE].chunks == (1,) * rank, "its marks are not one for a chunk")
-    _demand(math.prod(grid) <= MOST_CHUNKS, f"it has {math.prod(grid)} chunks, allowed are {MOST_CHUNKS}")
-    for name in layout.results:
-        one = layout.arrays[name]
-        extra = one.shape[rank:]
-        same = one.dims[:rank] == layout.dims and one.shape[:rank] == layout.shape and one.chunks[rank:] == extra
-        _demand(same and one.chunks[:rank] == layout.chunks, f"{name!r:.60} has shape {one.shape} in {one.chunks}")
-        _demand(math.prod(extra) <= MOST_EXTRA and one.unpacked <= MOST_CHUNK, f"a chunk of {name!r:.60} is too large")
-    for name in (*layout.dims[: rank - bool(layout.sampled)], *layout.sampled):
-        one, dim = layout.arrays[name], SAMPLE if name in layout.sampled else name
-        size = layout.shape[layout.dims.index(dim)]
-        part = layout.chunks[-1] if name in layout.generated else size
-        _demand((one.dtype, one.dims, one.shape, one.chunks) == ("float64", (dim,), (size,), (part,)),
-                f"{name!r:.60} has shape {one.shape} over {one.dims}")  # fmt: skip
-        _demand(name in layout.generated or size <= MOST_AXIS, f"{name!r:.60} has more than {MOST_AXIS} values")
+    _demand(math.prod(layout.grid) <= MOST_CHUNKS, f"it has {math.prod(layout.grid)} chunks, allowed: {MOST_CHUNKS}")
+    for name, one in layout.arrays.items():
+        extra = tuple(zip(one.dims, one.shape, strict=True))[rank:] if name in layout.results else ()
+        _demand(one.form == layout.form(name, extra), f"{name!r:.60} has shape {one.shape} in {one.chunks}")
+        if name in layout.results:
+            small = math.prod(size for _, size in extra) <= MOST_EXTRA and one.unpacked <= MOST_CHUNK
+            _demand(small, f"a chunk of {name!r:.60} is too large")
+        elif name != COMPLETE:
+            _demand(one.dtype == "float64", f"{name!r:.60} has no numbers")
+            small = name in layout.generated or one.shape[0] <= MOST_AXIS
+            _demand(small, f"{name!r:.60} has more than {MOST_AXIS} values")
 
 
 def _seal(document: dict[str, Any]) -> str:
@@ -219,11 +238,8 @@ def _seal(document: dict[str, Any]) -> str:
 # -- writing
 
 
-def lay_out(path: Path, plan: Map) -> None:
-    """Make all arrays of a map in an empty folder, and the coordinates."""
-    import zarr
-    from zarr.codecs import BloscCodec, BytesCodec, Crc32cCodec
-
+def planned(plan: Map) -> MapLayout:
+    """The layout of a map that is to be made."""
     from steadyslip import __version__
 
     try:
@@ -231,54 +247,56 @@ def lay_out(path: Path, plan: Map) -> None:
     except ParameterError:
         rig = ""
     outputs = plan.outputs()
-    group = zarr.create_group(str(path), zarr_format=3)
-    group.attrs.update(
-        {
-            "steadyslip_map": FORMAT,
-            "title": str(plan),
-            "rig": rig,
-            "definition": json.dumps(plan.definition()),
-            "dims": json.dumps(plan.dims),
-            "results": json.dumps([output.name for output in outputs]),
-            "steadyslip": __version__,
-            "versions": json.dumps(versions()),
-            "coordinates": " ".join(plan.sampling.names) if plan.sampling else "",
-        }
-    )
-
-    def array(name: str, dims: Any, shape: Any, chunks: Any, dtype: str, fill: Any, **attributes: Any) -> Any:
-        wide = np.dtype(dtype).itemsize > 1
-        packed = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle" if wide else "noshuffle")
-        return group.create_array(
-            name, shape=tuple(shape), chunks=tuple(chunks), dtype=dtype, fill_value=fill, dimension_names=tuple(dims),
-            compressors=(packed, Crc32cCodec()), serializer=BytesCodec() if wide else "auto", attributes=attributes,
-        )  # fmt: skip
-
+    sampled = tuple(plan.sampling.names) if plan.sampling else ()
+    layout = MapLayout(
+        plan.definition(), versions(), __version__, str(plan), rig, tuple(plan.dims), tuple(o.name for o in outputs),
+        sampled, sampled if isinstance(plan.sampling, Generated) else (), tuple(plan.shape), tuple(plan.chunks), {},
+    )  # fmt: skip
     known = roles(plan)
-    given = coordinates(plan)
     for name in plan.varied:
-        n = len(given[name]) if name in given else plan.shape[-1]
-        part = n if name in given else plan.chunks[-1]
-        dim = name if name in plan.dims else SAMPLE
-        made = array(name, [dim], [n], [part], "float64", np.nan, units=known[name].unit, long_name=known[name].doc)
-        if name in given:
-            made[:] = given[name]
+        said = {"units": known[name].unit, "long_name": known[name].doc}
+        layout.arrays[name] = StoredArray("float64", *layout.form(name), said)
     for output in outputs:
-        sizes = [size for _, size in output.extra]
         attributes: dict[str, Any] = {"units": output.unit, "long_name": output.meaning}
         if output.flags:
             attributes["flag_values"] = list(range(-1, len(output.flags)))
             attributes["flag_meanings"] = " ".join(word.replace(" ", "_") for word in ("not computed", *output.flags))
-        array(
-            output.name, [*plan.dims, *(dim for dim, _ in output.extra)], [*plan.shape, *sizes],
-            [*plan.chunks, *sizes], output.dtype, output.fill, **attributes,
+        layout.arrays[output.name] = StoredArray(output.dtype, *layout.form(output.name, output.extra), attributes)
+    said = {"units": "1", "long_name": "checksum of each finished chunk, 0 until then"}
+    layout.arrays[COMPLETE] = StoredArray("uint64", *layout.form(COMPLETE), said)
+    return layout
+
+
+def lay_out(path: Path, plan: Map) -> None:
+    """Make all arrays of a map in an empty folder, and the coordinates."""
+    import zarr
+    from zarr.codecs import BloscCodec, BytesCodec, Crc32cCodec
+
+    layout = planned(plan)
+    group = zarr.create_group(str(path), zarr_format=3)
+    group.attrs.update(
+        {
+            "steadyslip_map": FORMAT,
+            "title": layout.title,
+            "rig": layout.rig_text,
+            "definition": json.dumps(layout.definition),
+            "dims": json.dumps(layout.dims),
+            "results": json.dumps(layout.results),
+            "steadyslip": layout.version,
+            "versions": json.dumps(layout.versions),
+            "coordinates": " ".join(layout.sampled),
+        }
+    )
+    for name, one in layout.arrays.items():
+        wide = np.dtype(one.dtype).itemsize > 1
+        packed = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle" if wide else "noshuffle")
+        group.create_array(
+            name, shape=one.shape, chunks=one.chunks, dtype=one.dtype, fill_value=_FILL[one.dtype],
+            dimension_names=one.dims, compressors=None if name == COMPLETE else (packed, Crc32cCodec()),
+            serializer=BytesCodec() if wide else "auto", attributes=one.attributes,
         )  # fmt: skip
-    grid = [-(-n // c) for n, c in zip(plan.shape, plan.chunks, strict=True)]
-    group.create_array(
-        COMPLETE, shape=tuple(grid), chunks=(1,) * len(grid), dtype="uint64", fill_value=0, compressors=None,
-        dimension_names=[f"{dim}_chunk" for dim in plan.dims],
-        attributes={"units": "1", "long_name": "checksum of each finished chunk, 0 until then"},
-    )  # fmt: skip
+    for name, values in coordinates(plan).items():
+        group[name][:] = values
     with warnings.catch_warnings():  # readers list nothing then; the specification is on its way
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(str(path))

@@ -1,17 +1,18 @@
-"""The command line: thin, every command calls one public function."""
+"""The commands."""
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from io import TextIOWrapper
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
+
+from steadyslip.cli.answers import give, say, say_json
+from steadyslip.cli.ending import end, failed
+from steadyslip.cli.options import AsJson, Branch, Changes, RigFile, outputs
 
 
 class _Commands(TyperGroup):
@@ -21,7 +22,7 @@ class _Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as stopped:
-            raise typer.Exit(_failed(str(stopped) or "before there was an answer", 130, "stopped")) from None
+            raise typer.Exit(failed(str(stopped) or "before there was an answer", 130, "stopped")) from None
 
 
 app = typer.Typer(
@@ -32,22 +33,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Stability of frictional sliding: will it slide steadily, what would make it, how far is the edge.",
 )
-
-RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'")]
-
-
-def say(text: str) -> None:
-    """Print an answer; that it cannot be written is an error like any other."""
-    from steadyslip.files.output import answering
-
-    with answering():
-        typer.echo(text)
-
-
-Changes = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),
-]
 
 
 @app.callback(invoke_without_command=True)
@@ -63,12 +48,12 @@ def _start(version: Annotated[bool, typer.Option("--version", help="print the ve
 def analyze(
     rig: RigFile,
     changes: Changes = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+    as_json: AsJson = False,
     require_stable: Annotated[
         bool, typer.Option("--require-stable", help="exit with status 1 unless sliding is stable beyond rounding")
     ] = False,
     formula: Annotated[bool, typer.Option("--formula", help="also print the critical stiffness as a formula")] = False,
-    branch: Annotated[int, typer.Option(help="which steady sliding, where there are several")] = 0,
+    branch: Branch = 0,
     kick: Annotated[
         list[str] | None,
         typer.Option(
@@ -92,9 +77,7 @@ def analyze(
         data = result.to_dict()
         if formula:
             data |= _formula(result)
-        import json
-
-        say(json.dumps(data, indent=2, allow_nan=False))
+        say_json(data)
     else:
         head, _, rest = str(result).partition("\n")
         colour = {True: typer.colors.GREEN, False: typer.colors.RED, None: typer.colors.YELLOW}[result.stable]
@@ -151,10 +134,8 @@ def _predicted(
     found = predict(read_rig(rig, changes), load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
-        import json
-
         data = best.to_dict() | {"prediction": found.to_dict()} | (_formula(best) if formula else {})
-        say(json.dumps(data, indent=2, allow_nan=False))
+        say_json(data)
     else:
         say(f"{found}\n\nWith the best values\n{best}")
         if formula:
@@ -178,11 +159,8 @@ def fit(
         bool, typer.Option("--skip-bad-lines", help="leave damaged lines out, and say so")
     ] = False,
     bootstrap: Annotated[int, typer.Option(min=0, max=1_000_000, help="also refit this many resampled records")] = 0,
-    output: Annotated[
-        list[Path] | None,
-        typer.Option("-o", "--output", help="write .nc, .html, .json, .png, .svg or .pdf; repeatable"),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+    output: Annotated[list[Path] | None, outputs("write .nc, .html, .json, .png, .svg or .pdf")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Which friction do these records show, and how sure is that?"""
     from steadyslip.core.errors import ParameterError, Problem
@@ -212,12 +190,10 @@ def fit(
         except KeyboardInterrupt:
             stopped = True
     if as_json:
-        import json
-
         data = plain(found, comparison)
         if draws is not None:
             data["bootstrap"] = {n: {"error": draws.error(n), "interval": draws.interval(n)} for n in found.names}
-        say(json.dumps(data, indent=2, allow_nan=False))
+        say_json(data)
     elif draws is not None:
         say(f"\n{draws}")
     for path in () if as_json else output or ():
@@ -233,7 +209,7 @@ def explore(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="write the page (.html) instead of opening it")
     ] = None,
-    branch: Annotated[int, typer.Option(help="which steady sliding, where there are several")] = 0,
+    branch: Branch = 0,
 ) -> None:
     """A page for the browser: the verdict as the rig's values are moved. It needs nothing else, and can be sent on."""
     from steadyslip.explorer import explore as run
@@ -265,15 +241,12 @@ def simulate(
         list[str] | None,
         typer.Option("--initial", metavar="NAME=VALUE", help="start elsewhere than in steady sliding; SI; repeatable"),
     ] = None,
-    output: Annotated[
-        list[Path] | None,
-        typer.Option("-o", "--output", help="write .nc, .csv, .png, .svg or .pdf; repeatable"),
-    ] = None,
+    output: Annotated[list[Path] | None, outputs("write .nc, .csv, .png, .svg or .pdf")] = None,
     samples: Annotated[int | None, typer.Option(min=2, max=10_000_000, help="report at this many even times")] = None,
     phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,
     method: Annotated[str, typer.Option(help="auto, explicit or rosenbrock")] = "auto",
     rtol: Annotated[float, typer.Option(help="error allowed per step")] = 1e-7,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """What does this rig do, under the protocol of its file and of the command line?"""
     from steadyslip.files.output import check_output
@@ -281,7 +254,7 @@ def simulate(
 
     check_output(output or (), ENDINGS)
     history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol)
-    _given(
+    give(
         history,
         output or (),
         as_json,
@@ -298,10 +271,8 @@ def cycles(
         tuple[str, str] | None, typer.Option(metavar="LOW HIGH", help="range of it, such as '1 GPa/m' '50 GPa/m'")
     ] = None,
     doublings: Annotated[int, typer.Option(min=0, help="how many period doublings to follow")] = 1,
-    output: Annotated[
-        list[Path] | None, typer.Option("-o", "--output", help="write .nc, .csv, .png, .svg or .pdf; repeatable")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+    output: Annotated[list[Path] | None, outputs("write .nc, .csv, .png, .svg or .pdf")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
     from steadyslip.files.output import check_output
@@ -309,7 +280,7 @@ def cycles(
 
     check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings)
-    _given(branch, output or (), as_json, write_branch)
+    give(branch, output or (), as_json, write_branch)
 
 
 @app.command()
@@ -326,11 +297,8 @@ def threshold(
     reference: Annotated[
         str, typer.Option(help="whether the rig's drive is the velocity 'before' or 'after' a velocity step")
     ] = "before",
-    output: Annotated[
-        list[Path] | None,
-        typer.Option("-o", "--output", help="draw the basin in the phase plane: .png, .svg or .pdf; repeatable"),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON list in SI units")] = False,
+    output: Annotated[list[Path] | None, outputs("draw the basin in the phase plane: .png, .svg or .pdf")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """How large a kick does steady sliding survive? Ctrl-C keeps what there is."""
     from steadyslip.files.output import FIGURES, check_output
@@ -340,17 +308,14 @@ def threshold(
     found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
     if found.interrupted and output:
         typer.secho("stopped: the basin is not drawn", err=True)
-    _given(found, () if found.interrupted else output or (), as_json, write_basin)
+    give(found, () if found.interrupted else output or (), as_json, write_basin)
 
 
 @app.command("map")
 def map_(
     source: Annotated[Path, typer.Argument(metavar="RIG", help="rig file with a table [map], or a map (.zarr)")],
     changes: Changes = None,
-    output: Annotated[
-        list[Path] | None,
-        typer.Option("-o", "--output", help="the map (.zarr), and .nc, .parquet, .png, .svg or .pdf; repeatable"),
-    ] = None,
+    output: Annotated[list[Path] | None, outputs("the map (.zarr), and .nc, .parquet, .png, .svg or .pdf")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="processes; all cores unless given")] = None,
     cluster: Annotated[
         str | None, typer.Option(help="compute on Dask: address of a scheduler such as tcp://host:8786, or local")
@@ -362,7 +327,7 @@ def map_(
     refine: Annotated[int, typer.Option(min=0, help="halve the cells along the edge of stability so often")] = 0,
     of: Annotated[str | None, typer.Option(help="result whose edge to refine; status unless given")] = None,
     level: Annotated[float | None, typer.Option(help="value that it crosses there, SI units")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object in SI units")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Any analysis over many rigs, kept on disk; the same command again goes on after an interruption."""
     from steadyslip.maps import refine as refined
@@ -380,9 +345,7 @@ def map_(
     for path in others:
         write_map(found, path, figure, edge)
     if as_json:
-        import json
-
-        say(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        say_json(found.to_dict())
         return
     say(str(found))
     if edge is not None:
@@ -400,10 +363,8 @@ def sensitivity(
         typer.Option(help="result, such as critical_stiffness or margin; repeatable; those of [map] unless given"),
     ] = None,
     points: Annotated[int, typer.Option(help="sets of points, a power of 2")] = 4096,
-    output: Annotated[
-        list[Path] | None, typer.Option("-o", "--output", help="draw: .png, .svg or .pdf; repeatable")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
+    output: Annotated[list[Path] | None, outputs("draw: .png, .svg or .pdf")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Which parameters decide? Sobol indices over the ranges of the file's [map]."""
     from steadyslip.files.output import FIGURES, check_output, write_by_ending
@@ -411,27 +372,7 @@ def sensitivity(
 
     check_output(output or (), FIGURES)
     found = sensitivity_file(rig, changes or (), of or (), points)
-    _given(found, output or (), as_json, lambda result, path: write_by_ending(path, {}, result.plot))
-
-
-def _given(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]) -> None:
-    """Print JSON or words, then write the files asked for: an answer is not lost with a file.
-
-    After Ctrl-C there is something to give as well. `write` says whether it was cut short itself.
-    """
-    if as_json:
-        import json
-
-        say(json.dumps(result.to_dict(), indent=2, allow_nan=False))
-    else:
-        say(str(result))
-    interrupted = bool(getattr(result, "interrupted", False))
-    for path in output:
-        interrupted = bool(write(result, path)) or interrupted
-        if not as_json:
-            say(f"wrote {path}")
-    if interrupted:
-        raise typer.Exit(130)
+    give(found, output or (), as_json, lambda result, path: write_by_ending(path, {}, result.plot))
 
 
 @app.command()
@@ -450,94 +391,11 @@ def reproduce(
 @app.command()
 def schema() -> None:
     """Print the JSON schema of the files that are read: rigs, protocols, maps and fits."""
-    import json
-
     from steadyslip.schemas import json_schema
 
     say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
 
 
 def main() -> None:
-    """Entry point: whatever comes, one clear message at most, and a status that says what it was.
-
-    0 answered, 1 answered but not stable (``--require-stable``), 2 no answer (the message says why), 70 a fault of
-    this program, 130 interrupted (what there is has been given), 141 nobody reads the answer any more.
-    """
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
-            stream.reconfigure(errors="replace")
-    if sys.stdout is None:  # closed by who started this
-        sys.exit(_failed("there is no standard output to write the answer to", 2))
-    sys.exit(_status(app))
-
-
-def _status(command: Callable[[], object]) -> int:
-    """Run, and turn everything that can happen into a status."""
-    from steadyslip.core.errors import SteadyslipError
-    from steadyslip.files.output import OutputClosed
-
-    status = 0
-    try:
-        command()
-    except SystemExit as left:
-        status = left.code if isinstance(left.code, int) else 0 if left.code is None else 2
-    except KeyboardInterrupt:  # before there was a command
-        status = 130
-    except OutputClosed:
-        status = 141
-    except SteadyslipError as error:
-        status = _failed(str(error), 2)
-    except MemoryError:
-        status = _failed("there is not enough memory for this; ask for fewer points, samples or runs", 2)
-    except OSError as error:
-        status = _failed(_system_fault(error), 2)
-        if error.filename is None:  # the output itself: what is still buffered would fail once more
-            from steadyslip.files.output import discard_output
-
-            discard_output()
-    except Exception as error:
-        if "STEADYSLIP_DEBUG" in os.environ:
-            raise
-        what = f"{type(error).__name__}: {error}"[:300]
-        status = _failed(
-            f"a fault of steadyslip itself, please report it with the command and its files: {what} "
-            "(STEADYSLIP_DEBUG=1 shows where)",
-            70,
-        )
-    return _flushed(status)
-
-
-def _system_fault(error: OSError) -> str:
-    try:
-        os.getcwd()
-    except OSError:
-        return "the working folder does not exist any more; change to one that does"
-    where = repr(str(error.filename)) if error.filename else "cannot write to the standard output"
-    return f"{where}: {error.strerror or error}"
-
-
-def _failed(message: str, status: int, kind: str = "error") -> int:
-    with suppress(OSError):
-        typer.secho(f"{kind}: {message}", err=True, fg=typer.colors.RED if sys.stderr and sys.stderr.isatty() else None)
-    return status
-
-
-def _flushed(status: int) -> int:
-    """What is left in the buffers must go out now: later nobody could say that it did not."""
-    from steadyslip.files.output import discard_output
-
-    try:
-        if sys.stdout is not None:
-            sys.stdout.flush()
-    except BrokenPipeError:
-        status = 141
-    except (OSError, ValueError) as error:
-        status = _failed(f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}", 2)
-    else:
-        return status
-    discard_output()
-    return status
-
-
-if __name__ == "__main__":
-    main()
+    """Entry point."""
+    end(app)

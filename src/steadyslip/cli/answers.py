@@ -1,0 +1,41 @@
+"""Answers on the standard output, and in files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+
+
+def say(text: str) -> None:
+    """Print an answer; that it cannot be written is an error like any other."""
+    from steadyslip.files.output import answering
+
+    with answering():
+        typer.echo(text)
+
+
+def say_json(data: Any) -> None:
+    """Print an answer for other programs."""
+    say(json.dumps(data, indent=2, allow_nan=False))
+
+
+def give(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]) -> None:
+    """Print JSON or words, then write the files asked for: an answer is not lost with a file.
+
+    After Ctrl-C there is something to give as well. `write` says whether it was cut short itself.
+    """
+    if as_json:
+        say_json(result.to_dict())
+    else:
+        say(str(result))
+    interrupted = bool(getattr(result, "interrupted", False))
+    for path in output:
+        interrupted = bool(write(result, path)) or interrupted
+        if not as_json:
+            say(f"wrote {path}")
+    if interrupted:
+        raise typer.Exit(130)

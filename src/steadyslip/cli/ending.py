@@ -1,0 +1,94 @@
+"""How the program ends: whatever comes, one clear message at most, and a status that says what it was.
+
+0 answered, 1 answered but not stable (``--require-stable``), 2 no answer (the message says why), 70 a fault of
+this program, 130 interrupted (what there is has been given), 141 nobody reads the answer any more.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from io import TextIOWrapper
+
+import typer
+
+
+def end(command: Callable[[], object]) -> None:
+    """Run, and end this process with the status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a console without Greek letters shows a substitute
+            stream.reconfigure(errors="replace")
+    if sys.stdout is None:  # closed by who started this
+        sys.exit(failed("there is no standard output to write the answer to", 2))
+    sys.exit(status_of(command))
+
+
+def status_of(command: Callable[[], object]) -> int:
+    """Run, and turn everything that can happen into a status."""
+    from steadyslip.core.errors import SteadyslipError
+    from steadyslip.files.output import OutputClosed
+
+    status = 0
+    try:
+        command()
+    except SystemExit as left:
+        status = left.code if isinstance(left.code, int) else 0 if left.code is None else 2
+    except KeyboardInterrupt:  # before there was a command
+        status = 130
+    except OutputClosed:
+        status = 141
+    except SteadyslipError as error:
+        status = failed(str(error), 2)
+    except MemoryError:
+        status = failed("there is not enough memory for this; ask for fewer points, samples or runs", 2)
+    except OSError as error:
+        status = failed(_system_fault(error), 2)
+        if error.filename is None:  # the output itself: what is still buffered would fail once more
+            from steadyslip.files.output import discard_output
+
+            discard_output()
+    except Exception as error:
+        if "STEADYSLIP_DEBUG" in os.environ:
+            raise
+        what = f"{type(error).__name__}: {error}"[:300]
+        status = failed(
+            f"a fault of steadyslip itself, please report it with the command and its files: {what} "
+            "(STEADYSLIP_DEBUG=1 shows where)",
+            70,
+        )
+    return _flushed(status)
+
+
+def _system_fault(error: OSError) -> str:
+    try:
+        os.getcwd()
+    except OSError:
+        return "the working folder does not exist any more; change to one that does"
+    where = repr(str(error.filename)) if error.filename else "cannot write to the standard output"
+    return f"{where}: {error.strerror or error}"
+
+
+def failed(message: str, status: int, kind: str = "error") -> int:
+    """Say why there is no answer; the status."""
+    with suppress(OSError):
+        typer.secho(f"{kind}: {message}", err=True, fg=typer.colors.RED if sys.stderr and sys.stderr.isatty() else None)
+    return status
+
+
+def _flushed(status: int) -> int:
+    """What is left in the buffers must go out now: later nobody could say that it did not."""
+    from steadyslip.files.output import discard_output
+
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        status = 141
+    except (OSError, ValueError) as error:
+        status = failed(f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}", 2)
+    else:
+        return status
+    discard_output()
+    return status

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 import steadyslip as ss
@@ -11,14 +12,14 @@ from dimensionless import unit_rig
 from kicks_at_random import KINDS, Reference, drawn, outcome_of
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.kicks import outcomes as outcomes_module, spans as spans_module
+from steadyslip.nonlinear.kicks import kicks as kicks_module, outcomes as outcomes_module, spans as spans_module
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.closed_orbits import _attraction
 from steadyslip.nonlinear.kicks.fold import at_fold
 from steadyslip.nonlinear.kicks.kicks import Kicked
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood, rates_at
 from steadyslip.nonlinear.kicks.rest import rest_of
-from steadyslip.nonlinear.kicks.spans import BLOW_UP, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.spans import BLOW_UP, DOUBTS, EXHAUSTED, LATE, OUTCOMES, RETURNS, doubt_of
 
 STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
 
@@ -328,13 +329,13 @@ def test_a_given_steady_stress_holds_at_the_rigs_own_velocity(angle, expected):
 
 
 def doubtful(low, high, limit):
-    """Outcomes of a made-up rig: returns below `limit`, blow-up above, undecided in between."""
+    """Outcomes of a made-up rig: returns below `limit`, blow-up above, undecided in between, for want of steps."""
 
     def made(runs, threads=None, advanced=None):
         if advanced is not None:
             advanced(len(runs.jump))
         size = np.abs(runs.jump) / runs.rest.scales[:, 0]
-        return np.where((size > low) & (size < high), UNDECIDED, np.where(size < limit, RETURNS, BLOW_UP))
+        return np.where((size > low) & (size < high), EXHAUSTED, np.where(size < limit, RETURNS, BLOW_UP))
 
     return made
 
@@ -345,18 +346,61 @@ def test_doubt_is_carried_through(monkeypatch):
     found = ss.threshold(a_rig, "displacement")
     assert (found.decided, found.outcome) == (False, "blow-up")
     assert found.bracket == pytest.approx((5.0, 6.0), rel=0.02)
-    assert "undecided between" in str(found)
-    assert found.to_dict()["decided"] is False
+    why = doubt_of(EXHAUSTED)
+    assert f"survives up to {found.survived / 1e-6:.6g}"[:-1] in str(found)
+    assert f"undecided ({why}) between" in str(found)
+    assert (found.to_dict()["decided"], found.to_dict()["doubt"]) == (False, why)
+    assert found.survived == pytest.approx(found.bracket[0] / found.size * found.amount, rel=1e-12)
     brackets, _, _ = threshold_brackets(a_rig, {"mass": np.zeros(2)}, "displacement")
     assert np.isnan(brackets.size).all()
     assert np.all(brackets.low <= 5.0)
     assert np.all((brackets.low > 4.8) & (brackets.high >= 6.0) & (brackets.high < 6.2))
     margin = ss.margin_to_kick(a_rig, ss.DisplacementStep(at=0.0, by=5.5 * found.amount / found.size))
     assert margin.survives is None
-    assert "undecided" in str(margin)
-    assert margin.to_dict()["survives"] is None
-    analysis = ss.analyze(a_rig, kick="displacement")
-    assert "(undecided from size" in " ".join(str(analysis).split())
+    assert f"undecided ({why})" in str(margin)
+    assert (margin.to_dict()["survives"], margin.to_dict()["doubt"]) == (None, why)
+    analysis = " ".join(str(ss.analyze(a_rig, kick="displacement")).split())
+    assert "survives a displacement step of 4.9" in analysis
+    assert f"({why}); more leads to blow-up" in analysis
+
+
+def test_doubt_is_said_on_maps(monkeypatch):
+    """Beside sizes that are not given: in the coordinate of an array, in map results, in the legend of the picture."""
+    a_rig, why = tilted(0.3, 1.2), f"undecided: {doubt_of(EXHAUSTED)}"
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(5.0, 6.0, 5.5))
+    angle = xr.DataArray([-1.4, 0.2, 0.3], dims="angle", coords={"angle": [-1.4, 0.2, 0.3]})
+    mass = xr.DataArray([0.0, 0.0, 0.0], dims="mass", coords={"mass": [0.0, 1.0, 2.0]})
+    found = ss.threshold_map(a_rig, {"contact.angle": angle, "mass": mass}, "displacement")
+    assert np.isnan(found).all()
+    assert set(found["limit"].sel(angle=-1.4).values) == {"no steady sliding"}
+    assert set(found["limit"].sel(angle=0.3).values) == {why}
+    words = " | ".join(ss.figures.threshold_map(found).get_legend_handles_labels()[1]).replace("\n", " ")
+    assert words == f"no steady sliding | {why}"
+    measured = ss.KickThreshold(kick="displacement").arrays(a_rig, ss.Protocol(), {"contact.angle": np.array([0.3])})
+    (limit,) = [o for o in ss.KickThreshold(kick="displacement").outputs(a_rig, ()) if o.name == "threshold_limit"]
+    assert limit.flags[int(measured["threshold_limit"][0])] == why
+
+
+def test_below_an_edge_that_is_not_certain_the_certain_end_is_said(monkeypatch):
+    """Undecided up to the edge of the new steady sliding: the edge itself is no kick that is survived."""
+    a_rig = tilted(-0.5, 1.15)
+    edge = ss.threshold(a_rig, "normal-stress", precision=1e-3)
+    assert edge.edge
+
+    share = edge.amount / edge.size
+
+    def slow(runs, threads=None, advanced=None):
+        size = runs.rest.pressure / share
+        return np.where(size > edge.size, BLOW_UP, np.where(size > 0.9 * edge.size, LATE, RETURNS))
+
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", slow)
+    found = ss.threshold(a_rig, "normal-stress")
+    assert (found.edge, found.decided) == (True, False)
+    assert found.survived == pytest.approx(found.bracket[0] * share, rel=1e-9)
+    assert found.survived < 0.91 * edge.amount
+    for text in (str(found), " ".join(str(replace(ss.analyze(a_rig), kicks=(found,))).split())):
+        assert f"{found.survived / 1e3:.6g}"[:4] in text
+        assert doubt_of(LATE) in text
 
 
 def test_narrow_doubt_leaves_a_threshold_and_endless_doubt_none(monkeypatch):
@@ -408,20 +452,77 @@ def test_all_kicks_of_a_threshold_share_their_steps(monkeypatch):
     assert "undecided" in str(found)
 
 
+def lugre_with_mass(static, coulomb, v_stribeck, viscous, stiffness, damping, k, mass, drive):
+    friction = ss.LuGre(mu_coulomb=coulomb, mu_static=static, v_stribeck=v_stribeck, viscous=viscous,
+                        bristle_stiffness=stiffness, bristle_damping=damping)  # fmt: skip
+    return ss.Slider(
+        friction=friction, contact=ss.Constant(preload=5e6), stiffness=k, mass=mass, drive=ss.Steady(drive)
+    )
+
+
+BURSTS = lugre_with_mass(0.28515067, 0.22351647, 6.9428985e-4, 0.25962072, 166284.25, 3.6975851, 9.6609339e10,
+                         8342.8728, 5.1718067e-4)  # fmt: skip
+IRREGULAR = lugre_with_mass(0.43046778, 0.26011183, 5.6138831e-4, 1.7738102, 236582.66, 53.432126, 6.5651327e11,
+                            425.22112, 2.5630575e-4)  # fmt: skip
+
+
+def test_a_cycle_of_several_slip_events_is_one_though_two_of_them_always_follow_each_other():
+    """Bursts end with two events a fixed time apart; the period is the time between bursts."""
+    assert outcomes(BURSTS, "normal-stress", [0.028651621], -1) == ["oscillation"]
+
+
+def test_irregular_motion_about_unstable_sliding_goes_on():
+    """No cycle is found, and none is needed: nothing returns to unstable sliding, and peaks have long been as high."""
+    assert ss.growth_rate(IRREGULAR) > 0
+    assert outcomes(IRREGULAR, "displacement", [0.4448986]) == ["oscillation"]
+
+
+def test_motion_that_still_grows_is_no_irregular_one():
+    peak, count = (outcomes_module.TALLY.index(name) for name in ("peak_velocity", "velocity_peaks"))
+    jobs = Kicked(IRREGULAR, "displacement", 1, "before", {}, 0, None).runs(np.zeros(4, int), np.ones(4))
+    course = outcomes_module._Course(jobs, 1, None)
+    tally = np.zeros((4, len(outcomes_module.TALLY)))
+    tally[:, count], tally[:, peak] = (50, 50, 30, 50), 1e-3 * np.array([1.0, 1.2, 1.0, 1.0])
+    course.peak[:], course.elapsed[:] = 1e-3, (1.0, 1.0, 1.0, 1e-5)
+    assert course._goes_on(np.arange(4), tally).tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize("most", [400, 3000])
+def test_a_span_with_too_many_steps_goes_on_from_where_it_ended(monkeypatch, most):
+    """What comes of a motion does not depend on how many steps are taken at a time."""
+    own = kicks_module.options_for
+    monkeypatch.setattr(kicks_module, "options_for", lambda *given: replace(own(*given), most_steps=most))
+    assert outcomes(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["oscillation"]
+    assert outcomes(heavy(ss.Slip(), 1.3, 1e10), "displacement", [60.0]) == ["returns"]
+
+
+def test_a_block_pulled_back_out_of_all_proportion_is_followed():
+    """It stops so hard that ln v falls by thousands; numbers stay numbers on its way back, for every size."""
+    friction = rate_state(a=0.0126, b=0.0153, mu_ref=0.6, normal_memory=ss.LinkerDieterich(alpha=0.175))
+    a_rig = ss.Slider(friction=friction, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.016), stiffness=2.74e10,
+                      mass=2.58e5, drive=ss.Steady(V0))  # fmt: skip
+    kicked = Kicked(a_rig, "velocity", -1, "after", {}, 0, None)
+    sizes = np.linspace(13.5, 14.9, 64)
+    assert set(kicked.outcomes(np.zeros(64, dtype=int), sizes).tolist()) == {RETURNS}
+
+
 def test_what_takes_too_long_is_undecided(monkeypatch):
     """An unstable rig whose cycle nobody may look for: nothing is said of it."""
     monkeypatch.setattr(outcomes_module, "_alike", lambda now, before: np.zeros(len(now), dtype=bool))
-    monkeypatch.setattr(outcomes_module, "LONG", np.inf)
+    monkeypatch.setattr(outcomes_module, "EARLY", np.inf)
     monkeypatch.setattr(spans_module, "MOST_TURNS", 20.0)
     monkeypatch.setattr(spans_module, "MOST_LOADING", 50.0)
-    assert outcomes(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", [2.0]) == ["undecided"]
+    kicked = Kicked(heavy(ss.Aging(), 0.5, 2.5e9), "displacement", 1, "before", {}, 0, None)
+    assert kicked.outcomes(np.zeros(1, int), np.array([2.0])).tolist() == [LATE]
 
 
-def test_doubt_has_a_colour():
+def test_doubt_has_a_colour_and_a_reason():
     a_rig = tilted(0.3, 1.2)
     outcome = np.array([["returns", "undecided"], ["blow-up", "returns"]])
-    found = ss.Basin(a_rig, np.array([-1e-6, 1e-6]), np.array([1e-7, 1e-6]), outcome, ())
-    assert "undecided" in found.plot().get_legend_handles_labels()[1]
+    doubt = np.array([["", DOUBTS[0]], ["", ""]])
+    found = ss.Basin(a_rig, np.array([-1e-6, 1e-6]), np.array([1e-7, 1e-6]), outcome, doubt, ())
+    words = [word.replace("\n", " ") for word in found.plot().get_legend_handles_labels()[1]]
+    assert words[1:] == ["returns", "blow-up", f"undecided: {DOUBTS[0]}"]
 
 
 # -- a fixed part of benchmarks/kicks.py

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import cycle, pairwise
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,8 @@ _MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": (
 _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY}
 _AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY,
           "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
+_UNDECIDED = ("xx", "++", "oo")
+WRAPPED = 36  # characters of a line in a legend
 
 
 def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
@@ -143,7 +146,8 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
 def basin(found: Basin, ax: Axes | None = None) -> Axes:
     """What comes of every starting point: slip ahead of the load point against velocity.
 
-    White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles. Yellow is undecided.
+    White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles. Yellow is undecided;
+    the legend says why.
 
     Parameters
     ----------
@@ -168,7 +172,9 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     ax.plot([0], [found.rig.drive.velocity / speed], "o", color=BLACK, markersize=4, label="steady sliding")
     for index in np.unique(codes):
         patch: dict[str, Any] = {"facecolor": _AREAS[names[index]], "edgecolor": GREY}
-        ax.fill_between([], [], label=names[index], **patch)
+        doubts = np.unique(found.doubt[found.outcome == names[index]])
+        for why in doubts:
+            ax.fill_between([], [], label=_undecided(why) if why else names[index], **patch)
     ax.set_yscale("log")
     ax.set_xlim(found.x.min() / length, found.x.max() / length)
     ax.set_ylim(found.v.min() / speed, found.v.max() / speed)
@@ -181,8 +187,8 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
 def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     """Thresholds over two parameters, as `steadyslip.threshold_map` gives them for DataArrays.
 
-    Hatched: steady sliding is unstable. Dotted: there is none, or the threshold is undecided. White: no kick in the
-    range is large enough.
+    Hatched: steady sliding is unstable. Dotted: there is none. Crossed: the threshold is undecided; the legend says
+    why. White: no kick in the range is large enough.
 
     Parameters
     ----------
@@ -221,10 +227,9 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     if np.any(found.values == 0):
         ax.contourf(x, y, found.values == 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
         ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="//", label="steady sliding is unstable")
-    if np.any(np.isnan(found.values)):
-        ax.contourf(x, y, np.isnan(found.values), levels=[0.5, 1.5], colors="none", hatches=[".."])
-        label = "no steady sliding, or undecided"
-        ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch="..", label=label)
+    for label, where, hatch in _without_size(found):
+        ax.contourf(x, y, where, levels=[0.5, 1.5], colors="none", hatches=[hatch])
+        ax.fill_between([], [], facecolor="none", edgecolor=BLACK, hatch=hatch, label=label)
     if not np.all(found.values > 0):
         ax.legend(fontsize="small")
     for values, set_scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
@@ -233,3 +238,16 @@ def threshold_map(found: Any, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
     return ax
+
+
+def _without_size(found: Any) -> list[tuple[str, Any, str]]:
+    """Words, places and hatches of what has no threshold, for each reason that there is."""
+    missing = np.isnan(found.values)
+    limit = np.asarray(found["limit"].values) if "limit" in found.coords else np.full(missing.shape, "not known")
+    doubts = cycle(_UNDECIDED)
+    hatches = {word: next(doubts) if word.startswith("undecided") else ".." for word in np.unique(limit[missing])}
+    return [(fill(str(word), WRAPPED), missing & (limit == word), hatch) for word, hatch in hatches.items()]
+
+
+def _undecided(why: str) -> str:
+    return fill(f"undecided: {why}", WRAPPED)

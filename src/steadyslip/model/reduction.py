@@ -24,8 +24,8 @@ from steadyslip.core.questions import Keeper, question
 from steadyslip.model.equations import Model
 
 Row = dict[sp.Symbol, sp.Expr]
-STANDSTILL = -500
-"""Of ln(v/v0): a block with mass slower than this keeps still to every purpose, and 1/v stays a number there."""
+STANDSTILL = -200
+"""Of ln(v/v0): a block with mass slower than this keeps still to every purpose; products of 1/v stay numbers there."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -177,17 +177,21 @@ def _survived(kick: Threshold) -> str:
         return "none is survived: steady sliding is unstable"
     if math.isinf(kick.size):
         return f"every {kick.kick} step in the range searched is survived"
+    reason = f" ({kick.doubt})" if kick.doubt else ""
     why = "stopped, not known" if kick.interrupted else "undecided"
     if math.isnan(kick.size) and kick.bracket[0] == 0:
-        return f"{why} from the smallest {kick.kick} step on"
+        return f"{why} from the smallest {kick.kick} step on{reason}"
     if math.isnan(kick.size):
-        return f"every {kick.kick} step tried up to size {kick.bracket[0]:.4g} is survived; {why} beyond"
+        return f"every {kick.kick} step tried up to size {kick.bracket[0]:.4g} is survived; {why} beyond{reason}"
     what = {"velocity": "a velocity step to", "displacement": "a displacement step of",
             "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
     edge = ", the edge of the sliding that it leads to" if kick.edge else ""
-    doubt = "" if kick.decided else f" ({why} from size {kick.bracket[0]:.4g} to {kick.bracket[1]:.4g})"
+    after = f"{kick.outcome}{reason}" if kick.outcome == "undecided" else f"more leads to {kick.outcome}"
     amount = shown(kick.amount, kick.unit, area=kick.rig.area)
-    return f"survives {what} {amount}{edge}{doubt}; more leads to {kick.outcome}"
+    if kick.decided:
+        return f"survives {what} {amount}{edge}; {after}"
+    survived = shown(kick.survived, kick.unit, area=kick.rig.area)
+    return f"survives {what} {survived}; {why} from there to {amount}{edge}{reason}; {after}"
 
 
 def _disturbance(analysis: Findings) -> str:

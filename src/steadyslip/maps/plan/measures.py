@@ -29,7 +29,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.motion import simulate_many
 from steadyslip.motion.many import EVENT_UNITS
 from steadyslip.motion.status import WORDS
-from steadyslip.nonlinear.kicks.brackets import threshold_brackets
+from steadyslip.nonlinear.kicks.brackets import BEYOND, threshold_brackets
 from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.onset.hopf import onset_map
 from steadyslip.protocol import Protocol
@@ -254,6 +254,7 @@ class KickThreshold(Measure, name="threshold"):
             Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
             Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),
             Output("threshold_high", "1", f"size of the smallest {self.kick} kick known not to be survived"),
+            Output("threshold_limit", "1", f"what limits the {self.kick} kicks that are survived", BEYOND),
         )
 
     def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
@@ -262,7 +263,8 @@ class KickThreshold(Measure, name="threshold"):
             rig, vary, self.kick, direction=direction, reference=self.reference, precision=self.precision, threads=1,
             progress=False,
         )  # fmt: skip
-        return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high}
+        return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high,
+                "threshold_limit": found.beyond}  # fmt: skip
 
     def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
         return 5e-3

@@ -22,7 +22,7 @@ from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import rest_of
-from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Budget, Judged
+from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Budget, Judged, doubt_of
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
@@ -44,6 +44,8 @@ class Basin(ReadOnly):
         Velocity at the start, m/s.
     outcome : ndarray of str (m, n)
         ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``, ``interrupted``.
+    doubt : ndarray of str (m, n)
+        Why points are undecided; empty where they are not.
     cycles : tuple of History
         One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
         the plane of a rig with two variables.
@@ -53,6 +55,7 @@ class Basin(ReadOnly):
     x: Array = field(repr=False)
     v: Array = field(repr=False)
     outcome: Array = field(repr=False)
+    doubt: Array = field(repr=False)
     cycles: tuple[History, ...] = field(repr=False)
 
     @property
@@ -137,9 +140,10 @@ def basin(
     )
     with progress_bar(count, progress, "starting points") as advanced:
         found = outcomes_of(runs, threads, advanced)
-    outcome = np.array(OUTCOMES)[found].reshape(width.shape)
+    reasons = [doubt_of(code) for code in range(len(OUTCOMES))]
+    outcome, doubt = (np.array(words)[found].reshape(width.shape) for words in (OUTCOMES, reasons))
     orbits = () if np.any(found == INTERRUPTED) else _unstable_cycles(rig, along, branch, progress)
-    return Basin(rig, across, up, outcome, orbits)
+    return Basin(rig, across, up, outcome, doubt, orbits)
 
 
 def _unstable_cycles(rig: Slider, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:

@@ -13,15 +13,16 @@ from steadyslip.core.progress import progress_bar
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
 from steadyslip.nonlinear.kicks.kicks import KICKS, Kicked
-from steadyslip.nonlinear.kicks.spans import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.spans import CERTAIN, DOUBTS, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
 Array = np.ndarray
 COARSE = 48  # sizes of the first scan of each rig
 WIDE = 0.1  # relative width of an undecided bracket beyond which its middle is no threshold
-BEYOND = (*OUTCOMES, "edge", "unstable", "no steady sliding")
-"""What limits the kicks of a rig: what comes of the smallest that fails, or another reason; `RETURNS`: none fails."""
+BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding")
+"""What limits the kicks of a rig: what comes of the smallest that fails, why there is no size, or another reason;
+`RETURNS`: none fails."""
 EDGE, UNSTABLE, ABSENT = range(len(OUTCOMES), len(OUTCOMES) + 3)
 
 
@@ -86,7 +87,9 @@ def threshold_map(
         Sizes without unit, as in `Threshold`: 0 where steady sliding is unstable, inf where no kick in the
         range fails, NaN where there is no steady sliding, and where kicks over more than a tenth of the size are
         undecided (`Threshold` of a single rig says more). After Ctrl-C, NaN too where nothing is known yet, and the
-        middle of the bracket reached where something is.
+        middle of the bracket reached where something is. A DataArray has a coordinate ``limit`` beside it: what comes
+        of larger kicks, ``edge``, ``unstable``, ``no steady sliding`` or ``undecided`` with the reason; ``returns``
+        where none fails.
     """
     found, dims, coords = threshold_brackets(
         rig, vary, kick, direction=direction, reference=reference, precision=precision, rtol=rtol, threads=threads,
@@ -97,7 +100,10 @@ def threshold_map(
     import xarray as xr
 
     about = {"units": "1", "long_name": f"{kick} kick that is survived, {KICKS[kick].size}"}
-    return xr.DataArray(found.size, dims=dims, coords=coords, name=f"{kick}_threshold", attrs=about)
+    limit = np.array(BEYOND)[found.beyond]
+    return xr.DataArray(
+        found.size, dims=dims, coords={**coords, "limit": (dims, limit)}, name=f"{kick}_threshold", attrs=about
+    )
 
 
 def threshold_brackets(
@@ -117,7 +123,7 @@ def threshold_brackets(
     flat, _, together = broadcast_arrays(rig, Protocol(), vary, {})
     shape = together.shape
     size = int(np.prod(shape, dtype=int))
-    columns = [np.full(size, np.nan) for _ in range(3)] + [np.full(size, INTERRUPTED)]
+    columns = [*(np.full(size, np.nan) for _ in range(3)), np.full(size, INTERRUPTED)]
     rounds = COARSE + int(np.ceil(np.log2(0.35 / precision)))
     with progress_bar(size * rounds, progress) as advanced:
         for group_rig, chosen, index in regimes(rig, flat, size):
@@ -140,7 +146,8 @@ class _Search:
         self.stable, self.exists = (np.broadcast_to(a, (count,)) for a in (kicked.stable, kicked.exists))
         self.rig = np.arange(count) if kicked.size > 1 else np.zeros(count, dtype=int)
         self.low, self.high = np.zeros(count), np.full(count, np.inf)
-        self.doubt = np.full((count, 2), np.nan)  # ends of what is undecided inside the bracket
+        self.doubt = np.full((count, 2), np.nan)  # ends of what is undecided inside the bracket,
+        self.why = np.full(count, UNDECIDED)  # and why
         self.beyond = np.where(self.exists, np.where(self.stable, INTERRUPTED, UNSTABLE), ABSENT)
         self.whole = True
 
@@ -159,7 +166,7 @@ class _Search:
             if not len(going) or not self.whole:
                 break
         if self.whole:
-            self.beyond[going] = np.where(np.isnan(self.doubt[going, 0]), RETURNS, UNDECIDED)
+            self.beyond[going] = np.where(np.isnan(self.doubt[going, 0]), RETURNS, self.why[going])
         while self.whole:
             point, wide = self._next(precision)
             if not len(wide):
@@ -185,12 +192,13 @@ class _Search:
             return np.zeros(0, dtype=bool)
         found = self.kicked.outcomes(self.rig[which], sizes, self.threads, self.advanced, effort=1.0)
         self.whole = self.whole and not np.any(found == INTERRUPTED)
-        failed, back, doubtful = np.isin(found, CERTAIN), found == RETURNS, found == UNDECIDED
+        failed, back, doubtful = np.isin(found, CERTAIN), found == RETURNS, found >= UNDECIDED
         rig, size = which[failed], sizes[failed]
         self.high[rig], self.beyond[rig] = size, found[failed]
         self.doubt[rig[self.doubt[rig, 0] >= size]] = np.nan
         self.doubt[rig, 1] = np.minimum(self.doubt[rig, 1], size)
         rig, size = which[doubtful], sizes[doubtful]
+        self.why[rig] = found[doubtful]
         self.doubt[rig, 0] = np.fmin(self.doubt[rig, 0], size)
         self.doubt[rig, 1] = np.fmax(self.doubt[rig, 1], size)
         rig, size = which[back], sizes[back]
@@ -205,9 +213,10 @@ class _Search:
             middle = np.where(self.beyond == EDGE, self.high, 0.5 * (self.low + self.high))
             known = np.isfinite(self.high) & (~self.whole | (self.high - self.low <= WIDE * self.high))
         size = np.where(known, middle, np.nan)
+        beyond = np.where(np.isfinite(self.high) & ~known & self.whole, self.why, self.beyond)
         size = np.where(self.beyond == RETURNS, np.inf, size)
         size = np.where(self.beyond == UNSTABLE, 0.0, size)
         low, high = (np.where(self.beyond == ABSENT, np.nan, a) for a in (self.low, self.high))
         high = np.where(self.beyond == UNSTABLE, 0.0, high)
         low = np.where(self.beyond == INTERRUPTED, np.where(low > 0, low, np.nan), low)
-        return size, low, high, self.beyond
+        return size, low, high, beyond

@@ -52,8 +52,13 @@ class _Turn:
     good: Array
 
 
-def attracted(runs: Judged, which: Array, states: Array, period: Array, threads: int | None = None) -> Array:
-    """Whether runs `which` (k,), now at `states` (k, n), are on an attracting closed orbit of about `period` (k,)."""
+def attracted(
+    runs: Judged, which: Array, states: Array, period: Array, threads: int | None = None
+) -> tuple[Array, Array]:
+    """Whether runs `which` (k,), now at `states` (k, n), are on an attracting closed orbit of about `period` (k,).
+
+    And whether a period later they are where they were, but for a little: on any closed orbit, or close to one.
+    """
     rest = runs.rest.part(which)
     scale, n = rest.scales, states.shape[1]
     y, log_period = states / scale, np.log(period)
@@ -61,10 +66,10 @@ def attracted(runs: Judged, which: Array, states: Array, period: Array, threads:
     size = np.linalg.norm(speed, axis=1)
     alive = np.isfinite(size) & (size > 0)
     ahead = np.where(alive[:, None], speed / np.where(alive, size, 1.0)[:, None], 0.0)
-    found = np.zeros(len(which), dtype=bool)
+    found, back = np.zeros(len(which), dtype=bool), np.zeros(len(which), dtype=bool)
     tolerance = max(CLOSED, LOOSE * runs.jobs.options.rtol)
     start, steady = y.copy(), rest.state / scale
-    for _ in range(ROUNDS):
+    for attempt in range(ROUNDS):
         here = np.flatnonzero(alive)
         if not len(here):
             break
@@ -76,6 +81,8 @@ def attracted(runs: Judged, which: Array, states: Array, period: Array, threads:
         margin = _attraction(turn.derivative, arrival)
         size = np.max(np.abs(y[here] - steady[here]), axis=1)
         size = np.where(np.isfinite(size), np.minimum(size, 1.0), 1.0)
+        if attempt == 0:
+            back[here] = turn.good & (off < ON * size)
         close = turn.good & (off < tolerance) & ((off < PRECISE * margin * size) | (margin <= 0))
         found[here[close]] = (margin > 0)[close] & (size > AWAY)[close]
         near = np.max(np.abs(y[here] - start[here]) / (1 + np.abs(start[here])), axis=1) < ON * size
@@ -99,7 +106,7 @@ def attracted(runs: Judged, which: Array, states: Array, period: Array, threads:
         y[here[go]] += change[:, :n]
         log_period[here[go]] += change[:, n]
         alive[here[go[~usable]]] = False
-    return found
+    return found, back
 
 
 def _turned(runs: Judged, which: Array, states: Array, scale: Array, period: Array, threads: int | None) -> _Turn:

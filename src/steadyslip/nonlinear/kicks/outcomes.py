@@ -2,8 +2,9 @@
 
 A motion returns once it is in a computed neighbourhood of steady sliding that is never left (`neighbourhood`); it
 oscillates once it is on a closed orbit that was found and attracts (`closed_orbits`); blow-up and loss of contact are
-seen, and so is that a motion has no continuous solution any further (`fold`). Whatever is none of these runs on, and
-after a stated time it is *undecided*.
+seen, and so is that a motion has no continuous solution any further (`fold`). Where steady sliding is unstable nothing
+returns to it, and irregular motion that has gone on for dozens of peaks, none of them higher than those before,
+oscillates too. Whatever is none of these runs on, and after a stated time it is *undecided*, for a reason in `DOUBTS`.
 """
 
 from __future__ import annotations
@@ -21,21 +22,31 @@ from steadyslip.nonlinear.kicks.shells import Shells
 from steadyslip.nonlinear.kicks.spans import (
     BLOW_UP,
     CONTACT_LOST,
+    EXHAUSTED,
     INTERRUPTED,
+    LATE,
     NO_SOLUTION,
     OPEN,
     OSCILLATION,
     RETURNS,
-    UNDECIDED,
+    SPENT,
+    STUCK,
+    UNSEEN,
     Judged,
     Spans,
     advanced_runs,
 )
 
 Array = np.ndarray
-MOST_STEPS = 4_000_000  # after which a motion is undecided
-LONG, LATE = 0.05, 0.4  # share of the time allowed after which longer cycles are looked for; where sliding is stable
+MOST_STEPS = 400_000  # by which a motion is undecided, times its effort
+EARLY, HALFWAY = (
+    0.05,
+    0.4,
+)  # share of the time allowed after which longer cycles are looked for; where sliding is stable
 ALIKE = 1e-2  # relative change of the time between slip events from span to span below which a cycle is looked for
+PEAKS = 40  # of velocity in the last span of irregular motion,
+HIGHER = 0.01  # by this share of ln(velocity/drive) they may be higher than all before,
+LEFT = 30.0  # and so many growth times of unstable steady sliding it has gone on for
 STIFF = "rodas4"  # the method for motions that an explicit one needs too many steps for
 CODE = {word: number for number, word in enumerate(STATUSES)}
 
@@ -63,6 +74,8 @@ class _Course:
         Whether an explicit method has needed too many steps.
     between : ndarray (m,)
         Time between slip events, or peaks, at the end of the last span.
+    peak : ndarray (m,)
+        Highest velocity so far, m/s.
     """
 
     def __init__(self, runs: Judged, threads: int | None, start: Array | None) -> None:
@@ -71,6 +84,7 @@ class _Course:
         self.span, self.allowed = runs.times()
         self.most = self.allowed.copy()
         self.elapsed, self.steps, self.between = np.zeros(count), np.zeros(count), np.full(count, np.nan)
+        self.peak = np.full(count, np.nan)
         self.found, self.stiff = np.full(count, OPEN), np.zeros(count, dtype=bool)
         self.state = np.full(runs.rest.state.shape, np.nan) if start is None else np.array(start)
         self.started, self.begun = start is not None, np.full(count, start is not None)
@@ -120,13 +134,19 @@ class _Course:
         return found
 
     def _retried(self, open_: Array, ended: Spans) -> Array:
-        """Note where explicit steps were too many, to do the span once more; the others, which go on from its end."""
-        again = (ended.status == CODE["too many steps"]) & ~self.stiff[open_] & self.explicit
+        """Note where explicit steps were too many, to do the span once more; the others, which go on from its end.
+
+        A span that too many steps were not enough for has ended where they were used up.
+        """
+        many = ended.status == CODE["too many steps"]
+        again = many & ~self.stiff[open_] & self.explicit
         self.stiff[open_[again]] = True
         self.steps[open_] += np.where(again, 0.0, ended.steps)
         over = np.flatnonzero(~again)
         which = open_[over]
-        self.elapsed[which] += self.span[which]
+        short = many[over] & np.all(np.isfinite(ended.state[over]), axis=1) & (not self.anew)
+        self.span[which[short]] = 0.5 * ended.time[over[short]]
+        self.elapsed[which] += np.where(short, ended.time[over], self.span[which])
         self.state[which], self.begun[which] = ended.state[over], True
         away = self.allowed[which] + self.runs.reload(which, self.state[which])
         self.most[which] = np.maximum(self.most[which], away)
@@ -135,7 +155,7 @@ class _Course:
     def _judge(self, which: Array, ended: Spans, watched: Array) -> None:
         """Say what is certain of motions at the end of a span."""
         runs, found, state = self.runs, self.found, self.state
-        found[which] = _seen(runs, which, ended)
+        found[which] = _seen(runs, which, ended, self.anew)
         running = np.flatnonzero(found[which] == OPEN)
         going = which[running]
         found[going[runs.near.holds(going, state[going])]] = RETURNS
@@ -148,20 +168,38 @@ class _Course:
         apart, peaks = (ended.tally[:, TALLY.index(name)] for name in ("recurrence", "peak_period"))
         apart = np.where(apart > 0, apart, peaks)  # small cycles have no slip events
         alike = _alike(apart, self.between[which])[running]
-        tried = running[(found[going] == OPEN) & ~neutral & alike]
+        tried = np.flatnonzero((found[going] == OPEN) & ~neutral & alike)
+        again = np.zeros(len(going), dtype=bool)
         if len(tried):
-            closed = attracted(runs, which[tried], state[which[tried]], apart[tried], self.threads)
-            found[which[tried[closed]]] = OSCILLATION
-        long = np.where(runs.rest.stable[going], LATE, LONG) * self.most[going]
-        several = going[(found[going] == OPEN) & ~neutral & ~alike & (self.elapsed[going] > long)]
+            one = going[tried]
+            closed, again[tried] = attracted(runs, one, state[one], apart[running[tried]], self.threads)
+            found[one[closed]] = OSCILLATION
+        long = np.where(runs.rest.stable[going], HALFWAY, EARLY) * self.most[going]
+        several = going[(found[going] == OPEN) & ~neutral & ~again & (self.elapsed[going] > long)]
         found[[one for one in several if on_long_cycle(runs, one, state[one])]] = OSCILLATION
+        left = running[np.isin(going, several) & (found[going] == OPEN)]
+        found[which[left[self._goes_on(which[left], ended.tally[left])]]] = OSCILLATION
+        self.peak[which] = np.fmax(self.peak[which], ended.tally[:, TALLY.index("peak_velocity")])
         self.between[which] = apart
+
+    def _goes_on(self, which: Array, tally: Array) -> Array:
+        """Whether motions about unstable steady sliding go on for good, bounded though not repeating themselves."""
+        rest = self.runs.rest.part(which)
+        count, peak = (tally[:, TALLY.index(name)] for name in ("velocity_peaks", "peak_velocity"))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            before, now = (np.log(np.abs(v / rest.velocity)) for v in (self.peak[which], peak))
+            left = rest.leading.real * self.elapsed[which] > LEFT
+            return np.asarray(left & (count > PEAKS) & (now <= before + HIGHER * np.abs(before)))
 
     def _give_up(self, open_: Array) -> None:
         """Call undecided what has had its time, or its steps."""
-        late = (self.elapsed[open_] >= self.most[open_]) | (self.steps[open_] >= MOST_STEPS * self.runs.effort)
-        late |= self.runs.budget.steps <= 0
-        self.found[open_[late & (self.found[open_] == OPEN)]] = UNDECIDED
+        runs, open_ = self.runs, open_[self.found[open_] == OPEN]
+        late = self.elapsed[open_] >= self.most[open_]
+        unseen = runs.rest.stable[open_] & (runs.near.radius[open_] == 0)
+        self.found[open_[late]] = np.where(unseen, UNSEEN, LATE)[late]
+        self.found[open_[~late & (self.steps[open_] >= MOST_STEPS * runs.effort)]] = EXHAUSTED
+        if runs.budget.steps <= 0:
+            self.found[open_[self.found[open_] == OPEN]] = SPENT
 
 
 def _fates(runs: Judged, threads: int | None, start: Array) -> Array:
@@ -175,16 +213,19 @@ def _alike(now: Array, before: Array) -> Array:
         return np.asarray((now > 0) & (np.abs(now - before) < ALIKE * now))
 
 
-def _seen(runs: Judged, which: Array, ended: Spans) -> Array:
-    """Outcomes that a run's end itself tells; OPEN where it went on to the end of its span."""
+def _seen(runs: Judged, which: Array, ended: Spans, anew: bool) -> Array:
+    """Outcomes that a run's end itself tells; OPEN where it can go on, `anew` from its beginning only."""
     status = ended.status
     found = np.full(len(status), NO_SOLUTION)
     found[status == CODE["done"]] = OPEN
     found[status == CODE["blow-up"]] = BLOW_UP
     found[status == CODE["contact lost"]] = CONTACT_LOST
-    stuck = np.flatnonzero((status == CODE["stuck"]) | (status == CODE["too many steps"]))
-    if len(stuck):  # the integrator's limits, or no solution
-        folded = at_fold(runs.rest.part(which[stuck]), ended.state[stuck])
-        found[stuck[~folded]] = UNDECIDED
+    many = status == CODE["too many steps"]
+    limited = np.flatnonzero((status == CODE["stuck"]) | many)
+    if len(limited):  # the integrator's limits, or no solution
+        folded = at_fold(runs.rest.part(which[limited]), ended.state[limited])
+        lost = ~np.all(np.isfinite(ended.state[limited]), axis=1)
+        further = np.where(many[limited], np.where(lost | anew, EXHAUSTED, OPEN), STUCK)
+        found[limited[~folded]] = further[~folded]
     found[status >= len(STATUSES)] = INTERRUPTED
     return found

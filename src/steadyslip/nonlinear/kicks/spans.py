@@ -18,8 +18,19 @@ from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.protocol import Segments
 
 Array = np.ndarray
-OUTCOMES = ("returns", "blow-up", "contact lost", "oscillation", "no solution", "interrupted", "undecided")
+DOUBTS = (
+    "neither near steady sliding nor on a cycle that was found when its longest time was over",
+    "the steps of integration allowed for one motion are used up",
+    "the steps of integration allowed for all motions together are used up",
+    "the integrator came to where it cannot go on",
+    "no neighbourhood of steady sliding was found, so that a return cannot be told",
+)
+"""Why a motion is undecided."""
+OUTCOMES = ("returns", "blow-up", "contact lost", "oscillation", "no solution", "interrupted",
+            *len(DOUBTS) * ["undecided"])  # fmt: skip
 RETURNS, BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION, INTERRUPTED, UNDECIDED = range(7)
+"""Numbers of outcomes; from `UNDECIDED` on they are those of `DOUBTS`."""
+LATE, EXHAUSTED, SPENT, STUCK, UNSEEN = range(UNDECIDED, len(OUTCOMES))
 CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 """Outcomes that are not a return."""
 OPEN = -1
@@ -31,6 +42,11 @@ MOST_TURNS = 1000.0  # natural periods, and
 MOST_LOADING = 4000.0  # natural lengths after which a motion is undecided
 RELOAD = 1.5  # so many times the time in which the load point catches up with the block is no motion to wait for
 NEUTRAL_TURNS = 100.0  # where small motions neither grow nor decay: what stays bounded so long counts as returned
+
+
+def doubt_of(outcome: int) -> str:
+    """Why an outcome is undecided; empty where it is not."""
+    return DOUBTS[outcome - UNDECIDED] if UNDECIDED <= outcome < len(OUTCOMES) else ""
 
 
 @dataclass
@@ -111,11 +127,15 @@ def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array) 
     )
 
 
+ARRAYS = ("status", "time", "state", "steps", "tally")
+
+
 @dataclass
 class Spans:
-    """What a span of some runs ended with: status, state (k, n), steps and tally."""
+    """What a span of some runs ended with: status, time reached (s), state (k, n), steps and tally."""
 
     status: Array
+    time: Array
     state: Array
     steps: Array
     tally: Array
@@ -124,16 +144,16 @@ class Spans:
     @classmethod
     def empty(cls, count: int, n: int) -> Spans:
         """Of runs that are still to be run."""
-        return cls(np.full(count, len(STATUSES)), np.full((count, n), np.nan), np.zeros(count),
+        return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan), np.zeros(count),
                    np.full((count, len(TALLY)), np.nan))  # fmt: skip
 
     def part(self, which: Array) -> Spans:
         """Those of some of the runs."""
-        return Spans(self.status[which], self.state[which], self.steps[which], self.tally[which], self.whole)
+        return replace(self, **{name: getattr(self, name)[which] for name in ARRAYS})
 
     def put(self, which: Array, found: Spans) -> None:
         """Fill in those of some of the runs."""
-        for name in ("status", "state", "steps", "tally"):
+        for name in ARRAYS:
             getattr(self, name)[which] = getattr(found, name)
         self.whole = self.whole and found.whole
 
@@ -162,8 +182,9 @@ def advanced_runs(
 
     def work(begin: int, end: int, stopped: threading.Event) -> None:
         outcome = run_chunk(part, machine, begin, end, np.empty(0), watch, stopped)
-        found.status[begin:end], found.state[begin:end] = outcome.status, outcome.final[:, 4:]
-        found.steps[begin:end], found.tally[begin:end] = outcome.final[:, 2] + outcome.final[:, 3], outcome.tally
+        found.status[begin:end], found.tally[begin:end] = outcome.status, outcome.tally
+        found.time[begin:end], found.state[begin:end] = outcome.final[:, 0], outcome.final[:, 4:]
+        found.steps[begin:end] = outcome.final[:, 2] + outcome.final[:, 3]
 
     found.whole = run_many(work, count, threads)
     runs.budget.steps -= float(np.nansum(found.steps))

@@ -14,7 +14,16 @@ from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
-from steadyslip.nonlinear.kicks.spans import CERTAIN, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED, Budget
+from steadyslip.nonlinear.kicks.spans import (
+    CERTAIN,
+    INTERRUPTED,
+    LATE,
+    OUTCOMES,
+    RETURNS,
+    UNDECIDED,
+    Budget,
+    doubt_of,
+)
 from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
 
 Array = np.ndarray
@@ -41,7 +50,7 @@ class Threshold:
     bracket : tuple of float
         Sizes of the largest kick up to which all that were tried return, and of the smallest known not to.
     amount : float
-        The same in SI units: velocity after the step (or before it, with ``reference="after"``), displacement,
+        The size in SI units: velocity after the step (or before it, with ``reference="after"``), displacement,
         change of normal stress, or impulse.
     unit : str
     outcome : str
@@ -57,6 +66,10 @@ class Threshold:
         allowed without coming to an end.
     interrupted : bool
         Whether Ctrl-C ended the search; the bracket is what was known by then.
+    doubt : str
+        Why kicks inside the bracket, or beyond it, are undecided; empty where none of them is.
+    survived : float
+        The lower end of the bracket in SI units, as `amount`: all smaller kicks that were tried return.
     """
 
     rig: Slider = field(repr=False)
@@ -71,6 +84,8 @@ class Threshold:
     edge: bool = False
     decided: bool = True
     interrupted: bool = False
+    doubt: str = ""
+    survived: float = np.nan
 
     def __str__(self) -> str:
         what = f"{self.kick} kick"
@@ -82,14 +97,20 @@ class Threshold:
         if self.interrupted and low == 0 and np.isnan(self.size):
             return f"{what}: stopped before anything was found"
         if np.isnan(self.size):
-            beyond = "stopped there" if self.interrupted else "undecided beyond"
+            beyond = "stopped there" if self.interrupted else f"undecided beyond ({self.doubt})"
             return f"{what}: all that were tried are survived up to size {low:.4g}; {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
-        why = "stopped when it was" if self.interrupted else "undecided"
-        doubt = "" if self.decided else f"; {why} between {low:.6g} and {high:.6g}"
+        after = self.outcome if self.outcome != "undecided" else f"undecided ({self.doubt})"
+        amount = shown(self.amount, self.unit, 7, self.rig.area)
+        if self.decided:
+            return (
+                f"{what}: survives up to {amount} (size {self.size:.7g}, bracket {low:.9g} to {high:.9g}){edge}; "
+                f"beyond: {after}"
+            )
+        why = "stopped when it was between" if self.interrupted else f"undecided ({self.doubt}) between"
         return (
-            f"{what}: survives up to {shown(self.amount, self.unit, 7, self.rig.area)} (size {self.size:.7g}, bracket "
-            f"{low:.9g} to {high:.9g}){edge}{doubt}; beyond: {self.outcome}"
+            f"{what}: survives up to {shown(self.survived, self.unit, 7, self.rig.area)} (size {low:.7g}); "
+            f"{why} that and size {high:.7g}{edge}; beyond: {after}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -104,11 +125,13 @@ class Threshold:
             "size": plain(self.size),
             "bracket": [plain(x) for x in self.bracket],
             "amount": plain(self.amount),
+            "survived": plain(self.survived),
             "unit": self.unit,
             "outcome": self.outcome,
             "searched": self.searched,
             "edge": self.edge,
             "decided": self.decided,
+            "doubt": self.doubt,
             "interrupted": self.interrupted,
         } | total(plain(self.amount), self.unit, self.rig.area)
 
@@ -183,8 +206,9 @@ def threshold(
     steady_states(rig)  # raises, and says why
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol)
     if not kicked.stable[0]:
-        return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), float(kicked.amount(0.0)[0]), kicked.kick.unit,
-                         "unstable", kicked.highest)  # fmt: skip
+        nothing = float(kicked.amount(0.0)[0])
+        return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), nothing, kicked.kick.unit, "unstable", kicked.highest,
+                         survived=nothing)  # fmt: skip
     search = _Search(kicked, progress)
     try:
         search.run(precision)
@@ -201,13 +225,16 @@ class _Search:
     low, high : float
         Largest size up to which all return, smallest known not to (inf: none).
     outcome : int
-        What comes of the latter; `UNDECIDED` where the first doubt is.
+        What comes of the latter; why the first doubt is one, where that is all that is known.
+    doubt : int
+        Why kicks inside the bracket are undecided; `RETURNS` where none is.
     """
 
     def __init__(self, kicked: Kicked, progress: Callable[[int, float, float], None] | None) -> None:
         self.kicked, self.progress = kicked, progress
         kicked.budget = Budget(STEPS)
-        self.low, self.high, self.edge, self.outcome = 0.0, np.inf, np.inf, RETURNS
+        self.low, self.high, self.edge = 0.0, np.inf, np.inf
+        self.outcome = self.doubt = RETURNS
         self.tried, self.interrupted = 0, False
 
     def run(self, precision: float) -> None:
@@ -222,7 +249,9 @@ class _Search:
                 break
         if self.at_edge and self.high * BEYOND <= self.kicked.highest:
             found = int(self._outcomes(np.array([self.high * BEYOND]), PATIENCE)[0])
-            self.outcome = found if found in CERTAIN else UNDECIDED
+            if found == INTERRUPTED:
+                raise KeyboardInterrupt
+            self.outcome = LATE if found == RETURNS else found  # neutral sliding is no return there
 
     @property
     def at_edge(self) -> bool:
@@ -233,7 +262,7 @@ class _Search:
         """Rising sizes up to the first that fails; a block beyond the first doubt is the last."""
         for start in range(0, len(sizes), BLOCK):
             block, low = sizes[start : start + BLOCK], self.low
-            doubt = self.outcome == UNDECIDED
+            doubt = self.outcome >= UNDECIDED
             self._narrow(block[:: 2 if doubt else 1], 1.0)
             if doubt:
                 self.low = low
@@ -250,8 +279,10 @@ class _Search:
         failed = np.flatnonzero(np.isin(found, CERTAIN))
         if len(failed):
             self.high, self.outcome = float(sizes[failed[0]]), int(found[failed[0]])
-        elif len(others) and self.outcome == RETURNS:
-            self.outcome = UNDECIDED
+        doubtful = np.flatnonzero((found >= UNDECIDED) & (sizes < self.high))
+        self.doubt = int(found[doubtful[0]]) if len(doubtful) else RETURNS
+        if len(doubtful) and self.outcome == RETURNS:
+            self.outcome = self.doubt
         if survived:
             self.low = float(sizes[survived - 1])
         if np.any(found == INTERRUPTED):
@@ -272,10 +303,13 @@ class _Search:
         size = high if self.at_edge else 0.5 * (low + high)
         if np.isinf(high):
             size = np.inf if self.outcome == RETURNS and not self.interrupted else np.nan
-        amount = float(kicked.amount(size)[0]) if np.isfinite(size) else size
+        amount, survived = (float(kicked.amount(s)[0]) if np.isfinite(s) else s for s in (size, low))
+        doubt = doubt_of(self.doubt) or doubt_of(self.outcome)
         word = "" if self.outcome == RETURNS else OUTCOMES[self.outcome]
-        return Threshold(rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word,
-                         kicked.highest, self.at_edge, decided and not self.interrupted, self.interrupted)  # fmt: skip
+        return Threshold(
+            rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word, kicked.highest,
+            self.at_edge, decided and not self.interrupted, self.interrupted, doubt, survived,
+        )  # fmt: skip
 
 
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
@@ -318,12 +352,15 @@ class KickMargin:
     outcome : str
         What comes of the step itself: ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution`` or
         ``undecided``. Beyond the threshold larger kicks may return again.
+    doubt : str
+        Why it is undecided; empty where it is not.
     """
 
     step: Any
     threshold: Threshold
     ratio: float
     outcome: str
+    doubt: str = ""
 
     @property
     def survives(self) -> bool | None:
@@ -331,14 +368,14 @@ class KickMargin:
         return None if self.outcome == "undecided" else self.outcome == "returns"
 
     def __str__(self) -> str:
-        words = {True: "survives it", False: f"does not survive it ({self.outcome})", None: "undecided"}
+        words = {True: "survives it", False: f"does not survive it ({self.outcome})", None: f"undecided ({self.doubt})"}
         ratio = f": the limit is {self.ratio:.4g} times this step" if np.isfinite(self.ratio) else ""
         return f"{words[self.survives]}{ratio}\n{self.threshold}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units."""
         ratio = float(self.ratio) if np.isfinite(self.ratio) else None
-        return {"survives": self.survives, "outcome": self.outcome, "ratio": ratio,
+        return {"survives": self.survives, "outcome": self.outcome, "doubt": self.doubt, "ratio": ratio,
                 "threshold": self.threshold.to_dict()}  # fmt: skip
 
 
@@ -379,4 +416,4 @@ def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: i
     if outcome == INTERRUPTED:
         raise KeyboardInterrupt
     ratio = found.size / size if size else np.inf
-    return KickMargin(step, found, float(ratio), OUTCOMES[outcome])
+    return KickMargin(step, found, float(ratio), OUTCOMES[outcome], doubt_of(outcome))

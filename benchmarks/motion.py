@@ -34,6 +34,7 @@ from problems import Problem, problems
 import steadyslip as ss
 from steadyslip.kernels.build import machine_code
 from steadyslip.kernels.jump import jump
+from steadyslip.kernels.layout import Final
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.record import Record
 from steadyslip.motion.engine import LANES, Call
@@ -53,7 +54,7 @@ def ours_single(problem: Problem, tolerance: float, variants: np.ndarray) -> tup
     begin = time.process_time()
     call.go(10**12)
     seconds = time.process_time() - begin
-    names = dict(zip(machine.reduction.names, call.final[0, 4:], strict=True))
+    names = dict(zip(machine.reduction.names, call.final[0, Final.STATE :], strict=True))
     return np.array([[names["w"], names["x"]]]), seconds
 
 

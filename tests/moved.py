@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from javascript import Script
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Point, Recorded
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
 from steadyslip.kernels.program import TALLY
@@ -19,8 +19,10 @@ function run(machine, tables, times) {{
   const {{ layout, routines }} = machine, size = layout[1];
   const S = zeros(layout[30]), ids = zeros(1), cursor = zeros({len(Cursor)});
   cursor[{Cursor.LAST_JOB}] = 1; cursor[{Cursor.BUSY}] = 1; cursor[{Cursor.PAUSED}] = -1;
-  const out = [zeros(1), zeros(1, {int(Final.STATE)} + size), zeros(1, {len(TALLY)}), zeros(1, times.length, size)];
-  const log = zeros(4000, {LOG_COLUMNS}), recorded = zeros(0, 2 + size);
+  const point = {int(Point.STATE)} + size;
+  const out = [zeros(1), zeros(1, {int(Final.POINT)} + point), zeros(1, {len(TALLY)}), zeros(1, times.length,
+    point)];
+  const log = zeros(4000, {LOG_COLUMNS}), recorded = zeros(0, {int(Recorded.POINT)} + point);
   const t = zeros(times.length); t.set(times);
   let reason = 1;
   while (reason === 1) {{ // the log is full

@@ -726,13 +726,16 @@ def test_work_is_bounded_and_what_it_found_is_kept(monkeypatch):
 
 
 def test_cycles_end_where_no_velocity_balances_the_forces():
-    """A pad that lifts with velocity, without mass: forces fold, and what lies beyond has no velocity to tell."""
+    """A pad that lifts with velocity, without mass: forces fold, and what lies beyond has no velocity to tell.
+
+    The cycle comes as close to the fold as steps allow, which takes ever more of them, but not minutes.
+    """
     friction = rate_state(evolution=ss.PRZ(), regularised=True)
     lift = next(contact for contact in CONTACTS if contact.name == "lift")
     branch = ss.cycles(
         rig(friction=friction, contact=lift, stiffness=9e9, drive=ss.PD(1e-6, kp=2e10, kd=1e9)), doublings=0
     )
-    assert branch.end == "the equations have no solution in part of the cycle"
+    assert branch.end == tracer_module.ENDS["too many steps"]
     assert len(branch) > 5
     for name in ("peak_velocity", "lowest_velocity", "stress_drop"):
         assert np.all(np.isfinite(branch[name]))

@@ -93,6 +93,32 @@ def test_samples_equal_single_runs():
         assert values[3] == pytest.approx(single[name], rel=1e-9, abs=1e-15)
 
 
+THREE_VELOCITIES = ss.Slider(
+    friction=ss.LuGre(
+        mu_coulomb=0.3, mu_static=0.8, v_stribeck=0.05, viscous=1.0, bristle_stiffness=5e5, bristle_damping=140.0
+    ),
+    contact=ss.Constant(preload=5e6),
+    stiffness=1.4e10,
+    drive=ss.Steady(5e-4),
+)
+
+
+@pytest.mark.parametrize("start", [5.0, 500.0])
+def test_a_block_without_mass_is_seen_at_the_velocity_it_has(start):
+    """Forces balance at three velocities, and x and the bristles do not say which: dx/dt = v - v_lp does."""
+    times = 5e-5 * np.linspace(0, 1, 2001) ** 3
+    run = ss.simulate(THREE_VELOCITIES, until=5e-5, initial={"v": start}, times=times)
+    rate = run["v"] - 5e-4
+    moved = np.append(0.0, np.cumsum(0.5 * np.diff(times) * (rate[1:] + rate[:-1])))
+    assert moved == pytest.approx(run["x"], abs=2e-3 * run["x"].max())
+    asked = times[[0, 100, -2, -1]]
+    ensemble = ss.simulate_many(
+        THREE_VELOCITIES, vary={"stiffness": [1.4e10, 1.5e10]}, until=5e-5, initial={"v": start}, times=asked
+    )
+    assert ensemble.samples["v"][0] == pytest.approx(run["v"][[0, 100, -2, -1]], rel=1e-5)
+    assert ensemble.final["v"] == pytest.approx(ensemble.samples["v"][:, -1], rel=1e-9)
+
+
 @pytest.mark.parametrize("events", [True, False])
 def test_threads_chunks_and_order_change_nothing(events, monkeypatch):
     k = kappas(300)

@@ -11,6 +11,7 @@ import steadyslip as ss
 from dimensionless import unit_rig
 from kicks_at_random import KINDS, Reference, drawn, outcome_of
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
+from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks import kicks as kicks_module, outcomes as outcomes_module, spans as spans_module
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
@@ -288,6 +289,26 @@ def test_where_no_velocity_balances_forces_any_further_there_is_no_solution():
     ended = spans_module.advanced_runs(runs, np.zeros(1, dtype=int), None, runs.times()[0])
     assert at_fold(runs.rest, ended.state).all()
     assert not at_fold(runs.rest, runs.rest.state).any()
+
+
+def test_a_motion_goes_on_at_the_velocity_at_which_it_stopped():
+    """Two spans are one: where three velocities balance forces, a state alone begins at the wrong one of them."""
+    friction = ss.LuGre(
+        mu_coulomb=0.3, mu_static=0.8, v_stribeck=0.05, viscous=1.0, bristle_stiffness=5e5, bristle_damping=140.0
+    )
+    a_rig = rig(friction=friction, contact=ss.Constant(preload=5e6), stiffness=1.4e10, drive=ss.Steady(5e-4))
+    kicked = Kicked(a_rig, "displacement", 1, "before", {}, 0, None)
+    runs, one, span = kicked.runs(np.zeros(1, dtype=int), np.array([1e-9])), np.zeros(1, dtype=int), np.array([1e-5])
+    initial, velocity = initial_values(runs.jobs.reduction, runs.jobs.point, {"v": 50.0})
+    runs = replace(runs, jobs=replace(runs.jobs, initial=initial, velocity=velocity), jump=np.zeros(1))
+    whole = spans_module.advanced_runs(runs, one, None, 2 * span)
+    half = spans_module.advanced_runs(runs, one, None, span)
+    assert half.unknown[0] > 100 * 5e-4
+    again = spans_module.advanced_runs(runs, one, half.state, span, unknown=half.unknown)
+    assert again.state == pytest.approx(whole.state, rel=1e-4)
+    assert again.unknown == pytest.approx(whole.unknown, rel=1e-4)
+    lost = spans_module.advanced_runs(runs, one, half.state, span)
+    assert lost.unknown[0] < 0.1 * whole.unknown[0]
 
 
 # -- no threshold beyond an edge

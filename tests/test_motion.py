@@ -13,7 +13,7 @@ import steadyslip as ss
 from dimensionless import MU, A, phi_of, unit_rig, y_of
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.core.roles import positive, real
-from steadyslip.kernels.layout import SLIP_EVENT
+from steadyslip.kernels.layout import SLIP_EVENT, Point
 from steadyslip.kernels.program import Program
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
@@ -217,7 +217,7 @@ def test_small_kicks_grow_as_the_eigenvalues_say(law, contact, mass):
     with np.errstate(all="ignore"):
         outcome = run_single(jobs, machine, times, False, False)
     assert outcome.status[0] == 1
-    x = outcome.samples[0][:, 0]
+    x = outcome.samples[0][:, Point.STATE]
     right = misfit(times, rates, x)
     assert right < (1e-3 if law == "lugre" else 1e-4)
     if len(rates) < 4:  # with more modes than that, wrong ones can fit forty points of a short record

@@ -34,7 +34,7 @@ def interpreted(a_rig, protocol, until, initial, rtol):
         outcome = run_single(jobs, machine, np.empty(0), False, False)
         final = outcome.final[0]
         zero = np.zeros(1, int)
-        found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], final[None, 4:])
+        found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], outcome.point)
     names = ["x", "v", *(m.name for m in jobs.point.model.variables if m.name not in ("x", "v"))]
     return np.array([found[name][0] for name in names]), outcome
 
@@ -97,7 +97,7 @@ def test_times_are_exact(seed):
         assert np.sum(own == moment) == 2
     assert np.all(np.diff(outcome.log[:, 1]) >= 0)
     assert np.all(np.isfinite(outcome.samples))
-    np.testing.assert_array_equal(outcome.samples[0, -1], outcome.final[0, 4:])
+    np.testing.assert_array_equal(outcome.samples[0, -1], outcome.point[0])
 
 
 INPUTS = {

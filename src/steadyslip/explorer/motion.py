@@ -11,7 +11,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.explorer.equations import program
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Out, Setting
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Out, Recorded, Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
 from steadyslip.kernels.program import STATUSES, TALLY
@@ -102,7 +102,8 @@ def _facts(reduction: Reduction, kernel: Kernel, eliminate: int | None, missing:
         "cursor": {name.name: int(name) for name in Cursor},
         "kind": {name.name: int(name) for name in Kind},
         "out": {name.name: int(name) for name in Out},
-        "final": int(Final.STATE),
+        "final": int(Final.POINT),
+        "recorded": int(Recorded.POINT),
         "tally": len(TALLY),
         "logged": LOG_COLUMNS,
         "statuses": list(STATUSES),

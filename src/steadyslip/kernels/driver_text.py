@@ -6,10 +6,23 @@ import ast
 from importlib.resources import files
 from typing import Any, cast
 
-from steadyslip.kernels.layout import Cursor, Event, Final, Kind, Layout, Out, Routines, Row, Setting, Status
+from steadyslip.kernels.layout import (
+    Cursor,
+    Event,
+    Final,
+    Kind,
+    Layout,
+    Out,
+    Point,
+    Recorded,
+    Routines,
+    Row,
+    Setting,
+    Status,
+)
 
 DRIVER = "steadyslip.kernels.driver"
-_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Final, Out)}
+_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Point, Recorded, Final, Out)}
 _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 

@@ -66,7 +66,11 @@ class Kernel(Formulation):
         record = Record(self, Program("outputs"))
         program, n = record.program, self.size
         point = record.inputs(program.number) | {f"y{i}": program.load(i, "y") for i in range(n)}
+        if self.reduction.unknown is not None:
+            record.z = program.load(n + Out.UNKNOWN, "y")
         found = record.evaluated(self.outputs, point)
+        if self.reduction.unknown is not None:
+            program.store(n + Out.UNKNOWN, record.z, "y")
         for i, value in enumerate(found):
             program.store(n + i, value, "y")
         program.store(n + Out.V_LP, point["in_v"], "y")
@@ -131,4 +135,9 @@ class Kernel(Formulation):
                 program.store(i, y, "y")
             if self.speed is not None:
                 program.store(self.size + Out.W_SLOPE, horner(slope_of(record.course(self.layout.w)), theta), "y")
+            unknown: Value = program.load(Row.Z)
+            if self.reduction.unknown is not None:
+                old = program.load(Row.Z_OLD)
+                unknown = old + theta * (unknown - old)
+            program.store(self.size + Out.UNKNOWN, unknown, "y")
         return program

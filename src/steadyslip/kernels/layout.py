@@ -52,12 +52,14 @@ class Row(IntEnum):
     # slip that may become a slip event: since when, and what was there
     NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 57, 58, 59, 60
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 61, 62, 63, 64, 65, 66
+    Z_OLD = 67
+    """The unknown of the balance at the start of the last step."""
 
 
 INPUTS = 3
 MOST_FAILURES = 400.0
-"""Steps in a row that may be refused. A block with mass that is stopped falls by hundreds of decades in a moment: so
-much shorter may the step have to be than the one before."""
+"""Steps in a row that may be refused, or so short that time does not move. A block with mass that is stopped falls by
+hundreds of decades in a moment: so much shorter may the step have to be than the one before."""
 SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
 # slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)
 
@@ -65,9 +67,10 @@ SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, a
 class Out(IntEnum):
     """Places of the outputs, counted from the end of the state."""
 
-    V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
-    """Q is the disturbance, ADVANCE the way of the load point since the start of the segment, W_SLOPE the slope of the
-    dense output of the velocity variable; events follow from COUNT on. What `observe` gives ends with ADVANCE."""
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, UNKNOWN, COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
+    """Q is the disturbance, ADVANCE the way of the load point since the start of the segment. W_SLOPE is the slope of
+    the dense output of the velocity variable and UNKNOWN a guess of the unknown of the balance: outputs need both.
+    Events follow from COUNT on. What `observe` gives ends with ADVANCE."""
 
 
 class Setting(IntEnum):
@@ -108,10 +111,26 @@ LOG_COLUMNS = 8
 """Kind, time, v, sigma, tau, T, slip, segment."""
 
 
-class Final(IntEnum):
-    """Columns of the final state of a trajectory."""
+# A *point* is what is written down of a trajectory at a moment: the unknown of the balance, then the state. Where
+# forces balance at several velocities, the state alone does not say which of them is meant.
 
-    TIME, SEGMENT, ACCEPTED, REJECTED, STATE = 0, 1, 2, 3, 4
+
+class Point(IntEnum):
+    """Columns of a point, and of the samples at requested times."""
+
+    UNKNOWN, STATE = 0, 1
+
+
+class Recorded(IntEnum):
+    """Columns of the solver's own steps."""
+
+    TIME, SEGMENT, POINT, STATE = 0, 1, 2, 3
+
+
+class Final(IntEnum):
+    """Columns of where a trajectory ended."""
+
+    TIME, SEGMENT, ACCEPTED, REJECTED, POINT, STATE = 0, 1, 2, 3, 4, 5
 
 
 class Layout(NamedTuple):
@@ -203,11 +222,12 @@ class Routines(NamedTuple):
     ----------
     step : one step of every lane
     rates : rates, outputs and gap of the record's state
-    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events
+    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events;
+        the unknown of the balance is looked for near ``array[size + Out.UNKNOWN]``, and stands there afterwards
     restore : the variables that a jump leaves alone, from the record's state; what the load point moved is added up
     place : the record's state from them and the velocity variable `number`
     balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
-    dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`
+    dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`, `Out.UNKNOWN`
     extend : the dense output of the last step, made ready for `dense`
     watch_lanes : of every lane: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed

@@ -135,7 +135,7 @@ class Step(Record):
         accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
         store(Row.ACCEPTED, accepted)
         store(Row.REJECTED, rejected)
-        failures = select(good, 0.0, load(Row.FAILURES) + 1.0)
+        failures = select(good & (moved > self.tau), 0.0, load(Row.FAILURES) + 1.0)
         store(Row.FAILURES, failures)
         reasons = [
             moved >= self.end,
@@ -198,6 +198,8 @@ class Step(Record):
                 store(layout.stage + s * n + i, stage[i])
         if layout.w >= 0:
             store(Row.W_RATE_OLD, self.first[layout.w])
+        if self.kernel.reduction.unknown is not None:
+            store(Row.Z_OLD, self.program.load(Row.Z))
         store(Row.EXTENDED, 0.0)
         store(Row.DONE, self.h)
         store(Row.TAU_OLD, self.tau)

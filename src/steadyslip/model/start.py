@@ -138,6 +138,16 @@ def guess(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, velo
 
 
 @question
+def _velocity(reduction: Reduction) -> Callable[..., list[Any]]:
+    return reduction.model.function([reduction.outputs["v"]], *reduction.state, W)
+
+
+def velocity_at(reduction: Reduction, point: OperatingPoint, state: np.ndarray, unknown: Any) -> Any:
+    """Velocity of a massless block, m/s, from its state (k, n) and the unknown of the balance, if there is one."""
+    return point.evaluate(_velocity(reduction), *state.T, unknown)[0]
+
+
+@question
 def restored_of(reduction: Reduction) -> Callable[..., list[Any]]:
     """What a jump leaves unchanged, from the state: for starting a kernel anywhere."""
     return reduction.model.function(reduction.restored, *reduction.state, V_LP, Q, P, TIME)

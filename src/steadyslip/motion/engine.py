@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Row, Setting
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Point, Recorded, Row, Setting
 from steadyslip.kernels.program import STATUSES, TALLY, Program
 from steadyslip.motion.jobs import Jobs
 
@@ -26,7 +26,7 @@ INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATU
 class Outcome:
     """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only; `tables` it was given.
 
-    ``final`` has columns time, segment, accepted, rejected, then the state.
+    ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Point`.
     """
 
     status: np.ndarray
@@ -36,6 +36,26 @@ class Outcome:
     log: np.ndarray
     recorded: np.ndarray
     tables: tuple[np.ndarray, ...]
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Taken and refused, (jobs, 2)."""
+        return self.final[:, Final.ACCEPTED : Final.POINT]
+
+    @property
+    def point(self) -> np.ndarray:
+        """Where each ended, (jobs, 1 + state)."""
+        return self.final[:, Final.POINT :]
+
+    @property
+    def unknown(self) -> np.ndarray:
+        """The unknown of the balance where each ended, (jobs,)."""
+        return self.final[:, Final.POINT]
+
+    @property
+    def state(self) -> np.ndarray:
+        """Where each ended, (jobs, state)."""
+        return self.final[:, Final.STATE :]
 
 
 class Call:
@@ -55,9 +75,9 @@ class Call:
         self.status = np.zeros(size, dtype=np.int64)
         self.final = np.full((size, Final.STATE + layout.size), np.nan)
         self.tally = np.full((size, len(TALLY)), np.nan)
-        self.samples = np.full((size, len(times), layout.size), np.nan)
+        self.samples = np.full((size, len(times), Point.STATE + layout.size), np.nan)
         self.log = np.zeros((0, LOG_COLUMNS))
-        self.recorded = np.zeros((0, 2 + layout.size))
+        self.recorded = np.zeros((0, Recorded.STATE + layout.size))
 
     def go(self, quota: int) -> int:
         """0 done, 1 a buffer is full, 2 quota used up."""
@@ -73,7 +93,7 @@ class Call:
 
     def cut_off(self) -> None:
         """Where the job of the only lane is, as its end: it will not go on."""
-        reached = self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED]]
+        reached = self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED, Row.Z]]
         first = self.layout.state
         self.final[0] = [self.time(), *reached, *self.work[first : first + self.layout.size]]
 

@@ -16,6 +16,7 @@ from steadyslip.core.options import NUMBERS, checked, finite, whole
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
+from steadyslip.kernels.layout import Final, Point
 from steadyslip.kernels.program import STATUSES, TALLY
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.engine import (
@@ -272,24 +273,25 @@ class _Store:
         absent = np.broadcast_to(~(sigma > 0), outcome.status.shape)
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
         self.code[where] = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
-        self.end[where] = np.where(absent, np.nan, outcome.final[:, 0])
-        counts = np.nan_to_num(outcome.final[:, 2:4])  # NaN where a run was never finished
+        self.end[where] = np.where(absent, np.nan, outcome.final[:, Final.TIME])
+        counts = np.nan_to_num(outcome.steps)  # NaN where a run was never finished
         self.steps[where], self.rejected[where] = counts.T
         for name in self.events:
             i = TALLY.index(name)
             self.events[name][where] = np.where(absent, np.nan, outcome.tally[:, i])
         if not self.final:
             return
-        ran = np.flatnonzero(np.isfinite(outcome.final[:, 4:]).all(axis=1) & ~absent)
+        ran = np.flatnonzero(np.isfinite(outcome.state).all(axis=1) & ~absent)
         final = outcome.final[ran]
-        found = observe(jobs, machine, first, ran, final[:, 1].astype(int), final[:, 0], final[:, 4:], outcome.tables)
+        segment, time = final[:, Final.SEGMENT].astype(int), final[:, Final.TIME]
+        found = observe(jobs, machine, first, ran, segment, time, outcome.point[ran], outcome.tables)
         rows = np.arange(len(self.code))[where]
-        self._leaves_range(rows[ran], final[:, 0], out_of_range(found))
+        self._leaves_range(rows[ran], time, out_of_range(found))
         for name, array in self.final.items():
             if name in found:
                 array[rows[ran]] = found[name]
         if self.samples:
-            lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, 0]) & ~absent[:, None])
+            lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, Point.STATE]) & ~absent[:, None])
             segment = segment_of(jobs.segments, first + lane, self.times[k])
             found = observe(
                 jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k], outcome.tables

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.questions import question
+from steadyslip.kernels.layout import Point
 from steadyslip.kernels.program import Program
 from steadyslip.model import Model
 from steadyslip.motion.jobs import Jobs
@@ -48,10 +49,10 @@ def _function(model: Model) -> tuple[list[str], Callable[..., list[Any]]]:
 
 
 def observe(
-    jobs: Jobs, machine: Program, first: int, lane: Array, segment: Array, time: Array, states: Array,
+    jobs: Jobs, machine: Program, first: int, lane: Array, segment: Array, time: Array, points: Array,
     tables: Tables | None = None,
 ) -> dict[str, Array]:  # fmt: skip
-    """All observables at given states.
+    """All observables at given points.
 
     Parameters
     ----------
@@ -60,7 +61,8 @@ def observe(
     lane, segment : ndarray of int (points,)
     time : ndarray (points,)
         Since the start of the run.
-    states : ndarray (points, state)
+    points : ndarray (points, 1 + state)
+        The unknown of the balance (NaN where it is not known), then the state: see `Point`.
     tables : tuple of ndarray, optional
         Those of the jobs from `first` on, if they are at hand.
     """
@@ -70,11 +72,11 @@ def observe(
     constants, _, settings, segments = tables or jobs.tables(machine, first, last, False, False)
     values = np.empty((len(OBSERVED) + len(reduction.continuous), len(time)))
     machine.code.observe(
-        constants, settings, segments, np.ascontiguousarray(states), np.ascontiguousarray(lane, dtype=np.int64),
+        constants, settings, segments, np.ascontiguousarray(points), np.ascontiguousarray(lane, dtype=np.int64),
         np.ascontiguousarray(segment, dtype=np.int64), np.ascontiguousarray(time), values,
     )  # fmt: skip
     found = dict(zip(OBSERVED, values, strict=False))
-    found["x"] = states[:, 0]
+    found["x"] = points[:, Point.STATE]
     continuous = dict(zip(reduction.continuous, values[len(OBSERVED) :], strict=True))
     found |= {item.name: continuous[item.symbol] for item in (*model.memory, *model.integrals)}
     found["slip"] = found["x"] + found["load_displacement"]

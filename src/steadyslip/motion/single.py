@@ -11,6 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import NUMBERS, checked, finite, whole
+from steadyslip.kernels.layout import Final, Point, Recorded
 from steadyslip.kernels.program import Program
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
@@ -134,15 +135,17 @@ def _history(
     rig: Slider, plan: Protocol, jobs: Jobs, machine: Program, outcome: Outcome, requested: np.ndarray, own: bool
 ) -> History:
     status = WORDS[int(outcome.status[0])]
-    final, end = outcome.final[0], float(outcome.final[0, 0])
+    steps, end = outcome.steps[0], float(outcome.final[0, Final.TIME])
     if own:
-        time, segment, states = outcome.recorded[:, 0], outcome.recorded[:, 1].astype(int), outcome.recorded[:, 2:]
+        own_steps = outcome.recorded
+        time, segment = own_steps[:, Recorded.TIME], own_steps[:, Recorded.SEGMENT].astype(int)
+        points = own_steps[:, Recorded.POINT :]
     else:
-        reached = np.isfinite(outcome.samples[0, :, 0])
-        time, states = requested[reached], outcome.samples[0][reached]
+        reached = np.isfinite(outcome.samples[0, :, Point.STATE])
+        time, points = requested[reached], outcome.samples[0][reached]
         segment = segment_of(jobs.segments, np.zeros(len(time), dtype=int), time)
     lane = np.zeros(len(time), dtype=int)
-    found = observe(jobs, machine, 0, lane, segment, time, states, outcome.tables)
+    found = observe(jobs, machine, 0, lane, segment, time, points, outcome.tables)
     units = {"t": "s"} | observable_units(machine.reduction.model)
     events = events_of(outcome.log)
     if status == "blow-up":
@@ -162,14 +165,15 @@ def _history(
         end=end,
         method=machine.choice.method,
         rtol=jobs.options.rtol,
-        steps=int(final[2]),
-        rejected=int(final[3]),
+        steps=int(steps[0]),
+        rejected=int(steps[1]),
     )
 
 
 def _last_event(kind: str, jobs: Jobs, machine: Program, outcome: Outcome) -> Event:
     """The end of a run that could not go on, as an event."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
-    found = observe(jobs, machine, 0, zero, final[1:2].astype(int), final[0:1], final[None, 4:], outcome.tables)
+    segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]
+    found = observe(jobs, machine, 0, zero, segment, time, outcome.point, outcome.tables)
     names = ("v", "normal_stress", "shear_stress", "spring_stress", "slip")
-    return Event(kind, float(final[0]), *(float(found[name][0]) for name in names))
+    return Event(kind, float(time[0]), *(float(found[name][0]) for name in names))

@@ -91,11 +91,11 @@ export class Motion {
    */
   async run({ disturbance, size, at, until }, stopped, pause, told = () => {}) {
     const { facts, machine, driver } = this, { layout, routines } = machine, c = facts.cursor;
-    const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows);
+    const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows), point = 1 + facts.names.length;
     cursor[c.LAST_JOB] = cursor[c.BUSY] = 1;
     cursor[c.PAUSED] = -1;
-    const out = [zeros(1), zeros(1, facts.final + facts.names.length), zeros(1, facts.tally), zeros(1, 0, facts.names.length)];
-    const log = zeros(64, facts.logged), recorded = zeros(1024, 2 + facts.names.length), ids = zeros(1);
+    const out = [zeros(1), zeros(1, facts.final + point), zeros(1, facts.tally), zeros(1, 0, point)];
+    const log = zeros(64, facts.logged), recorded = zeros(1024, facts.recorded + point), ids = zeros(1);
     const done = (status, end) => this.observed(tables, recorded.slice(0, cursor[c.RECORDED]), log.slice(0, cursor[c.LOGGED]), status, end);
     for (;;) {
       const reason = driver.advance(layout, routines, S, ids, cursor, ...tables, zeros(0), ...out, log, recorded, SLICE);
@@ -116,11 +116,11 @@ export class Motion {
   /** Series over time, slip events and how it ended. */
   observed(tables, recorded, log, status, end) {
     const { facts, machine } = this, many = recorded.length, o = facts.out;
-    const states = recorded.map((row) => row.subarray(2)), own = zeros(many), values = zeros(8 + facts.kept, many);
+    const points = recorded.map((row) => row.subarray(facts.recorded)), own = zeros(many), values = zeros(8 + facts.kept, many);
     const segment = Float64Array.from(recorded, (row) => row[1]), times = Float64Array.from(recorded, (row) => row[0]);
-    states.shape = [many, facts.names.length];
+    points.shape = [many, 1 + facts.names.length];
     const [constants, , settings, segments] = tables;
-    this.driver.observe(machine.layout, machine.routines, constants, settings, segments, states, own, segment, times, values);
+    this.driver.observe(machine.layout, machine.routines, constants, settings, segments, points, own, segment, times, values);
     const events = [], { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind;
     let open = null;
     for (const [kind, time, v, , , stress] of Array.from(log).sort((a, b) => a[1] - b[1])) {

@@ -68,6 +68,7 @@ def follow(
         note(R, layout, kind, tau, y, log, cursor)
         if kind == Kind.LOST:
             R[Row.TAU] = tau
+            R[Row.Z] = y[layout.size + Out.UNKNOWN]
             for i in range(layout.size):
                 R[layout.state + i] = y[i]
             for i in range(count):  # what would have come later was counted by the step

@@ -6,7 +6,7 @@ import math
 
 from steadyslip.kernels.driver.crossings import crossed, follow
 from steadyslip.kernels.driver.looking import look_now
-from steadyslip.kernels.driver.samples import await_sample, record, record_step, take_samples
+from steadyslip.kernels.driver.samples import await_sample, record_now, record_step, take_samples
 from steadyslip.kernels.driver.segments import clock, enter_segment
 from steadyslip.kernels.driver.slip import note
 from steadyslip.kernels.layout import (
@@ -67,7 +67,7 @@ def load_job(
 
 
 def exhausted(S: Array, lanes: int, lane: int) -> int:
-    """The status of a lane that may not go on: too many steps refused in a row, or taken at all; else RUNNING."""
+    """The status of a lane that may not go on: too many steps in vain in a row, or taken at all; else RUNNING."""
     if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
         return Status.STUCK
     if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST * lanes + lane]:
@@ -109,6 +109,7 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
     final[row, Final.SEGMENT] = R[Row.SEGMENT]
     final[row, Final.ACCEPTED] = R[Row.ACCEPTED]
     final[row, Final.REJECTED] = R[Row.REJECTED]
+    final[row, Final.POINT] = R[Row.Z]
     for i in range(layout.size):
         final[row, Final.STATE + i] = R[layout.state + i]
     first = Row.PEAK_SIZE - Row.EVENTS
@@ -135,7 +136,7 @@ def go_on(
         lost = R[Row.WATCH] > 0.0 and follow(R, layout, routines, cursor, log, y, order)
         take_samples(R, layout, routines, j - j0, times, samples, False, y)
         if R[Row.RECORD] > 0.0 and lost:
-            record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
+            record_now(R, layout, cursor, recorded)
         elif R[Row.RECORD] > 0.0:
             record_step(R, layout, routines, cursor, recorded, y)
         if lost:
@@ -158,7 +159,7 @@ def go_on(
         await_sample(R, times)
         R[Row.H] = h
         if R[Row.RECORD] > 0.0:
-            record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
+            record_now(R, layout, cursor, recorded)
         if R[Row.WATCH] > 0.0:
             crossed(R, layout, routines, before, slipping > 0.0, cursor, log, y)
     return Status.RUNNING
@@ -184,7 +185,7 @@ def attend(
         ids[lane] = j
         if start_job(R, layout, routines, j, cursor, results[4], arrays, y):
             if R[Row.RECORD] > 0.0:
-                record(R, layout, R[Row.TAU], R, layout.state, cursor, results[5])
+                record_now(R, layout, cursor, results[5])
             return
         finish(R, layout, j - cursor[Cursor.FIRST_JOB], Status.NO_VELOCITY, results)
     ids[lane] = -1

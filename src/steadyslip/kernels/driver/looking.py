@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
+from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, call
 
 
 def look_now(R: Array, layout: Layout, routines: Routines, tau: float, y: Array) -> None:
     """The record's state and outputs, at tau into the segment, in y."""
     for i in range(layout.size):
         y[i] = R[layout.state + i]
+    y[layout.size + Out.UNKNOWN] = R[Row.Z]
     call(routines.outputs, R, tau, y)
 
 
 def between(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
-    """The state at the fraction theta of the last step, in y."""
+    """The state at the fraction theta of the last step, in y, and near which the unknown of the balance is there."""
     if R[Row.EXTENDED] == 0.0:
         call(routines.extend, R, 0.0, y)
     call(routines.dense, R, theta, y)

@@ -6,7 +6,7 @@ import math
 
 from steadyslip.kernels.driver.looking import between
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import Array, Cursor, Layout, Routines, Row
+from steadyslip.kernels.layout import Array, Cursor, Layout, Out, Point, Recorded, Routines, Row
 
 BETWEEN = 3  # points that are recorded between the ends of a step whose dense output has stages of its own
 
@@ -33,24 +33,29 @@ def take_samples(
                 break
             for i in range(layout.size):
                 y[i] = R[layout.state + i]
+            y[layout.size + Out.UNKNOWN] = R[Row.Z]
         else:
             if times[k] >= R[Row.STOP] or (tau >= R[Row.TAU] and not arrived):
                 break
             between(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
+        samples[row, k, Point.UNKNOWN] = y[layout.size + Out.UNKNOWN]
         for i in range(layout.size):
-            samples[row, k, i] = y[i]
+            samples[row, k, Point.STATE + i] = y[i]
         k += 1
     R[Row.TAKEN] = k
     await_sample(R, times)
 
 
-def record(R: Array, layout: Layout, tau: float, state: Array, first: int, cursor: Array, recorded: Array) -> None:
-    """Write down a state, numbers from `first` of an array, at tau into the segment."""
+def record(
+    R: Array, layout: Layout, tau: float, unknown: float, state: Array, first: int, cursor: Array, recorded: Array
+) -> None:
+    """Write down a point, its state the numbers from `first` of an array, at tau into the segment."""
     i = cursor[Cursor.RECORDED]
-    recorded[i, 0] = clock(R, tau)
-    recorded[i, 1] = R[Row.SEGMENT]
+    recorded[i, Recorded.TIME] = clock(R, tau)
+    recorded[i, Recorded.SEGMENT] = R[Row.SEGMENT]
+    recorded[i, Recorded.POINT] = unknown
     for c in range(layout.size):
-        recorded[i, 2 + c] = state[first + c]
+        recorded[i, Recorded.STATE + c] = state[first + c]
     cursor[Cursor.RECORDED] = i + 1
 
 
@@ -59,5 +64,11 @@ def record_step(R: Array, layout: Layout, routines: Routines, cursor: Array, rec
     for i in range(1, BETWEEN + 1 if layout.extra > 0 else 1):
         theta = i / (BETWEEN + 1)
         between(R, layout, routines, theta, y)
-        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], y, 0, cursor, recorded)
-    record(R, layout, R[Row.TAU], R, layout.state, cursor, recorded)
+        unknown = y[layout.size + Out.UNKNOWN]
+        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], unknown, y, 0, cursor, recorded)
+    record_now(R, layout, cursor, recorded)
+
+
+def record_now(R: Array, layout: Layout, cursor: Array, recorded: Array) -> None:
+    """Write down where the record is."""
+    record(R, layout, R[Row.TAU], R[Row.Z], R, layout.state, cursor, recorded)

@@ -1,12 +1,14 @@
-"""No loop at all: outputs and rates at states that are given."""
+"""No loop at all: outputs and rates at points that are given."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from steadyslip.kernels.driver.balance import solve_balance
 from steadyslip.kernels.driver.segments import begin_segment, set_inputs
-from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Setting, call
+from steadyslip.kernels.layout import Array, Layout, Out, Point, Routines, Row, Setting, call
 
 
 def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
@@ -17,16 +19,26 @@ def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: 
     R[Row.Z_SCALE] = settings[own if settings.shape[0] > 1 else 0, Setting.Z_SCALE]
 
 
-def place_state(R: Array, layout: Layout, routines: Routines, states: Array, m: int, y: Array) -> None:
-    """Bring state m into a record and into y, balance solved where there is one left to solve."""
+def place_point(R: Array, layout: Layout, routines: Routines, points: Array, m: int, y: Array) -> None:
+    """Bring point m into a record and into y, balance solved where there is one left to solve.
+
+    Where the point does not tell its unknown (NaN), what the record has is the guess.
+    """
+    if math.isfinite(points[m, Point.UNKNOWN]):
+        R[Row.Z] = points[m, Point.UNKNOWN]
     for i in range(layout.size):
-        R[layout.state + i] = states[m, i]
+        R[layout.state + i] = points[m, Point.STATE + i]
+        y[i] = points[m, Point.STATE + i]
     if layout.solved:
         for i in range(layout.kept):
-            R[layout.continuous + i] = states[m, i]
-        R[Row.Z] = solve_balance(R, routines, R[Row.Z], y)
-    for i in range(layout.size):
-        y[i] = states[m, i]
+            R[layout.continuous + i] = points[m, Point.STATE + i]
+        near = R[Row.Z]
+        R[Row.Z] = solve_balance(R, routines, near, y)
+        if not math.isfinite(R[Row.Z]):
+            R[Row.Z] = near
+        for i in range(layout.size):  # what `solve_balance` left there
+            y[i] = points[m, Point.STATE + i]
+    y[layout.size + Out.UNKNOWN] = R[Row.Z]
 
 
 def go_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array, s: int, k: int, y: Array) -> None:
@@ -42,31 +54,31 @@ def go_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array,
 
 
 def observe(
-    layout: Layout, routines: Routines, constants: Array, settings: Array, segments: Array, states: Array, own: Array,
+    layout: Layout, routines: Routines, constants: Array, settings: Array, segments: Array, points: Array, own: Array,
     segment: Array, times: Array, values: Array,
 ) -> None:  # fmt: skip
-    """Outputs and continuous variables at given states.
+    """Outputs and continuous variables at given points.
 
-    `states` is (m, size); `own` (m,) the rig's row, `segment` and `times` where and when in its protocol, since the
+    `points` is (m, 1 + size); `own` (m,) the rig's row, `segment` and `times` where and when in its protocol, since the
     start of the run. `values` is (8 + kept, m): `Out` up to ADVANCE, which is here the way of the load point since the
     start of the run, and the variables that jumps leave alone.
     """
     R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
     rig = -1
-    for m in range(states.shape[0]):
+    for m in range(points.shape[0]):
         if own[m] != rig:
             rig = own[m]
             place_rig(R, layout, constants, settings, rig)
             R[Row.SEGMENT] = -1.0
             R[Row.LOAD_MOVED] = 0.0
         for i in range(layout.size):
-            R[layout.state + i] = states[m, i]
+            R[layout.state + i] = points[m, Point.STATE + i]
         if R[Row.SEGMENT] > segment[m]:
             R[Row.SEGMENT] = -1.0
             R[Row.LOAD_MOVED] = 0.0
         go_to_segment(R, layout, routines, segments, rig if segments.shape[0] > 1 else 0, segment[m], y)
         R[Row.TAU] = times[m] - R[Row.START]
-        place_state(R, layout, routines, states, m, y)
+        place_point(R, layout, routines, points, m, y)
         call(routines.outputs, R, R[Row.TAU], y)
         for i in range(Out.W_SLOPE):
             values[i, m] = y[layout.size + i]
@@ -79,16 +91,19 @@ def observe(
 
 
 def field(
-    layout: Layout, routines: Routines, constants: Array, settings: Array, states: Array, inputs: Array, own: Array,
+    layout: Layout, routines: Routines, constants: Array, settings: Array, points: Array, inputs: Array, own: Array,
     values: Array,
 ) -> None:  # fmt: skip
-    """Rates at given states, (m, size); `inputs` (m, 7) holds v_lp, q, p, their slopes and the time, `own` the rig."""
+    """Rates (m, size) at given points, (m, 1 + size).
+
+    `inputs` (m, 7) holds v_lp, q, p, their slopes and the time, `own` the rig.
+    """
     R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
-    for m in range(states.shape[0]):
+    for m in range(points.shape[0]):
         place_rig(R, layout, constants, settings, own[m])
         set_inputs(R, 1, 0, inputs[m], 0)
         R[Row.START] = inputs[m, 6]
-        place_state(R, layout, routines, states, m, y)
+        place_point(R, layout, routines, points, m, y)
         call(routines.rates, R, 0.0, y)
         for i in range(layout.size):
             values[m, i] = R[layout.rate + i]

@@ -87,13 +87,11 @@ class _Course:
         self.peak = np.full(count, np.nan)
         self.found, self.stiff = np.full(count, OPEN), np.zeros(count, dtype=bool)
         self.state = np.full(runs.rest.state.shape, np.nan) if start is None else np.array(start)
+        self.unknown = np.full(count, np.nan)
         self.started, self.begun = start is not None, np.full(count, start is not None)
         self.shells = None if self.started else Shells(runs, threads, _fates)
-        reduction = runs.rest.reduction
         self.stiffly = replace(runs.jobs.options, method=STIFF)
-        self.explicit = automatic_method(reduction) != STIFF
-        # which of several velocities balances forces is not in the state: such motions run from their beginning
-        self.anew = reduction.unknown is not None and not reduction.model.inertial and not self.started
+        self.explicit = automatic_method(runs.rest.reduction) != STIFF
 
     def run(self, advanced: Callable[[int], None] | None) -> Array:
         """The outcomes."""
@@ -118,18 +116,17 @@ class _Course:
 
     def _advanced(self, open_: Array) -> Spans:
         """A span of some motions: those of each method, and those from their beginning, by themselves."""
-        fresh = ~self.begun[open_] | self.anew
+        fresh = ~self.begun[open_]
         found = Spans.empty(len(open_), self.state.shape[1])
         for stiff, anew in ((False, True), (False, False), (True, True), (True, False)):
             here = np.flatnonzero((self.stiff[open_] == stiff) & (fresh == anew))
             if not len(here) or not found.whole:
                 continue
             which = open_[here]
-            span = self.span[which] + (self.elapsed[which] if self.anew else 0.0)
             watch = bool(self.begun[which].any())
             found.put(here, advanced_runs(
-                self.runs, which, None if anew else self.state[which], span, watch, self.threads,
-                self.stiffly if stiff else None,
+                self.runs, which, None if anew else self.state[which], self.span[which], watch, self.threads,
+                self.stiffly if stiff else None, self.unknown[which],
             ))  # fmt: skip
         return found
 
@@ -144,10 +141,10 @@ class _Course:
         self.steps[open_] += np.where(again, 0.0, ended.steps)
         over = np.flatnonzero(~again)
         which = open_[over]
-        short = many[over] & np.all(np.isfinite(ended.state[over]), axis=1) & (not self.anew)
+        short = many[over] & np.all(np.isfinite(ended.state[over]), axis=1)
         self.span[which[short]] = 0.5 * ended.time[over[short]]
         self.elapsed[which] += np.where(short, ended.time[over], self.span[which])
-        self.state[which], self.begun[which] = ended.state[over], True
+        self.state[which], self.unknown[which], self.begun[which] = ended.state[over], ended.unknown[over], True
         away = self.allowed[which] + self.runs.reload(which, self.state[which])
         self.most[which] = np.maximum(self.most[which], away)
         return over
@@ -155,7 +152,7 @@ class _Course:
     def _judge(self, which: Array, ended: Spans, watched: Array) -> None:
         """Say what is certain of motions at the end of a span."""
         runs, found, state = self.runs, self.found, self.state
-        found[which] = _seen(runs, which, ended, self.anew)
+        found[which] = _seen(runs, which, ended)
         running = np.flatnonzero(found[which] == OPEN)
         going = which[running]
         found[going[runs.near.holds(going, state[going])]] = RETURNS
@@ -172,11 +169,13 @@ class _Course:
         again = np.zeros(len(going), dtype=bool)
         if len(tried):
             one = going[tried]
-            closed, again[tried] = attracted(runs, one, state[one], apart[running[tried]], self.threads)
+            closed, again[tried] = attracted(
+                runs, one, state[one], self.unknown[one], apart[running[tried]], self.threads
+            )
             found[one[closed]] = OSCILLATION
         long = np.where(runs.rest.stable[going], HALFWAY, EARLY) * self.most[going]
         several = going[(found[going] == OPEN) & ~neutral & ~again & (self.elapsed[going] > long)]
-        found[[one for one in several if on_long_cycle(runs, one, state[one])]] = OSCILLATION
+        found[[one for one in several if on_long_cycle(runs, one, state[one], self.unknown[one])]] = OSCILLATION
         left = running[np.isin(going, several) & (found[going] == OPEN)]
         found[which[left[self._goes_on(which[left], ended.tally[left])]]] = OSCILLATION
         self.peak[which] = np.fmax(self.peak[which], ended.tally[:, TALLY.index("peak_velocity")])
@@ -213,8 +212,8 @@ def _alike(now: Array, before: Array) -> Array:
         return np.asarray((now > 0) & (np.abs(now - before) < ALIKE * now))
 
 
-def _seen(runs: Judged, which: Array, ended: Spans, anew: bool) -> Array:
-    """Outcomes that a run's end itself tells; OPEN where it can go on, `anew` from its beginning only."""
+def _seen(runs: Judged, which: Array, ended: Spans) -> Array:
+    """Outcomes that a run's end itself tells; OPEN where it can go on."""
     status = ended.status
     found = np.full(len(status), NO_SOLUTION)
     found[status == CODE["done"]] = OPEN
@@ -225,7 +224,7 @@ def _seen(runs: Judged, which: Array, ended: Spans, anew: bool) -> Array:
     if len(limited):  # the integrator's limits, or no solution
         folded = at_fold(runs.rest.part(which[limited]), ended.state[limited])
         lost = ~np.all(np.isfinite(ended.state[limited]), axis=1)
-        further = np.where(many[limited], np.where(lost | anew, EXHAUSTED, OPEN), STUCK)
+        further = np.where(many[limited], np.where(lost, EXHAUSTED, OPEN), STUCK)
         found[limited[~folded]] = further[~folded]
     found[status >= len(STATUSES)] = INTERRUPTED
     return found

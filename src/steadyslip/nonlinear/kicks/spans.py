@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from steadyslip.kernels.layout import Final
 from steadyslip.kernels.program import STATUSES, TALLY, Program
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
-from steadyslip.model.start import restored_of
+from steadyslip.model.start import restored_of, velocity_at
 from steadyslip.motion.engine import LANES, run_chunk, run_many
 from steadyslip.motion.jobs import Jobs, Options
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
@@ -127,16 +128,20 @@ def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array) 
     )
 
 
-ARRAYS = ("status", "time", "state", "steps", "tally")
+ARRAYS = ("status", "time", "state", "unknown", "steps", "tally")
 
 
 @dataclass
 class Spans:
-    """What a span of some runs ended with: status, time reached (s), state (k, n), steps and tally."""
+    """What a span of some runs ended with: status, time reached (s), state (k, n), steps and tally.
+
+    `unknown` (k,) is that of the balance.
+    """
 
     status: Array
     time: Array
     state: Array
+    unknown: Array
     steps: Array
     tally: Array
     whole: bool = True
@@ -144,8 +149,8 @@ class Spans:
     @classmethod
     def empty(cls, count: int, n: int) -> Spans:
         """Of runs that are still to be run."""
-        return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan), np.zeros(count),
-                   np.full((count, len(TALLY)), np.nan))  # fmt: skip
+        return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan),
+                   np.full(count, np.nan), np.zeros(count), np.full((count, len(TALLY)), np.nan))  # fmt: skip
 
     def part(self, which: Array) -> Spans:
         """Those of some of the runs."""
@@ -160,9 +165,12 @@ class Spans:
 
 def advanced_runs(
     runs: Judged, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
-    options: Options | None = None,
+    options: Options | None = None, unknown: Array | None = None,
 ) -> Spans:  # fmt: skip
-    """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning."""
+    """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning.
+
+    `unknown` (k,) is that of the balance at `start`, NaN where it is not known.
+    """
     jobs, rest = replace(runs.jobs, options=options or runs.jobs.options), runs.rest
     velocity, pressure = rest.velocity[which], rest.pressure[which]
     jump = runs.jump[which] if start is None else np.zeros(len(which))
@@ -170,7 +178,7 @@ def advanced_runs(
     if start is None:
         initial, speed = picked(jobs.initial, which), picked(jobs.velocity, which)
     else:
-        initial, speed = continuous_at(jobs.reduction, point, start, velocity, pressure)
+        initial, speed = continuous_at(jobs.reduction, point, start, velocity, pressure, unknown)
     part = replace(
         jobs, point=point, initial=initial, velocity=speed,
         segments=constant_inputs(span, velocity, jump, pressure), size=len(which),
@@ -183,8 +191,8 @@ def advanced_runs(
     def work(begin: int, end: int, stopped: threading.Event) -> None:
         outcome = run_chunk(part, machine, begin, end, np.empty(0), watch, stopped)
         found.status[begin:end], found.tally[begin:end] = outcome.status, outcome.tally
-        found.time[begin:end], found.state[begin:end] = outcome.final[:, 0], outcome.final[:, 4:]
-        found.steps[begin:end] = outcome.final[:, 2] + outcome.final[:, 3]
+        found.time[begin:end], found.steps[begin:end] = outcome.final[:, Final.TIME], outcome.steps.sum(axis=1)
+        found.state[begin:end], found.unknown[begin:end] = outcome.state, outcome.unknown
 
     found.whole = run_many(work, count, threads)
     runs.budget.steps -= float(np.nansum(found.steps))
@@ -192,8 +200,9 @@ def advanced_runs(
 
 
 def continuous_at(
-    reduction: Reduction, point: OperatingPoint, state: Array, velocity: Array, pressure: Array
-) -> tuple[Array, Array]:
+    reduction: Reduction, point: OperatingPoint, state: Array, velocity: Array, pressure: Array,
+    unknown: Array | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
     """What a kernel starts from: the continuous variables, and a velocity near which to look for its own."""
     with np.errstate(all="ignore"):
         found = point.evaluate(restored_of(reduction), *state.T, velocity, 0.0, pressure, 0.0)
@@ -201,4 +210,7 @@ def continuous_at(
         speed = np.array(velocity)
         if reduction.form == "eliminated":
             speed = np.asarray(point.drive) * np.exp(state[:, reduction.names.index("w")])
+        elif unknown is not None and not reduction.model.inertial:
+            known = np.broadcast_to(velocity_at(reduction, point, state, unknown), speed.shape)
+            speed = np.where(np.isfinite(known), known, speed)
     return np.ascontiguousarray(initial), speed

@@ -15,6 +15,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
+from steadyslip.kernels.layout import Point
 from steadyslip.kernels.program import SETTINGS, Program, program
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -31,6 +32,7 @@ from steadyslip.protocol import Segments
 Array = np.ndarray
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
+MOST_STEPS = 300_000  # of one run, some tenths of a second
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
 
@@ -116,7 +118,7 @@ class Runs:
         self.reduction, self.size = jobs.reduction, len(jobs.reduction.state)
         method = automatic_method(self.reduction)
         stiff = method != "tsit5"
-        self.options = Options(rtol=rtol or (1e-9 if stiff else 1e-10), most_steps=1_000_000)
+        self.options = Options(rtol=rtol or (1e-9 if stiff else 1e-10), most_steps=MOST_STEPS)
         self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
@@ -203,27 +205,31 @@ class Runs:
         tables = (constants, np.ascontiguousarray(initial), settings, _rows(inputs, times))
         call = Call(machine, tables, len(times), np.empty(0))
         call.go(2**62)
-        self.steps += int(np.nansum(call.final[:, 2:4]))
+        outcome = call.outcome()
+        self.steps += int(np.nansum(outcome.steps))
         if np.any(call.status != DONE):
             raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
-        return call.final[:, 4:]
+        return outcome.state
 
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:
         """Rates (m, n), their Jacobian (m, n, n) and their slopes in the parameter (m, n) at given states."""
         count, n = len(states), self.size
-        full = np.hstack([states, self._unit(count)])
+        full = np.hstack([np.full((count, 1), np.nan), states, self._unit(count)])
         inputs = np.zeros((count, 7))
         inputs[:, :3] = setting.inputs
-        values = np.empty_like(full)
+        values = np.empty((count, full.shape[1] - Point.STATE))
         own = np.zeros(count, dtype=np.int64)
         self.sensitive.code.field(*setting.varied, full, inputs, own, values)
         matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return values[:, :n], matrix, values[:, n + n * n :]
 
     def watched(
-        self, setting: FlowSetting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER
-    ) -> Outcome:
+        self, setting: FlowSetting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER,
+        unknown: float = np.nan,
+    ) -> Outcome:  # fmt: skip
         """One run with its events and steps, and samples at given times.
+
+        `unknown` is that of the balance at `state`, where it is known.
 
         Raises
         ------
@@ -235,6 +241,8 @@ class Runs:
         initial = self._continuous(setting, state[None])
         settings = self._finer(setting.plain[1], amplitude)
         settings[:, SETTINGS.index("watch")] = settings[:, SETTINGS.index("record")] = 1.0
+        if np.isfinite(unknown):
+            settings[:, SETTINGS.index("guess")] = unknown
         tables = (*setting.plain[:1], initial, settings, _rows(setting.inputs, np.array([time])))
         outcome = run_tables(self.machine, tables, times)
         if outcome.status[0] == INTERRUPTED:
@@ -243,8 +251,8 @@ class Runs:
             raise FlowFailure(WORDS[int(outcome.status[0])])
         return outcome
 
-    def observed(self, setting: FlowSetting, times: Array, states: Array) -> dict[str, Array]:
-        """All observables at given states."""
+    def observed(self, setting: FlowSetting, times: Array, points: Array) -> dict[str, Array]:
+        """All observables at given points (m, 1 + n)."""
         rows = _rows(setting.inputs, np.array([float(times[-1]) or 1.0]))[0]
         waves = np.zeros((1, 1, 3, 0))
         segments = Segments(
@@ -253,7 +261,7 @@ class Runs:
         )  # fmt: skip
         jobs = replace(self.base, point=setting.point, segments=segments)
         zero = np.zeros(len(times), dtype=int)
-        return observe(jobs, self.machine, 0, zero, zero, times, states)
+        return observe(jobs, self.machine, 0, zero, zero, times, points)
 
 
 class Flow(Runs):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from steadyslip.kernels.layout import Recorded
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
@@ -49,8 +50,8 @@ def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
     starts = np.cumsum(shooting.fractions) - shooting.fractions
     for begin, share, state in zip(starts, shooting.fractions, orbit.states, strict=True):
         record = flow.watched(setting, state, share * orbit.period, shooting.amplitude).recorded
-        times.append(begin * orbit.period + record[:-1, 0])
-        states.append(record[:-1, 2:])
+        times.append(begin * orbit.period + record[:-1, Recorded.TIME])
+        states.append(record[:-1, Recorded.STATE :])
     time, every = np.concatenate(times), np.vstack(states)
     place = np.arcsinh(every / flow.scales)
     arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))

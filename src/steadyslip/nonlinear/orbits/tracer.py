@@ -39,6 +39,8 @@ ENDS = {
     "growth": "the cycle is too unstable to matter: deviations grow 1e8-fold in each period",
     "contact lost": "contact lost: the normal stress falls to zero in the cycle",
     "stuck": "the equations have no solution in part of the cycle",
+    "too many steps": "the integration needs ever smaller steps, as it does where the cycle comes close to states at "
+    "which no velocity balances the forces; mass or damping helps",
     "no velocity": "the equations have no solution in part of the cycle",
     "precision": "precision is lost; a smaller rtol may lead further",
     "steady": "back at steady sliding, at another edge of stability",

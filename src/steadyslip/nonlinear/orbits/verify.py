@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.program import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle
@@ -33,7 +34,8 @@ MOST_STEPS = 40_000
 
 
 def cycle_near(
-    runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False
+    runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
+    unknown: float = np.nan,
 ) -> Cycle | None:  # fmt: skip
     """The cycle that a motion is on, or comes to.
 
@@ -41,13 +43,15 @@ def cycle_near(
     ----------
     runs : Runs
     state : ndarray (n,)
-        The kernel's state variables (``outcome.final[row, 4:]``), anywhere near the suspected cycle.
+        The kernel's state variables (``outcome.state[row]``), anywhere near the suspected cycle.
     value : float
         Of the free parameter, where `runs` has one.
     patience : int
         How many stretches of some returns each to go on for, as long as no cycle is close enough.
     attracts : bool
         Whether to pass by cycles that are not stable.
+    unknown : float, optional
+        Of the balance at `state`, where it is known.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def cycle_near(
         None if there is none: the motion grows, settles, wanders, or is still too far from any.
     """
     with suppress(FlowFailure):
-        for seen in _stretches(runs, runs.setting(value), state, patience):
+        for seen in _stretches(runs, runs.setting(value), state, unknown, patience):
             for back in _candidates(runs, seen):
                 found = _solved(runs, value, seen, int(back))
                 if found is not None and (found.stable or not attracts):
@@ -77,7 +81,7 @@ class _Stretch:
     amplitude: float
 
 
-def _stretches(runs: Runs, setting: FlowSetting, state: Array, patience: int) -> Iterator[_Stretch]:
+def _stretches(runs: Runs, setting: FlowSetting, state: Array, unknown: float, patience: int) -> Iterator[_Stretch]:
     """The motion, some returns at a time."""
     span, spent = FIRST_SPAN * runs.time, 0
     for _ in range(patience):
@@ -86,17 +90,19 @@ def _stretches(runs: Runs, setting: FlowSetting, state: Array, patience: int) ->
         low, high, speeds = [], [], []
         now = 0.0
         while len(times) < RETURNS and spent < MOST_STEPS * patience:
-            outcome = runs.watched(setting, state, span)
+            outcome = runs.watched(setting, state, span, unknown=unknown)
             record, log = outcome.recorded, outcome.log
+            visited = record[:, Recorded.STATE :]
             at = log[(log[:, 0] == BEGINS) & (log[:, 1] > 0), 1]
             times += list(now + at)
             states += list(_between(runs, setting, record, at))
-            low.append(np.arcsinh(record[:, 2:].min(axis=0) / runs.scales))
-            high.append(np.arcsinh(record[:, 2:].max(axis=0) / runs.scales))
+            low.append(np.arcsinh(visited.min(axis=0) / runs.scales))
+            high.append(np.arcsinh(visited.max(axis=0) / runs.scales))
             if np.max(high[-1] - low[-1]) < SMALLEST:
                 return
-            speeds.append(np.append(log[:, 2], runs.observed(setting, record[:, 0], record[:, 2:])["v"]))
-            state, now, spent = outcome.final[0, 4:], now + span, spent + len(record)
+            speeds.append(np.append(log[:, 2], runs.observed(setting, record[:, 0], record[:, Recorded.POINT :])["v"]))
+            state, unknown = outcome.state[0], float(outcome.unknown[0])
+            now, spent = now + span, spent + len(record)
             span *= 2.0 if len(times) < RETURNS // 2 else 1.0
         if len(times) < 2:
             return
@@ -106,7 +112,7 @@ def _stretches(runs: Runs, setting: FlowSetting, state: Array, patience: int) ->
 
 def _between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
     """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
-    time, states = record[:, 0], record[:, 2:]
+    time, states = record[:, Recorded.TIME], record[:, Recorded.STATE :]
     i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     h = (time[i + 1] - time[i])[:, None]
     s = (at - time[i])[:, None] / h

@@ -135,7 +135,7 @@ class Step(Record):
         accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
         store(Row.ACCEPTED, accepted)
         store(Row.REJECTED, rejected)
-        failures = select(good & (moved > self.tau), 0.0, load(Row.FAILURES) + 1.0)
+        failures = select(good, 0.0, load(Row.FAILURES) + 1.0)
         store(Row.FAILURES, failures)
         reasons = [
             moved >= self.end,

@@ -67,7 +67,7 @@ def load_job(
 
 
 def exhausted(S: Array, lanes: int, lane: int) -> int:
-    """The status of a lane that may not go on: too many steps in vain in a row, or taken at all; else RUNNING."""
+    """The status of a lane that may not go on: too many steps refused in a row, or taken at all; else RUNNING."""
     if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
         return Status.STUCK
     if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST * lanes + lane]:

@@ -32,7 +32,7 @@ from steadyslip.protocol import Segments
 Array = np.ndarray
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
-MOST_STEPS = 300_000  # of one run, some tenths of a second
+MOST_STEPS = 100_000  # of one run, some tenths of a second
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
 

@@ -12,7 +12,6 @@ import lab_records as lab
 import steadyslip as ss
 from command import run
 from steadyslip.experiments.spec import spec_from_text
-from steadyslip.report import fit_report
 
 BASALT = "examples/data/basalt_b819_velocity_step.txt"
 
@@ -38,8 +37,8 @@ def test_from_a_record_to_estimates(fitted):
     assert data["search"]["converged"] is True
     assert data["correlated"] is True
     page = (folder / "fit.html").read_text()
-    assert page.count("<svg") == 3  # the fit, its one step, the estimates against each other
-    assert "http-equiv" not in page
+    assert page.count("<figure>") == 3  # the fit, its one step, the estimates against each other
+    assert len(page) <= 500_000
     assert "d_c = 9.4" in page
     assert (folder / "fit.png").stat().st_size > 10_000
 
@@ -157,7 +156,7 @@ def test_laws_are_compared_and_records_fitted_together(tmp_path):
 def test_reports_escape_what_came_from_outside():
     record = lab.record(lab.rig(), lab.STEP)
     fit = ss.fit(ss.lab_rig(), replace(record, source="<script>alert(1)</script>"))
-    page = fit_report(fit)
+    page = ss.report(fit, explorer=False).html
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
 

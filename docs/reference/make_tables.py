@@ -263,6 +263,7 @@ GROUPS = {
     "": "Modules",
     "verdict": "The verdict",
     "explorer": "The explorer",
+    "reports": "Reports",
     "files.specifications": "Rig files",
     "schemas": "Schema of files",
     "laws.contact": "Contact laws",
@@ -288,7 +289,6 @@ ORDER = (
 )
 MODULES = {
     "figures": tuple(name for name in figures.__all__ if name.islower()),
-    "report": ("fit_report",),
     "testing": ("check_friction_law", "check_contact_law"),
 }
 

@@ -15,8 +15,9 @@ from importlib import import_module
 
 import lazy_loader
 
-from steadyslip.core import pictures
+from steadyslip.core import pages, pictures
 
 pictures.figures_from(lambda: import_module("steadyslip.figures"))  # the one place that knows both
+pages.pages_from(lambda: import_module("steadyslip.reports"))
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __version__ = "0.1.0"

@@ -195,6 +195,10 @@ from .protocol import (
     VelocityRamp as VelocityRamp,
     VelocityStep as VelocityStep,
 )
+from .reports import (
+    Report as Report,
+    report as report,
+)
 from .schemas import json_schema as json_schema
 from .verdict import (
     Analysis as Analysis,

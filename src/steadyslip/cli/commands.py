@@ -167,7 +167,6 @@ def fit(
     from steadyslip.experiments import bootstrap as resample, fit_files
     from steadyslip.experiments.commands import ENDINGS, as_json as plain, split_files, write_fit
     from steadyslip.files.output import check_output
-    from steadyslip.report import fit_report
 
     check_output(output or (), ENDINGS)
     if bootstrap == 1:
@@ -175,7 +174,7 @@ def fit(
     records, spec = split_files(files)
     found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
     for path in output or ():
-        write_fit(found, comparison, path, fit_report)
+        write_fit(found, comparison, path)
     if not as_json:
         for record in found.plan.records:
             say(f"{record}\n")
@@ -227,6 +226,43 @@ def explore(
 
 
 @app.command()
+def report(
+    rig: RigFile,
+    changes: Changes = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="write the document (.html) instead of opening it")
+    ] = None,
+    branch: Branch = 0,
+    fitted: Annotated[
+        Path | None,
+        typer.Option("--fit", metavar="FIT", help="a fit (.nc): judge with its friction, and say how sure that is"),
+    ] = None,
+) -> None:
+    """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
+    from steadyslip.core.errors import ParameterError, Problem
+    from steadyslip.files.output import check_output
+    from steadyslip.files.specifications import read_rig
+    from steadyslip.reports import report as run
+
+    if output is not None:
+        check_output([output], [".html"])
+    if fitted is not None and branch:
+        message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
+        raise ParameterError([Problem("--branch", message)])
+    options: dict[str, Any] = {"branch": branch}
+    if fitted is not None:
+        from steadyslip.experiments import load_fit
+
+        options["fit"] = load_fit(fitted)
+    found = run(read_rig(rig, changes or ()), title=rig.stem, source=rig, **options)
+    if output is None:
+        say(f"opened {found.open()}")
+        return
+    found.save(output)
+    say(f"wrote {output}")
+
+
+@app.command()
 def simulate(
     rig: RigFile,
     changes: Changes = None,
@@ -241,7 +277,7 @@ def simulate(
         list[str] | None,
         typer.Option("--initial", metavar="NAME=VALUE", help="start elsewhere than in steady sliding; SI; repeatable"),
     ] = None,
-    output: Annotated[list[Path] | None, outputs("write .nc, .csv, .png, .svg or .pdf")] = None,
+    output: Annotated[list[Path] | None, outputs("write .nc, .csv, .html, .png, .svg or .pdf")] = None,
     samples: Annotated[int | None, typer.Option(min=2, max=10_000_000, help="report at this many even times")] = None,
     phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,
     method: Annotated[str, typer.Option(help="auto, explicit or rosenbrock")] = "auto",
@@ -271,7 +307,7 @@ def cycles(
         tuple[str, str] | None, typer.Option(metavar="LOW HIGH", help="range of it, such as '1 GPa/m' '50 GPa/m'")
     ] = None,
     doublings: Annotated[int, typer.Option(min=0, help="how many period doublings to follow")] = 1,
-    output: Annotated[list[Path] | None, outputs("write .nc, .csv, .png, .svg or .pdf")] = None,
+    output: Annotated[list[Path] | None, outputs("write .nc, .csv, .html, .png, .svg or .pdf")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Which stick-slip cycles does this rig have, as a parameter varies? Ctrl-C keeps what there is."""
@@ -315,7 +351,9 @@ def threshold(
 def map_(
     source: Annotated[Path, typer.Argument(metavar="RIG", help="rig file with a table [map], or a map (.zarr)")],
     changes: Changes = None,
-    output: Annotated[list[Path] | None, outputs("the map (.zarr), and .nc, .parquet, .png, .svg or .pdf")] = None,
+    output: Annotated[
+        list[Path] | None, outputs("the map (.zarr), and .nc, .parquet, .html, .png, .svg or .pdf")
+    ] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="processes; all cores unless given")] = None,
     cluster: Annotated[
         str | None, typer.Option(help="compute on Dask: address of a scheduler such as tcp://host:8786, or local")

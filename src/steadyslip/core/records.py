@@ -19,6 +19,7 @@ from typing import Any, ClassVar, TypeVar, dataclass_transform
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came, one
+from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Domain, Option, Parameter, Role, Series, Value, fault
 
 
@@ -165,7 +166,7 @@ def setting(role: Value, *, default: Any = MISSING, key: str = "") -> Any:
     frozen_default=True,
     field_specifiers=(parameter, option, samples, part, parts, named, setting),
 )
-class FrozenRecord:
+class FrozenRecord(Displayed):
     """Frozen, checked when built, addressed by dotted names.
 
     Subclasses become frozen keyword-only dataclasses by themselves. ``name="..."`` registers a law

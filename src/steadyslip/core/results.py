@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.pages import Displayed
+
 _HOLDERS = frozenset((np.ndarray, tuple, dict))
 
 
-class ReadOnly:
+class ReadOnly(Displayed):
     """Base of frozen dataclasses that hold arrays, which become read-only, in tuples and dictionaries too."""
 
     def __post_init__(self) -> None:

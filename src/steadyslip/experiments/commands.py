@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.pages import write_page
 from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.files.output import FIGURES, write_by_ending
@@ -32,8 +33,8 @@ def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
     return records, specs[0] if specs else None
 
 
-def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, page: Any) -> None:
-    """Write a fit by the ending of the name; `page` makes the HTML.
+def write_fit(fit: Fit, comparison: LawComparison | None, path: Path) -> None:
+    """Write a fit by the ending of the name.
 
     Raises
     ------
@@ -45,7 +46,7 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, page: Any)
         target.write_text(json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
     def as_page(target: Path) -> None:
-        target.write_text(page(fit, comparison), encoding="utf-8")
+        write_page(fit, target, title=f"Fit of {path.stem}", comparison=comparison)
 
     write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
 

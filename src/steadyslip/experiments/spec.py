@@ -12,6 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.records import FrozenRecord, Part, given, resolve, role_of
 from steadyslip.core.roles import Parameter, positive
@@ -37,7 +38,7 @@ TABLES = (Section("record", RecordSettings), Section("fit", FitSettings))
 
 
 @dataclass(frozen=True)
-class Spec:
+class Spec(Displayed):
     """How to read records and what to fit to them.
 
     Attributes

@@ -7,18 +7,19 @@ What moves is marked by classes: ``ground`` (seen from the load point it passes 
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Callable
 
 from steadyslip.machine.slider import Slider
 
-WIDTH, HEIGHT = 340, 166
+WIDTH, HEIGHT = 340, 174
 GROUND = 132.0  # height of the surface, from above
 PERIOD = 10.0  # of the hatching
 BLOCK, TOP = 80.0, 86.0  # length of the block, height of its top
 HOOKED = 108.0  # height at which the spring holds it
 LENGTH = 130.0  # of the spring
-STEEPEST = 40.0  # degrees that are drawn at most
+STEEPEST, FLATTEST = 33.0, 7.0  # degrees that a spring and a surface are drawn at most
 _TURNS = 7
 
 
@@ -35,8 +36,9 @@ def sketch(rig: Slider) -> str:
     str
         An ``<svg>`` element that refers to nothing outside itself.
     """
-    drawn = _EXTRAS.get(rig.contact.name)
-    extra, tilt = drawn(rig) if drawn else "", _tilt(rig)
+    shape = rig.contact.shape()
+    tilt = max(-FLATTEST, min(FLATTEST, math.degrees(shape.tilt)))
+    extra = "".join(_EXTRAS[one](rig) for one in (shape.between, shape.part) if one)
     inside = _ground() + _surface() + extra + _block(rig) + _links(rig) + _load(rig)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="sketch" viewBox="0 0 {WIDTH} {HEIGHT}" data-period="{PERIOD}" '
@@ -78,19 +80,18 @@ def _surface() -> str:
 
 def _foot(rig: Slider) -> float:
     """How far the block is above the surface: a film or a layer may be between."""
-    return {"lift": 5.0, "dilating-layer": 8.0}.get(rig.contact.name, 0.0)
+    return {"film": 5.0, "layer": 8.0}.get(rig.contact.shape().between, 0.0)
 
 
 def _block(rig: Slider) -> str:
     foot, (left, right) = GROUND - _foot(rig), _sides(rig)
-    wedge = rig.contact.name == "self-energising"
+    wedge, load = rig.contact.shape().part == "wedge", rig.contact.shape().load
     shape = (
         f'<path d="M{left} {foot}V{TOP}L{right} {TOP + 16 * wedge}V{foot}Z" fill="currentColor" fill-opacity=".12"/>'
     )
     middle = (left + right) / 2
     mass = _text(middle, 114, "m") if rig.mass else ""
-    pressed = "" if wedge else _arrow((middle, 46), (middle, TOP - 2))
-    pressed += "" if wedge else _text(middle + 15, 60, _PRESSED.get(rig.contact.name, "σ₀"))
+    pressed = _arrow((middle, 46), (middle, TOP - 2)) + _text(middle + 15, 60, html.escape(load)) if load else ""
     rubbed = _arrow((right - 14, GROUND + 22), (left + 20, GROUND + 22)) + _text(left + 8, GROUND + 27, "τ")
     held = ""
     if rig.radiation_damping:
@@ -121,9 +122,7 @@ def _pot() -> str:
 
 def _rise(rig: Slider) -> float:
     """Degrees by which the spring leaves the surface, upwards where it pulls, below zero where it presses."""
-    if rig.contact.name == "inclined-spring":
-        return math.degrees(float(rig.value("contact.angle") or 0.0))
-    return {"slider-crank": 18.0, "triaxial": -30.0}.get(rig.contact.name, 0.0)
+    return math.degrees(rig.contact.shape().rise)
 
 
 def _pushed(rig: Slider) -> bool:
@@ -167,20 +166,12 @@ def _load(rig: Slider) -> str:
     if rig.drive.proportional():
         point = f'<rect x="{x - 2:.5g}" y="{y - 12:.5g}" width="34" height="24"/>' + _text(x + 15, y + 4, "PID")
         x += 28
-    start = (x - 10, y - 16) if _pushed(rig) or rig.contact.name == "slider-crank" else (x + 8, y)
+    start = (x - 10, y - 16) if _pushed(rig) or rig.contact.shape().part == "crank" else (x + 8, y)
     arrow = _arrow(start, (start[0] + 26, start[1])) + _text(start[0] + 12, start[1] - 8, "v₀")
     return f'<g class="load">{bar}{point}{arrow}</g>'
 
 
 # -- what some contacts have besides
-
-_PRESSED = {"triaxial": "P", "lead-screw": "W"}
-
-
-def _tilt(rig: Slider) -> float:
-    """Degrees by which the surface rises in the direction of sliding."""
-    name = {"sloped-guide": "contact.slope", "lead-screw": "contact.lead_angle"}.get(rig.contact.name)
-    return max(-7.0, min(7.0, math.degrees(float(rig.value(name) or 0.0)))) if name else 0.0
 
 
 def _wedge(rig: Slider) -> str:
@@ -212,8 +203,8 @@ def _crank(rig: Slider) -> str:
 
 
 _EXTRAS: dict[str, Callable[[Slider], str]] = {
-    "self-energising": _wedge,
-    "lift": _film,
-    "dilating-layer": _layer,
-    "slider-crank": _crank,
+    "wedge": _wedge,
+    "film": _film,
+    "layer": _layer,
+    "crank": _crank,
 }

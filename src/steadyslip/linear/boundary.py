@@ -11,6 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import LOW_AND_HIGH, checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
 from steadyslip.linear.search import Boundary, Search
 from steadyslip.machine.slider import Slider
@@ -18,7 +19,7 @@ from steadyslip.model.point import operating_point
 
 
 @dataclass(frozen=True)
-class Margin:
+class Margin(Displayed):
     """How far one parameter is from the nearest edge of stability.
 
     Attributes

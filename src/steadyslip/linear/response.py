@@ -18,6 +18,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import Num
 from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import quietly
@@ -27,7 +28,7 @@ from steadyslip.model.point import OperatingPoint, Vary, operating_point
 
 
 @dataclass(frozen=True)
-class Response:
+class Response(Displayed):
     """Ingredients of the cubic, per unit area: SymPy expressions from `response`, numbers from `small_signal`.
 
     Attributes

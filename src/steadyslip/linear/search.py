@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, unit
 from steadyslip.linear.polynomials import Array, damping_measures, roots
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
@@ -35,7 +36,7 @@ _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 
 
 @dataclass(frozen=True)
-class Boundary:
+class Boundary(Displayed):
     """One value of a parameter at which stability changes.
 
     Attributes

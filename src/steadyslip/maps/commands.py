@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.pages import write_page
 from steadyslip.files.output import FIGURES, check_output, write_by_ending
 from steadyslip.maps.plan.axes import Axis, Generated
 from steadyslip.maps.plan.map import Map
@@ -20,7 +21,7 @@ from steadyslip.maps.view.result import MapResult, open_map
 from steadyslip.maps.work.run import run_map
 
 STORE = ".zarr"
-ENDINGS = (STORE, ".nc", ".parquet", *FIGURES)
+ENDINGS = (STORE, ".nc", ".parquet", ".html", *FIGURES)
 REFINED = (".csv", *ENDINGS)
 
 
@@ -75,6 +76,8 @@ def write_map(found: MapResult, path: Path, options: Mapping[str, Any], edge: Re
         If the figure cannot be drawn so.
     """
     writers: dict[str, Any] = {".nc": found.to_netcdf, ".parquet": found.to_parquet}
+    if edge is None:
+        writers[".html"] = lambda p: write_page(found, p, title=f"Map of {path.stem}")
     if edge is not None:
         writers[".csv"] = edge.to_csv
     write_by_ending(path, writers, lambda: found.plot(**options) if edge is None else edge.plot())

@@ -11,6 +11,7 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import array_function
+from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper
 from steadyslip.core.roles import Parameter
 
@@ -83,7 +84,7 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
-class Model(Keeper):
+class Model(Keeper, Displayed):
     """A rig's equations.
 
     The variables y obey y' = `rates`; one scalar equation for each contact, its `balance` = 0 (friction law against

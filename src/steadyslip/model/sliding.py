@@ -12,6 +12,7 @@ import sympy as sp
 
 from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
 from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.core.questions import question
 from steadyslip.machine.slider import Slider
@@ -21,7 +22,7 @@ from steadyslip.model.steady import steady_equation
 
 
 @dataclass(frozen=True)
-class SteadySliding:
+class SteadySliding(Displayed):
     """One state of steady sliding.
 
     Attributes

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.pages import write_page
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.core.roles import Parameter, positive
@@ -18,7 +19,7 @@ from steadyslip.motion.result import History
 from steadyslip.motion.single import simulate
 from steadyslip.protocol import Protocol
 
-ENDINGS = (".nc", ".csv", *FIGURES)
+ENDINGS = (".nc", ".csv", ".html", *FIGURES)
 
 
 def run_file(
@@ -106,12 +107,16 @@ def _starting_values(texts: Iterable[str]) -> dict[str, float]:
 
 
 def write_history(history: History, path: Path, kind: str = "history") -> None:
-    """Write a run as netCDF, as columns or as a figure, by the ending of the name.
+    """Write a run as netCDF, as columns, as a document or as a figure, by the ending of the name.
 
     Raises
     ------
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".nc": history.save, ".csv": history.to_csv}
+    writers = {
+        ".nc": history.save,
+        ".csv": history.to_csv,
+        ".html": lambda p: write_page(history, p, title=f"Run of {path.stem}"),
+    }
     write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind), dtype=object)))

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.core.pages import Displayed
 from steadyslip.kernels.program import LOG_KINDS
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(Displayed):
     """A moment of a run.
 
     Attributes
@@ -38,7 +39,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class SlipEvent:
+class SlipEvent(Displayed):
     """Slip ahead of the load point, so that the spring unloads, at twice its velocity or more.
 
     The block is faster than the load point (and not arrested) throughout, and at the peak at least twice as fast

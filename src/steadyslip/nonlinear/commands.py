@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from steadyslip.core.pages import write_page
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
@@ -21,7 +22,7 @@ from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
-ENDINGS = (".nc", ".csv", *FIGURES)
+ENDINGS = (".nc", ".csv", ".html", *FIGURES)
 
 
 def cycles_of_file(
@@ -38,14 +39,18 @@ def cycles_of_file(
 
 
 def write_branch(branch: CycleBranch, path: Path) -> None:
-    """Write a branch as netCDF, as columns or as a figure, by the ending of the name.
+    """Write a branch as netCDF, as columns, as a document or as a figure, by the ending of the name.
 
     Raises
     ------
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".nc": lambda p: write_dataset(branch.to_xarray(), p), ".csv": branch.to_csv}
+    writers = {
+        ".nc": lambda p: write_dataset(branch.to_xarray(), p),
+        ".csv": branch.to_csv,
+        ".html": lambda p: write_page(branch, p, title=f"Cycles of {path.stem}"),
+    }
     write_by_ending(path, writers, branch.plot)
 
 

@@ -60,9 +60,6 @@ class Analysis(Findings):  # noqa: D101 -- its base has it
     def __repr__(self) -> str:
         return f"<Analysis: {headline(self)}; print it for the whole verdict>"
 
-    def _repr_markdown_(self) -> str:
-        return f"```\n{self}\n```"
-
 
 @checked()
 def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:

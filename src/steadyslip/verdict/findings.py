@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from steadyslip.core.pages import Displayed
 from steadyslip.linear.boundary import Margin
 from steadyslip.linear.search import Boundary
 from steadyslip.machine.slider import Slider
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Findings:
+class Findings(Displayed):
     """Verdict on one rig; printing it gives the verdict in words.
 
     Attributes

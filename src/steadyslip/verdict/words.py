@@ -41,27 +41,27 @@ _BEYOND = {
 def verdict(analysis: Findings) -> str:
     """The whole verdict as text, at most some 100 columns wide."""
     lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
-    lines += _facts(analysis)
+    for name, text in facts(analysis):
+        lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
     lines += _margin_table(analysis)
-    lines += _meaning(analysis)
+    lines += ["", *meant] if (meant := meaning(analysis)) else []
     for text in analysis.warnings:
         lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
 
 
-def _meaning(analysis: Findings) -> list[str]:
+def meaning(analysis: Findings) -> list[str]:
     """What the verdict does not say."""
     if analysis.stable is None or analysis.on_edge:
         return []
     if analysis.stable:
         kicked = "A large enough kick may still start an oscillation or a run-away."
-        lines = ["", f"Stable means: small disturbances die out. {kicked}"]
+        lines = [f"Stable means: small disturbances die out. {kicked}"]
         if not analysis.kicks:
             lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
-        return lines if analysis.onset is not None or analysis.kicks else lines[:2]
+        return lines if analysis.onset is not None or analysis.kicks else lines[:1]
     if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away and not _limited(analysis.rig):
         return [
-            "",
             "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
             "steadyslip simulate shows which.",
         ]
@@ -129,7 +129,8 @@ def _stress(analysis: Findings, value: float) -> str:
     return shown(value, "Pa") if area is None else f"{shown(value * area, 'N')} ({shown(value, 'Pa')})"
 
 
-def _facts(analysis: Findings) -> list[str]:
+def facts(analysis: Findings) -> list[tuple[str, str]]:
+    """What is known of steady sliding, its disturbances, its edge and kicks: name and words."""
     steady = analysis.steady
     if steady is None:
         return []
@@ -150,11 +151,7 @@ def _facts(analysis: Findings) -> list[str]:
         rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
     if analysis.onset is not None:
         rows.append(("onset", _onset(analysis.onset)))
-    rows += [("a kick", _survived(kick)) for kick in analysis.kicks]
-    lines: list[str] = []
-    for name, text in rows:
-        lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
-    return lines
+    return rows + [("a kick", _survived(kick)) for kick in analysis.kicks]
 
 
 def _onset(onset: Onset) -> str:
@@ -226,14 +223,19 @@ def _stable_set(analysis: Findings) -> str:
     return ", or ".join(parts) or "no stiffness"
 
 
+def edge_rows(analysis: Findings) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
+    """Of every parameter with an edge: name, value, edge, change and what happens beyond; names of those without."""
+    rows = [_margin_row(analysis, margin) for margin in analysis.margins if margin.edge is not None]
+    return rows, [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
+
+
 def _margin_table(analysis: Findings) -> list[str]:
     """The nearest edge of each parameter, the others unchanged."""
-    with_edge = [margin for margin in analysis.margins if margin.edge is not None]
-    without = [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
     if not analysis.margins:
         return []
+    rows, without = edge_rows(analysis)
     lines = ["", "Nearest edge in each parameter, the others unchanged, and what happens beyond it"]
-    rows = [_margin_row(analysis, margin) for margin in with_edge]
+    rows = [(name, value, f"-> {edge}", change, words) for name, value, edge, change, words in rows]
     widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
     lines += [
         "  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows
@@ -269,7 +271,7 @@ def _margin_row(analysis: Findings, margin: Margin) -> tuple[str, str, str, str,
     return (
         _short(analysis, margin.parameter),
         _quantity(analysis, margin.value, margin.unit),
-        f"-> {_quantity(analysis, edge.value, margin.unit)}",
+        _quantity(analysis, edge.value, margin.unit),
         change,
         words,
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.experiments.answers.validation import cross_validate
 from steadyslip.experiments.fitting.fit import fit, started_from
@@ -18,7 +19,7 @@ from steadyslip.machine.slider import Slider
 
 
 @dataclass(frozen=True, eq=False)
-class LawComparison:
+class LawComparison(Displayed):
     """Fits of several models to the same records, the best first.
 
     Attributes

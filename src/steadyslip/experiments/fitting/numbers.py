@@ -11,6 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.options import checked, finite
+from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, shown_error, shown_range
 from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly, read_only
@@ -26,7 +27,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Displayed):
     """One fitted parameter.
 
     Attributes

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import read_only
@@ -26,7 +27,7 @@ FEWEST_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(Displayed):
     """A record of an experiment; build one with `read_record` or `record_from_arrays`.
 
     Attributes

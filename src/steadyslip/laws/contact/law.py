@@ -56,6 +56,31 @@ class Motion:
         )
 
 
+@dataclass(frozen=True)
+class Shape:
+    """How a mechanism is sketched.
+
+    Attributes
+    ----------
+    rise : float
+        Angle (rad) by which the spring leaves the surface; below zero it presses the block into it, from behind.
+    tilt : float
+        Angle (rad) by which the surface rises in the direction of sliding.
+    between : str
+        What is between the surfaces: ``film``, ``layer`` or nothing.
+    part : str
+        What there is besides: ``wedge``, ``crank`` or nothing.
+    load : str
+        Letter of what presses the block from above; empty where nothing does.
+    """
+
+    rise: float = 0.0
+    tilt: float = 0.0
+    between: str = ""
+    part: str = ""
+    load: str = "σ₀"
+
+
 class ContactLaw(FrozenRecord, family="contact law"):
     """Base of contact laws: normal stress σ (Pa, compression positive) from the motion.
 
@@ -105,6 +130,10 @@ class ContactLaw(FrozenRecord, family="contact law"):
     def lock_up(self, friction_coefficient: float) -> str:
         """The lock-up condition in this law's own terms, empty if it has none to add."""
         return ""
+
+    def shape(self) -> Shape:
+        """How the mechanism is sketched: a block on a plane, pulled along it."""
+        return Shape()
 
 
 class PreloadedContact(ContactLaw):

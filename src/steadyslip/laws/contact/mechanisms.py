@@ -14,7 +14,7 @@ import sympy as sp
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import Condition, option, parameter
 from steadyslip.core.roles import acute, angle, nonnegative, positive, real, turn
-from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact
+from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact, Shape
 from steadyslip.units import deg
 
 
@@ -37,6 +37,9 @@ class InclinedSpring(PreloadedContact, name="inclined-spring"):
     def lock_up(self, friction_coefficient: float) -> str:
         limit = -math.atan2(1.0, friction_coefficient) / deg
         return f"the spring angle must be above −arccot μss = {limit:.4g} deg (eq. 27)"
+
+    def shape(self) -> Shape:
+        return Shape(rise=self.angle)
 
 
 class SliderCrank(PreloadedContact, name="slider-crank"):
@@ -73,6 +76,9 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
     def lock_up(self, friction_coefficient: float) -> str:
         return f"tan of the pushing rod's inclination must be below 1/μss = {1 / friction_coefficient:.4g}"
 
+    def shape(self) -> Shape:
+        return Shape(rise=0.3 if self.stroke == "pull" else -0.3, part="crank")
+
 
 class Triaxial(ContactLaw, name="triaxial"):
     """Saw cut in a triaxial press at constant confining pressure: σ = P_c + T tan θ.
@@ -108,6 +114,9 @@ class Triaxial(ContactLaw, name="triaxial"):
         limit = math.atan2(1.0, friction_coefficient) / deg
         return f"the saw-cut angle must be below arccot μss = {limit:.4g} deg"
 
+    def shape(self) -> Shape:
+        return Shape(rise=-self.angle, load="P")
+
 
 class SelfEnergising(PreloadedContact, name="self-energising"):
     """A wedge or self-energising guide: friction itself adds to the normal stress, σ = σ0 + γτ.
@@ -138,6 +147,9 @@ class SelfEnergising(PreloadedContact, name="self-energising"):
     def lock_up(self, friction_coefficient: float) -> str:
         return f"the gain must be below 1/μss = {1 / friction_coefficient:.4g}"
 
+    def shape(self) -> Shape:
+        return Shape(part="wedge", load="")
+
 
 class LeadScrew(ContactLaw, name="lead-screw"):
     """The thread of a lead screw under axial load W: σ = W/cos β ± τ tan β, β the lead angle.
@@ -161,6 +173,9 @@ class LeadScrew(ContactLaw, name="lead-screw"):
         limit = math.atan2(1.0, friction_coefficient) / deg
         return f"raising needs a lead angle below arccot μss = {limit:.4g} deg"
 
+    def shape(self) -> Shape:
+        return Shape(tilt=self.lead_angle, load="W")
+
 
 class DilatingLayer(PreloadedContact, name="dilating-layer"):
     """Double direct shear with a compliant normal ram: σ = σ0 + k_n e ln(v/v_ref).
@@ -177,6 +192,9 @@ class DilatingLayer(PreloadedContact, name="dilating-layer"):
     def coupling(self, motion: Motion) -> Expression:
         return self.ram_stiffness * self.dilatancy * sp.log(motion.velocity / self.v_ref)
 
+    def shape(self) -> Shape:
+        return Shape(between="layer")
+
 
 class Lift(PreloadedContact, name="lift"):
     """A guide whose lubricant lifts the block as it speeds up: σ = σ0 − l (v − v_ref).
@@ -190,6 +208,9 @@ class Lift(PreloadedContact, name="lift"):
     def coupling(self, motion: Motion) -> Expression:
         return -self.lift * (motion.velocity - self.v_ref)
 
+    def shape(self) -> Shape:
+        return Shape(between="film")
+
 
 class SlopedGuide(PreloadedContact, name="sloped-guide"):
     """A guide of normal stiffness k_n that follows a surface sloping at β: σ = σ0 + k_n x tan β.
@@ -202,3 +223,6 @@ class SlopedGuide(PreloadedContact, name="sloped-guide"):
 
     def coupling(self, motion: Motion) -> Expression:
         return self.guide_stiffness * motion.slip * sp.tan(self.slope)
+
+    def shape(self) -> Shape:
+        return Shape(tilt=self.slope)

@@ -12,6 +12,7 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly
 from steadyslip.core.roles import Parameter
 
@@ -26,7 +27,7 @@ LARGEST_HYPERCUBE = 2**22  # all its points are needed for one of them
 
 
 @dataclass(frozen=True)
-class Grid:
+class Grid(Displayed):
     """Evenly spaced values of a parameter, both ends included.
 
     Parameters
@@ -46,7 +47,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Samples:
+class Samples(Displayed):
     """Points spread over ranges of several parameters, along one dimension of the map.
 
     Parameters

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
+from steadyslip.core.pages import Displayed
 from steadyslip.core.records import Address, FrozenRecord, parameters, resolve
 from steadyslip.core.roles import Parameter
 from steadyslip.files.specifications import rig_to_text
@@ -34,7 +35,7 @@ AnyMeasure = Measure | FunctionMeasure
 
 
 @dataclass(frozen=True, eq=False)
-class Map:
+class Map(Displayed):
     """What to compute of which rigs.
 
     Parameters

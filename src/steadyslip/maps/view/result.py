@@ -11,6 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, shown_range
 from steadyslip.machine.slider import Slider
@@ -20,7 +21,7 @@ from steadyslip.maps.view import export
 BLOCK = 2**22  # points read at a time
 
 
-class MapResult:
+class MapResult(Displayed):
     """A map on disk.
 
     Opening it reads no results; `dataset` reads what is asked of it. A map that is still being computed can be opened

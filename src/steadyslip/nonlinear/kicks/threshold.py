@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
+from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_states
@@ -35,7 +36,7 @@ BEYOND = 1.01  # edges over this: where it is looked what happens beyond
 
 
 @dataclass(frozen=True)
-class Threshold:
+class Threshold(Displayed):
     """How large a kick steady sliding survives.
 
     Attributes
@@ -339,7 +340,7 @@ def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class KickMargin:
+class KickMargin(Displayed):
     """How far an expected disturbance is from the limit.
 
     Attributes

@@ -19,6 +19,7 @@ import numpy as np
 
 from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable
 from steadyslip.core.options import BRANCH, NAME, checked
+from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.polynomials import stable_set
@@ -35,7 +36,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Onset:
+class Onset(Displayed):
     """What happens at an oscillatory edge of stability.
 
     Attributes

@@ -15,6 +15,7 @@ import numpy as np
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked, finite
+from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range
 from steadyslip.core.results import ReadOnly
@@ -33,7 +34,7 @@ SMALLEST_FREQUENCY = 1e-4  # of the one at the start; below, the edge has become
 
 
 @dataclass(frozen=True)
-class SpecialPoint:
+class SpecialPoint(Displayed):
     """A place on a curve where something changes.
 
     Attributes

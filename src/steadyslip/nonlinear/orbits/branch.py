@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, stress_name, total, totals
 from steadyslip.machine.slider import Slider
@@ -20,7 +21,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class CycleBranch:
+class CycleBranch(Displayed):
     """Cycles that are born at an oscillatory edge of stability, in the order in which they were followed.
 
     Attributes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from steadyslip.core.pages import Displayed
 from steadyslip.nonlinear.orbits.shooting import Orbit
 
 UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "stress_drop": "Pa",
@@ -11,7 +12,7 @@ UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "ampli
 
 
 @dataclass(frozen=True, eq=False)
-class Cycle:
+class Cycle(Displayed):
     """One periodic motion.
 
     Attributes
@@ -65,7 +66,7 @@ class Cycle:
 
 
 @dataclass(frozen=True, eq=False)
-class SpecialCycle:
+class SpecialCycle(Displayed):
     """A cycle at which the branch changes.
 
     Attributes

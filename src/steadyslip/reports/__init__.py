@@ -1,0 +1,58 @@
+"""Rigs and results as documents that anybody can open and print: HTML in one file, figures inside.
+
+`brief` is the part of a page that notebooks show of any result. Knows everything but the command line.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from steadyslip.core.options import NAME, checked
+from steadyslip.core.pages import register_pages
+from steadyslip.reports.brief import brief
+from steadyslip.reports.document import Report, put_together
+from steadyslip.reports.results import parts_of
+
+__all__ = ["Report", "brief", "report"]
+
+
+@checked(title=NAME)
+def report(
+    result: Any, *, title: str = "steadyslip report", explorer: bool = True, source: Path | None = None, **options: Any
+) -> Report:
+    """A printable document about a rig or a result.
+
+    Parameters
+    ----------
+    result : Slider, Analysis, History, CycleBranch, MapResult or Fit
+    title : str, optional
+        Stands above the headline.
+    explorer : bool, optional
+        Whether the explorer of the rig is at its end.
+    source : path, optional
+        The file it was made of, whose hash is given.
+    **options
+        Of a rig: ``branch``, which steady sliding where there are several, and ``fit``, a Fit whose friction to take,
+        so that it says how sure the verdict is. Of a fit: ``comparison``, a LawComparison.
+
+    Returns
+    -------
+    Report
+        Shown in a notebook; ``save("rig.html")`` writes it, ``open()`` shows it in the browser.
+
+    Raises
+    ------
+    ParameterError
+        If there is no document of such a result.
+    NotAvailable
+        If the numbers of the rig leave the range of floating point.
+    """
+    return Report(put_together(parts_of(result, **options), title, explorer, source), title)
+
+
+def _whole(result: Any, **options: Any) -> str:
+    return report(result, **options).html
+
+
+register_pages(brief=brief, whole=_whole)

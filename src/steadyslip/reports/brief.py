@@ -1,0 +1,243 @@
+"""Any result, rig or model as a part of a page: what notebooks show. This is the one place that does it for all.
+
+What an attribute is called says what it is, the same in all results: its unit is found by its name in `UNITS`.
+Attributes in `OWN` are in the unit that the result itself names, those in `PLAIN` have none.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown, shown_range
+from steadyslip.core.records import FrozenRecord, parameters
+from steadyslip.explorer.sketch import sketch
+from steadyslip.machine.slider import Slider
+from steadyslip.model import Model
+from steadyslip.reports.drawings import drawn
+from steadyslip.reports.elements import STYLE, Markup, figure, heading, letter, math as formula, paragraph, table, typed
+
+_BY_UNIT = {
+    "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times",
+    "m/s": "velocity v peak_velocity lowest_velocity",
+    "m": "slip x displacement",
+    "Pa": "normal_stress shear_stress spring_stress stress_drop lowest_normal_stress highest_normal_stress normal "
+    "shear stress_ratio",
+    "Pa/m": "critical_stiffness stable_stiffness critical_axial_stiffness k B1",
+    "Pa s/m": "f S",
+    "kg/m^2": "m",
+    "rad/s": "angular_frequency critical_angular_frequency",
+    "1/s": "eigenvalues growth_rate coefficient r",
+    "m^2": "area",
+}
+UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
+OWN = frozenset("value error low high amount absolute values".split())  # noqa: SIM905 -- a list of words
+PLAIN = frozenset(
+    """relative size bracket searched damping_ratio amplitude trivial multipliers ratio share ssq rtol steps rejected
+    routh characteristic_polynomial growth_slope f1 mu B0 B2 B3 friction precision rise scale noise safety level
+    points outcome fold status_code kind stable exists survived is_edge doubt details criteria predicted residuals
+    seen worth errors first second first_interval total_interval total missing spacing edge correlation
+    log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
+    sides conditions""".split()  # noqa: SIM905 -- a list of words
+)
+_BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
+_NOT_SHOWN = frozenset(
+    "rig version plan data protocol area unit units html start fit fits draws search noise plot map".split()  # noqa: SIM905
+)
+_ROWS, _ARRAY = 12, 4
+
+
+def brief(result: Any) -> str:
+    """A result as HTML: what it is, its numbers with their units, a picture where there is one.
+
+    Parameters
+    ----------
+    result : object
+        Any public result, a rig, a law, a protocol or a Model.
+
+    Returns
+    -------
+    str
+        An element that refers to nothing outside itself.
+    """
+    if isinstance(result, Model):
+        inside = "".join(_model(result))
+    elif isinstance(result, FrozenRecord):
+        inside = "".join(_record(result))
+    else:
+        inside = "".join(_result(result))
+    return f'<div class="told"><style>{STYLE}</style>{inside}</div>'
+
+
+def rows_of(text: str) -> str:
+    """Words of an answer as HTML: lines of a name and what it is as a table, the others as paragraphs."""
+    parts: list[str] = []
+    rows: list[list[str]] = []
+    for line in text.splitlines():
+        found = re.match(r"(\S(?:.*?\S)?) {2,}(\S.*)$", line.strip())
+        if rows and re.match(r" {8,}\S", line):
+            rows[-1][-1] += f" {line.strip()}"
+        elif found:
+            rows.append([found[1], *re.split(r" {2,}", found[2])])
+        elif line.strip():
+            parts += [_even(rows), paragraph(line.strip())]
+            rows = []
+    return "".join([*parts, _even(rows)])
+
+
+def _even(rows: list[list[str]]) -> str:
+    widest = max(map(len, rows), default=0)
+    return table([[*row, *[""] * (widest - len(row))] for row in rows])
+
+
+# -- what is shown of each kind
+
+
+def _model(model: Model) -> Iterator[str]:
+    kind = "with inertia" if model.inertial else "quasistatic"
+    yield heading(f"Model, {kind}", 3)
+    for equation in model.equations():
+        yield f'<div class="formula">{formula(equation)}</div>'
+    yield table([(letter(one.symbol), one.unit, one.doc) for one in model.variables], ("variable", "unit", "meaning"))
+    rows = [
+        (name, letter(symbol), model.roles[name].unit, model.roles[name].doc)
+        for name, symbol in model.parameters.items()
+    ]
+    yield table(rows, ("parameter", "letter", "unit", "meaning"))
+
+
+def _record(record: FrozenRecord) -> Iterator[str]:
+    name = getattr(record, "name", "")
+    yield heading(f"{type(record).__name__}{f' ({name})' if isinstance(name, str) and name else ''}", 3)
+    if isinstance(record, Slider):
+        yield figure(sketch(record))
+    rows = []
+    for path, one in parameters(record).items():
+        if one.value is not None:
+            values = np.asarray(one.value)
+            words = shown(float(values), one.role.unit, 6) if values.ndim == 0 else _array(values, one.role.unit, None)
+            rows.append((path, words, one.role.doc))
+    yield table(rows, ("parameter", "value", "meaning"))
+
+
+def _result(result: Any) -> Iterator[str]:
+    words = str(result)
+    told = not words.startswith((f"{type(result).__name__}(", "<"))
+    yield heading(type(result).__name__, 3)
+    if told:
+        yield rows_of(words)
+    else:
+        yield table(_attributes(result))
+    for name, many in _series(result):
+        yield heading(name.replace("_", " ").capitalize(), 3) + many
+    yield figure(_picture(result))
+
+
+def _picture(result: Any) -> str:
+    if not hasattr(result, "plot"):
+        return ""
+    try:
+        return drawn(lambda: draw(result), type(result).__name__, 5.5)
+    except NotAvailable:
+        return ""
+
+
+def _public(result: Any) -> Iterator[tuple[str, Any]]:
+    """Names and values of attributes, in order of declaration."""
+    names = [one.name for one in fields(result)] if is_dataclass(result) else getattr(result, "_fields", vars(result))
+    for name in names:
+        if not name.startswith("_") and name not in _NOT_SHOWN:
+            yield name, getattr(result, name)
+
+
+def _attributes(result: Any) -> Iterator[tuple[str, Any]]:
+    area = getattr(result, "area", None) or getattr(getattr(result, "rig", None), "area", None)
+    for name, value in _public(result):
+        cell = _cell(value, unit_of(result, name), area)
+        if cell:
+            yield name.replace("_", " "), cell
+
+
+def unit_of(result: Any, name: str) -> str:
+    """The SI unit of an attribute."""
+    own = getattr(result, "unit", None)
+    if isinstance(own, str) and name in OWN | _BY_TYPE.get(type(result).__name__, set()):
+        return own
+    return UNITS.get(name, "1")
+
+
+def _cell(value: Any, unit: str, area: float | None) -> Any:
+    """A value for people; empty where it is none, or several results."""
+    if value is None or isinstance(value, bool | np.bool_ | str):
+        return "" if value is None else str(value) if isinstance(value, str) else "yes" if value else "no"
+    if isinstance(value, int | np.integer) and unit == "1":
+        return str(value)
+    if isinstance(value, int | float | np.integer | np.floating):
+        return "" if math.isnan(value) else shown(float(value), unit, area=area)
+    if isinstance(value, complex):
+        sign = "+" if value.imag >= 0 else "-"
+        return f"{value.real:.4g} {sign} {abs(value.imag):.4g} i {'' if unit == '1' else unit}"
+    if isinstance(value, np.ndarray):
+        return _array(value, unit, area)
+    if isinstance(value, Mapping):
+        plain = {k: v for k, v in value.items() if isinstance(v, int | float)}
+        return Markup("<br>".join(f"{typed(k)}: {typed(shown(float(v), '1'))}" for k, v in plain.items()))
+    if isinstance(value, tuple | list) and value and not is_dataclass(value[0]):
+        cells = [str(_cell(one, unit, area)) for one in value[:_ROWS]]
+        return Markup("<br>".join(one if isinstance(one, Markup) else typed(one) for one in cells))
+    return ""
+
+
+def _array(values: np.ndarray, unit: str, area: float | None) -> str:
+    """A few values, or how many there are and their range."""
+    if values.size == 0:
+        return "none"
+    if values.dtype.kind not in "fiu":
+        names, counts = np.unique(values.astype(str), return_counts=True)
+        return ", ".join(f"{n} {name}" for name, n in zip(names[:_ROWS], counts, strict=False))
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return f"{values.size} values, none a number"
+    if values.size <= _ARRAY:
+        return ", ".join(shown(float(one), unit, area=area) for one in values.ravel())
+    shape = " × ".join(map(str, values.shape))
+    return f"{shape} values, {shown_range(float(finite.min()), float(finite.max()), unit, area)}"
+
+
+def _series(result: Any) -> Iterator[tuple[str, str]]:
+    """Results within a result, as tables with a row each; series with their units."""
+    area = getattr(getattr(result, "rig", None), "area", None)
+    for name, value in _public(result):
+        if isinstance(value, tuple) and value and is_dataclass(value[0]) and hasattr(type(value[0]), "_repr_html_"):
+            yield name, _listed(value, area)
+    units = getattr(result, "units", None)
+    for name in ("data", "final"):
+        series = getattr(result, name, None)
+        if isinstance(series, Mapping) and isinstance(units, Mapping):
+            rows = [
+                (key.replace("_", " "), _array(np.asarray(values), units.get(key, "1"), area))
+                for key, values in series.items()
+            ]
+            yield name, table(rows)
+
+
+def _listed(results: Iterable[Any], area: float | None) -> str:
+    many = list(results)
+    names = [name for name, _ in _public(many[0]) if any(_short(one, name, area) for one in many)]
+    rows = [[_short(one, name, area) for name in names] for one in many[:_ROWS]]
+    more = paragraph(f"and {len(many) - _ROWS} more", "small") if len(many) > _ROWS else ""
+    return table(rows, [name.replace("_", " ") for name in names], left=False) + more
+
+
+def _short(result: Any, name: str, area: float | None) -> Any:
+    """A cell of a list: numbers and words only."""
+    value = getattr(result, name)
+    own = getattr(result, "area", None) or area
+    return _cell(value, unit_of(result, name), own) if isinstance(value, bool | int | float | str) else ""

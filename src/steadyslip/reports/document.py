@@ -1,0 +1,135 @@
+"""A document about a rig or a result: its parts in order, where it came from, and the explorer at its end."""
+
+from __future__ import annotations
+
+import hashlib
+import html
+import platform
+import tempfile
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from os import PathLike
+from pathlib import Path
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.explorer.page import document, fragment, style
+from steadyslip.files.output import whole_file
+from steadyslip.machine.slider import Slider
+from steadyslip.reports.elements import STYLE, heading, listing, paragraph, table, typed
+
+_PAGE = """
+body { background: #fff; }
+.report { max-width: 54em; margin: 0 auto; padding: 22px 16px; }
+.report .kind { color: #566173; margin: 0; }
+.report .lead { font-size: 17px; margin: 4px 0 12px; }
+.report .sketch { width: 340px; max-width: 100%; height: auto; }
+.report + .steadyslip-root { border-top: 1px solid #cfd5dd; }
+@page { size: A4; margin: 16mm; }
+@media print {
+  .report { padding: 0; }
+  .steadyslip-root, .on-screen { display: none !important; }
+}
+"""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A printable document in one file.
+
+    Attributes
+    ----------
+    html : str
+        The whole file; it asks for nothing from outside.
+    title : str
+    """
+
+    html: str = field(repr=False)
+    title: str
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the file.
+
+        Raises
+        ------
+        NotAvailable
+            If it cannot be written.
+        """
+        with whole_file(path) as name:
+            Path(name).write_text(self.html, encoding="utf-8")
+
+    def open(self) -> Path:
+        """Show it in the browser; the file it is in."""
+        options = {"suffix": ".html", "prefix": "steadyslip-", "delete": False, "encoding": "utf-8"}
+        with tempfile.NamedTemporaryFile("w", **options) as to:  # type: ignore[call-overload]
+            to.write(self.html)
+        webbrowser.open(Path(to.name).as_uri())
+        return Path(to.name)
+
+    def _repr_html_(self) -> str:
+        frame = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;border:0"'
+        return f'<iframe title="{html.escape(self.title)}" {frame} srcdoc="{html.escape(self.html)}"></iframe>'
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a document says.
+
+    Attributes
+    ----------
+    headline, lead, question : str
+        Words: the answer, why, and what was asked.
+    body : sequence of str
+        HTML.
+    rig : Slider or None
+        Of the explorer.
+    text : str
+        The rig as a file, or whatever else says what this is about.
+    branch : int
+        Which steady sliding.
+    """
+
+    headline: str
+    lead: str
+    question: str
+    body: Sequence[str]
+    rig: Slider | None
+    text: str
+    branch: int = 0
+
+
+def put_together(parts: Parts, title: str, explorer: bool, source: Path | None) -> str:
+    """The text of the file."""
+    live, still = "", ""
+    if explorer and parts.rig is not None:
+        try:
+            live = fragment(parts.rig, title, parts.branch)
+        except NotAvailable as refused:
+            still = paragraph(f"There is no explorer at the end: {refused}.", "small")
+    shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
+    article = (
+        f'<article class="report told"><p class="kind">{typed(title)}</p><h1>{typed(parts.headline)}</h1>'
+        f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
+        f"{''.join(parts.body)}{_provenance(parts.text, source)}{still}"
+        f'<div class="on-screen">{shown}</div></article>\n'
+    )
+    return document(f"{title} – steadyslip", _PAGE + STYLE + (style() if live else ""), article + live)
+
+
+def _provenance(text: str, source: Path | None) -> str:
+    """What made this document, of what."""
+    import numpy as np
+    import scipy
+    import sympy as sp
+
+    from steadyslip import __version__
+
+    versions = (
+        f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}, SymPy {sp.__version__}"
+    )
+    rows = [("steadyslip", __version__), ("with", versions), ("made on", f"{datetime.now(UTC):%Y-%m-%d}")]
+    if source is not None and source.is_file():
+        rows.append((f"SHA-256 of {source.name}", hashlib.sha256(source.read_bytes()).hexdigest()))
+    rows.append(("SHA-256 of the file below", hashlib.sha256(text.encode()).hexdigest()))
+    return heading("Where it came from") + table(rows) + listing(text)

@@ -1,0 +1,102 @@
+"""What pages consist of: text that is safe and well set, tables, formulas, pictures."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import sympy as sp
+from sympy.printing.mathml import MathMLPresentationPrinter
+
+_SPOKEN = ((r"(?<![A-Za-z])um(?![A-Za-z])", "µm"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"), (r"^x (?=\d)", "× "),
+           (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"))  # fmt: skip
+_ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
+STYLE = """
+.told { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b2430; }
+.told h1 { font-size: 25px; line-height: 1.25; margin: 2px 0 6px; }
+.told h2 { font-size: 18px; margin: 26px 0 6px; break-after: avoid; }
+.told h3 { font-size: 15px; margin: 14px 0 4px; break-after: avoid; }
+.told table { border-collapse: collapse; margin: 6px 0; }
+.told td, .told th { padding: 3px 14px 3px 0; border-bottom: 1px solid #d5dae1; text-align: left; vertical-align: top;
+  font-variant-numeric: tabular-nums; background: none; }
+.told th { font-weight: 650; }
+.told .n { white-space: nowrap; }
+.told h1, .told p, .told td { overflow-wrap: anywhere; }
+.told tr { break-inside: avoid; }
+.told .wide { overflow-x: auto; max-width: 100%; }
+.told figure { margin: 10px 0; break-inside: avoid; }
+.told figure svg, .told figure img { max-width: 100%; height: auto; }
+.told figcaption, .told .small { color: #566173; font-size: 13px; }
+.told .warning { background: #fff3d6; border-left: 5px solid #e08a00; padding: 6px 12px; margin: 8px 0; }
+.told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
+  white-space: pre-wrap; overflow-wrap: anywhere; }
+.told math { font-size: 17px; }
+.told .formula { overflow-x: auto; overflow-y: hidden; margin: 8px 0; padding: 2px 0; }
+"""
+"""Of everything inside an element of class ``told``."""
+
+
+def typed(text: Any) -> str:
+    """Words as they are set in print: µm, ², →, a true minus; safe in HTML."""
+    words = str(text)
+    for pattern, better in _SPOKEN:
+        words = re.sub(pattern, better, words)
+    return html.escape(words, quote=True)
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """A paragraph of words."""
+    return f"<p{f' class={kind!r}' if kind else ''}>{typed(text)}</p>"
+
+
+def heading(text: str, level: int = 2) -> str:
+    """A heading."""
+    return f"<h{level}>{typed(text)}</h{level}>"
+
+
+def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = True) -> str:
+    """A table; what is `Markup` stays as it is, the rest is set as words. With `left` the first cell heads its row."""
+    top = f"<thead><tr>{''.join(f'<th scope=col>{typed(cell)}</th>' for cell in head)}</tr></thead>" if head else ""
+    lines = []
+    for row in rows:
+        first, *rest = [cell if isinstance(cell, Markup) else typed(cell) for cell in row]
+        side = f"<th scope=row>{first}</th>" if left else f"<td>{first}</td>"
+        cells = (f"<td{_whole(cell)}>{cell}</td>" for cell in rest)
+        lines.append(f"<tr>{side}{''.join(cells)}</tr>")
+    return f'<div class="wide"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>' if lines else ""
+
+
+def _whole(cell: str) -> str:
+    """Short cells, as values with their units are, stay on one line."""
+    return " class=n" if len(cell) <= 16 and " " in cell else ""
+
+
+class Markup(str):
+    """Text that is HTML already."""
+
+
+def math(expression: Any, display: bool = True) -> Markup:
+    """An expression of SymPy as MathML, which needs no font and no script."""
+    text = MathMLPresentationPrinter().doprint(expression)
+    for entity, character in _ENTITIES.items():
+        text = text.replace(entity, character)
+    style = ' display="block" class="formula"' if display else ""
+    return Markup(f'<math xmlns="http://www.w3.org/1998/Math/MathML"{style}>{text}</math>')
+
+
+def letter(symbol: sp.Symbol) -> Markup:
+    """A symbol within a line."""
+    return math(symbol, display=False)
+
+
+def figure(drawing: str, caption: str = "") -> str:
+    """A drawing with a caption; nothing where there is none."""
+    below = f"<figcaption>{typed(caption)}</figcaption>" if caption else ""
+    return f"<figure>{drawing}{below}</figure>" if drawing else ""
+
+
+def listing(text: str) -> str:
+    """Text whose lines stay as they are."""
+    return f"<pre>{html.escape(text)}</pre>"

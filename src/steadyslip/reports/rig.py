@@ -1,0 +1,118 @@
+"""What a document says of a rig: question, sketch, inputs, verdict, edges, charts, formula, confidence, caveats."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from steadyslip import figures
+from steadyslip.core.errors import NotAvailable, ParameterError
+from steadyslip.core.quantities import shown
+from steadyslip.experiments import Prediction
+from steadyslip.explorer.sketch import sketch
+from steadyslip.files.specifications import rig_to_text
+from steadyslip.machine.slider import Slider
+from steadyslip.model.build import build_model
+from steadyslip.protocol import Protocol
+from steadyslip.reports.brief import rows_of
+from steadyslip.reports.document import Parts
+from steadyslip.reports.drawings import drawn
+from steadyslip.reports.elements import Markup, figure, heading, letter, math, paragraph, table
+from steadyslip.verdict import Analysis
+from steadyslip.verdict.words import edge_rows, facts, headline, meaning
+
+SMALL = (
+    "The verdict is on small disturbances of steady sliding: it holds for the model and the numbers above, and says "
+    "nothing of wear, heat or of what the laws leave out."
+)
+
+
+def about(analysis: Analysis, prediction: Prediction | None = None) -> Parts:
+    """The document of a verdict; with the friction of a fit, how sure that is."""
+    rig = analysis.rig
+    speed = shown(rig.drive.velocity, "m/s")
+    body = [
+        heading("The rig"), figure(sketch(rig)), inputs(rig),
+        heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
+        *_confidence(prediction),
+        heading("How far is the edge?"), *_edges(analysis), *_charts(analysis),
+        heading("The formulas"), *formulas(analysis),
+        heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings), paragraph(SMALL),
+    ]  # fmt: skip
+    question = f"Will this rig slide steadily at {speed}, what would make it, and how far is it from the edge?"
+    lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
+    return Parts(_sentence(headline(analysis)), lead, question, body, rig, as_file(rig), analysis.branch)
+
+
+def as_file(rig: Slider, protocol: Protocol | None = None) -> str:
+    """A rig as the text of its file; one with a law that no file can name as Python writes it."""
+    try:
+        return rig_to_text(rig, protocol)
+    except ParameterError:
+        return f"{rig!r}\n[protocol]\n{protocol!r}" if protocol is not None else repr(rig)
+
+
+def _sentence(line: str) -> str:
+    """A headline that is not shouted."""
+    loud, colon, rest = line.partition(": ")
+    return (
+        f"{loud.capitalize() if loud.isupper() else loud}{colon}{rest}"
+        if colon
+        else line.replace("NO STEADY SLIDING", "No steady sliding")
+    )
+
+
+def inputs(rig: Slider) -> str:
+    """Every number of a rig with its letter, unit and meaning."""
+    symbols = build_model(rig).parameters
+    rows = []
+    for name, one in rig.parameters().items():
+        if one.value is None:
+            continue
+        known = letter(symbols[name]) if name in symbols else Markup("")
+        rows.append((name, known, shown(one.value, one.role.unit, 6), one.role.doc))
+    return table(rows, ("parameter", "letter", "value", "meaning"))
+
+
+def _edges(analysis: Analysis) -> Iterator[str]:
+    rows, without = edge_rows(analysis)
+    if rows:
+        head = ("parameter", "now", "edge", "change", "beyond it")
+        yield paragraph("The nearest edge in each parameter, the others unchanged.")
+        yield table(rows, head)
+    if without:
+        yield paragraph(f"No edge within range: {', '.join(without)}.", "small")
+
+
+def _charts(analysis: Analysis) -> Iterator[str]:
+    rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
+    near = [one.parameter for one in analysis.margins if one.edge is not None and one.parameter != stiffness]
+    for name in near[:2]:
+        chart = drawn(lambda name=name: figures.stability_chart(rig, name, stiffness, points=101), "", 6.0)  # type: ignore[misc]
+        words = f"Where sliding is stable over {name} and {stiffness}; the dot is this rig."
+        yield figure(chart, words)
+    if analysis.stable is not None:
+        locus = drawn(lambda: figures.root_locus(rig), "root locus", 6.0)
+        yield figure(
+            locus, "Eigenvalues of small disturbances as the stiffness varies; to the right of the axis they grow."
+        )
+
+
+def formulas(analysis: Analysis) -> Iterator[str]:
+    """The critical stiffness where it has a formula, and the equations of the model."""
+    try:
+        found = analysis.formula()
+        yield paragraph("The critical stiffness of every rig with the same terms, along the sliding direction:")
+        yield f'<div class="formula">{math(found)}</div>'
+    except NotAvailable as refused:
+        yield paragraph(f"The critical stiffness has no formula here: {refused}.")
+    yield paragraph("The equations of motion:")
+    for equation in build_model(analysis.rig).equations():
+        yield f'<div class="formula">{math(equation)}</div>'
+
+
+def _confidence(prediction: Prediction | None) -> Iterator[str]:
+    if prediction is None:
+        return
+    yield heading("How sure is that?")
+    yield rows_of(str(prediction))
+    yield figure(drawn(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig.")

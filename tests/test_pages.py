@@ -1,0 +1,217 @@
+"""Results as HTML: in notebooks all of them, as documents those that answer a question."""
+
+import dataclasses
+import hashlib
+import inspect
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+from command import run
+from fuzz_rigs import DRIVES, FRICTION
+from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
+from steadyslip.core.records import FrozenRecord
+from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, rows_of, unit_of
+from steadyslip.reports.elements import math, table, typed
+
+VOID = {"br", "img", "meta", "hr", "input", "link"}
+OWN_RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
+
+
+class _Balanced(HTMLParser):
+    """Complains of elements that do not nest."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.words, self.quiet = [], [], 0
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if not {"script", "style", "pre", "svg"} & set(self.open):
+            self.words.append(data)
+
+
+def words(text):
+    """What a reader sees, elements checked on the way."""
+    return re.sub(r"\s+", " ", " ".join(_Balanced(text).words))
+
+
+# -- set as in print
+
+
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [("5 um", "5 µm"), ("3 um/s", "3 µm/s"), ("9 kg/m^2", "9 kg/m²"), ("sum of 2", "sum of 2"), ("-45 deg", "−45 deg"),
+     ("1e-05", "1e-05"), ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
+)  # fmt: skip
+def test_words_are_set_as_in_print(text, printed):
+    assert typed(text) == printed
+
+
+def test_lines_of_names_and_words_become_tables():
+    found = rows_of("Head\n  velocity      1 um/s to 2 um/s\n                going on\nlast  a  b\nThe end")
+    assert words(found).strip() == "Head velocity 1 µm/s to 2 µm/s going on last a b The end"
+    assert found.count("<tr>") == 2
+    assert found.count("<p>") == 2
+
+
+def test_formulas_need_no_script_and_no_entity():
+    text = math(ss.formula(OWN_RIG))
+    _Balanced(text)
+    assert not re.search("&[a-zA-Z]", text)
+    assert text.startswith('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"')
+
+
+def test_cells_are_words_unless_they_say_otherwise():
+    assert "&lt;i&gt;" in table([("<i>", "b")])
+
+
+# -- notebooks
+
+PUBLIC = [one for one in (getattr(ss, name) for name in dir(ss)) if inspect.isclass(one)]
+RESULTS = [
+    one for one in PUBLIC
+    if dataclasses.is_dataclass(one) and not issubclass(one, (Exception, FrozenRecord)) and one is not ss.Motion
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", RESULTS, ids=lambda kind: kind.__name__)
+def test_every_public_result_has_html_and_every_number_of_it_a_unit(kind):
+    assert hasattr(kind, "_repr_html_")
+    for one in dataclasses.fields(kind):
+        if re.search("float|ndarray|complex|Array", str(one.type)) and not one.name.startswith("_"):
+            known = UNITS.keys() | OWN | PLAIN | _NOT_SHOWN
+            assert one.name in known, f"{kind.__name__}.{one.name}: say in reports/brief.py which unit it has"
+
+
+@pytest.fixture(scope="module")
+def results():
+    analysis = ss.analyze(OWN_RIG)
+    run = ss.simulate(OWN_RIG, ss.VelocityStep(at=1.0, to=2 * V0), until=60.0)
+    return {
+        "rig": OWN_RIG, "law": OWN_RIG.friction, "protocol": run.protocol, "model": ss.build_model(OWN_RIG),
+        "analysis": analysis, "steady": analysis.steady, "margin": analysis.margins[0], "onset": analysis.onset,
+        "boundary": ss.boundary(OWN_RIG, "stiffness")[0], "response": ss.small_signal(OWN_RIG),
+        "history": run, "event": run.events[0], "slip": run.slip_events[0],
+        "ensemble": ss.simulate_many(OWN_RIG, {"stiffness": np.array([6e9, 5e10])}, until=2.0),
+    }  # fmt: skip
+
+
+SAID = {
+    "rig": "slider.stiffness 6 GPa/m", "law": "d_c", "protocol": "pieces.1.to 2 µm/s", "model": "quasistatic",
+    "analysis": "Unstable", "steady": "5 MPa", "margin": "absolute", "onset": "critical", "boundary": "GPa/m",
+    "response": "Pa s/m", "history": "slip events", "event": "velocity", "slip": "peak velocity", "ensemble": "v",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_results_show_themselves_in_notebooks(results, name):
+    shown = results[name]._repr_html_()
+    text = words(shown)
+    assert SAID[name].lower() in text.lower()
+    assert " um" not in text
+    assert "<script" not in shown
+    assert not re.search(r"""(?:src|href)=["'](?!data:|#)""", shown)
+    assert len(shown) < 150_000
+
+
+def test_pictures_and_formulas_are_there(results):
+    assert "<svg" in results["rig"]._repr_html_()
+    assert results["history"]._repr_html_().count('role="img"') == 1
+    assert results["model"]._repr_html_().count("<math") > 5
+
+
+def test_units_are_those_of_the_result(results):
+    assert unit_of(results["margin"], "absolute") == results["margin"].unit
+    assert unit_of(results["slip"], "stress_drop") == "Pa"
+    assert unit_of(results["boundary"], "value") == "Pa/m"
+
+
+def test_rigs_with_an_area_are_told_in_newtons():
+    text = words(brief(ss.analyze(rig(area=0.01, stiffness=6e9))))
+    assert "MN/m" in text
+    assert " GPa/m" not in text
+
+
+# -- documents
+
+
+def test_a_report_says_everything_about_a_rig():
+    analysis, found = ss.analyze(OWN_RIG), ss.report(OWN_RIG, title="A rig")
+    text = words(found.html)
+    for part in ("Unstable: steady sliding at 1 µm/s", "Will this rig slide steadily", "The rig", "slider.stiffness",
+                 "6 GPa/m", "How far is the edge?", "friction.b", "doubles in", "What to keep in mind", ss.__version__,
+                 hashlib.sha256(ss.rig_to_text(OWN_RIG).encode()).hexdigest()):  # fmt: skip
+        assert part in text, part
+    assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
+    assert " um" not in text
+    assert found.html.count("<figure>") == 4
+    assert found.html.count("<math") > 10
+    assert found.html.count('class="steadyslip-root"') == 1
+    assert len(found.html.encode()) <= 500_000
+
+
+def test_runs_have_documents(results):
+    found = ss.report(results["history"], explorer=False)
+    assert found.html == ss.report(results["history"], explorer=False).html
+    assert 'class="steadyslip-root"' not in found.html
+    text = words(found.html)
+    count = len(results["history"].slip_events)
+    assert f"{count} slip event{'' if count == 1 else 's'} in 1 min" in text or f"{count} slip event" in text
+    assert "velocity-step" in found.html
+    assert found.html.count("<figure>") == 3
+
+
+def test_what_has_no_document_is_refused():
+    with pytest.raises(ss.ParameterError, match="got int; allowed: a rig, a verdict, a run"):
+        ss.report(3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(0, len(FRICTION) * len(CONTACTS), 37))
+def test_reports_of_all_kinds_of_rigs_fit(number):
+    law, contact = FRICTION[number % len(FRICTION)], CONTACTS[number % len(CONTACTS)]
+    own = ss.Slider(friction=law, contact=contact, stiffness=9e9, mass=1e6 * (number % 2), drive=DRIVES[number % 3])
+    found = ss.report(own)
+    text = words(found.html)
+    assert "steady sliding at" in text.lower()
+    assert len(found.html.encode()) <= 500_000
+
+
+def test_the_command_writes_a_report(tmp_path):
+    ss.write_rig(OWN_RIG, tmp_path / "my rig.toml")
+    answered = run("report", tmp_path / "my rig.toml", "-o", tmp_path / "report.html", "--set", "stiffness=90 GPa/m")
+    assert answered.returncode == 0, answered.stderr
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<title>my rig – steadyslip</title>" in text
+    assert "Stable: steady sliding" in text
+    assert hashlib.sha256((tmp_path / "my rig.toml").read_bytes()).hexdigest() in text
+    refused = run("report", tmp_path / "my rig.toml", "-o", tmp_path / "report.pdf")
+    assert refused.returncode == 2
+    assert ".html" in refused.stderr
+
+
+def test_locked_rigs_have_reports_too():
+    text = words(ss.report(rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0))).html)
+    assert "No steady sliding at 1 µm/s" in text
+
+
+def test_records_of_hostile_names_are_text():
+    record = lab.record(lab.rig(), lab.STEP)
+    hostile = dataclasses.replace(record, source="<script>alert(1)</script>")
+    assert "<script>alert" not in hostile._repr_html_()
+    assert "&lt;script&gt;alert" in hostile._repr_html_()

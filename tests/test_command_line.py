@@ -104,7 +104,7 @@ def test_help_and_analyze_stay_light():
         "import sys; from steadyslip.cli import main\n"
         "try: main()\n"
         "except SystemExit: pass\n"
-        "heavy = {'numba','matplotlib','xarray','pandas','pint','scipy.optimize','scipy.signal'}\n"
+        "heavy = {'numba','matplotlib','xarray','pandas','pint','scipy.optimize','scipy.signal','scipy.special'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     for arguments in (["--help"], ["analyze", str(EXAMPLE)]):

@@ -19,7 +19,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import ndtri
 
 from steadyslip.nonlinear.kicks.rest import Rest, field_of
 
@@ -175,7 +174,8 @@ def directions(n: int) -> Array:
     if n == 2:
         angle = np.arange(48) * (2 * np.pi / 48)
         return np.column_stack([np.cos(angle), np.sin(angle)])
-    from scipy.stats import qmc  # slow to import
+    from scipy.special import ndtri  # slow to import
+    from scipy.stats import qmc
 
     power = 6 + (n - 2).bit_length()  # 64 (n - 1), rounded up to a power of 2, which Sobol points need
     normal = ndtri(qmc.Sobol(n, seed=1).random_base2(power) * (1 - 2e-9) + 1e-9)

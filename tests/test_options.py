@@ -35,7 +35,7 @@ def _calls(fitted, grid, fresh):
         return ss.simulate(STIFF, STEP, **(QUICK | o))
 
     def many(**o):
-        return ss.simulate_many(STIFF, {"stiffness": np.array([3e10, 4e10])}, **({"until": 0.1, "progress": False} | o))
+        return ss.simulate_many(STIFF, {"stiffness": np.array([3e10, 4e10])}, **(QUICK | {"progress": False} | o))
 
     def threshold(**o):
         return ss.threshold(STIFF, "displacement", **({"precision": 0.1} | o))
@@ -44,8 +44,8 @@ def _calls(fitted, grid, fresh):
         return ss.threshold_map(STIFF, {"stiffness": np.array([3e10])}, "displacement",
                                 **({"precision": 0.1, "progress": False} | o))  # fmt: skip
 
-    def basin(**o):
-        return ss.basin(STIFF, **({"x": [0.0], "v": [1e-6], "progress": False} | o))
+    def basin(**o):  # along a parameter that changes no cycle, so that none is looked for
+        return ss.basin(STIFF, **({"x": [0.0], "v": [1e-6], "along": "drive.velocity", "progress": False} | o))
 
     def cycles(**o):
         return ss.cycles(STIFF, **({"most_points": 2, "doublings": 0} | o))

@@ -162,7 +162,7 @@ class Track:
             s = b - at_high * (b - a) / rise if rise else a
             if not a < s < b:
                 s = 0.5 * (a + b)
-            middle = self.corrected(low.u + s * low.tangent, low.tangent, low.length + s, reach)
+            middle = self.corrected(self._between(low, near, far, s), low.tangent, low.length + s, reach)
             value = measure(middle)
             if (value > 0) == (at_low > 0):
                 a, at_low, near = s, value, middle
@@ -175,6 +175,17 @@ class Track:
             if value == 0 or b - a <= width * (1 + abs(low.length)):
                 break
         return (near, far) if side == -1 else (far, near)
+
+    def _between(self, low: Point, near: Point, far: Point, s: float) -> Array:
+        """Where the curve should be at distance `s` along the tangent of `low`: on the cubic through two points."""
+        across = self.weights * low.tangent
+        a, b = (float(across @ (one.u - low.u)) for one in (near, far))
+        share, chord = (s - a) / (b - a), far.u - near.u
+        bends = [(b - a) * one.tangent / float(across @ one.tangent) - chord for one in (near, far)]
+        if not max(map(self.size, bends)) < self.size(chord):
+            bends = [0.0 * chord] * 2
+        guess: Array = near.u + share * chord + share * (1 - share) * ((1 - share) * bends[0] - share * bends[1])
+        return guess
 
 
 def turned_round(point: Point) -> Point:

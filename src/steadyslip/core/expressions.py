@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import sympy as sp
-from sympy.printing.numpy import NumPyPrinter
+
+from steadyslip.core.errors import NotAvailable
 
 Num = Any
 """A number, an array of numbers or a SymPy expression: formulas are written once for all three."""
@@ -47,20 +48,112 @@ def numpy_asinh_exp(x: Any, y: Any) -> Any:
 
 _PYTHON = frozenset((int, float, bool))
 """Numbers that raise where NumPy's become inf or NaN."""
+_NUMPY = {
+    sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
+    sp.tanh: "tanh", sp.asin: "arcsin", sp.acos: "arccos", sp.atan: "arctan", sp.atan2: "arctan2", sp.asinh: "arcsinh",
+    sp.acosh: "arccosh", sp.atanh: "arctanh", sp.Abs: "absolute", sp.sign: "sign", asinh_exp: "asinh_exp",
+    sp.Max: "maximum", sp.Min: "minimum", sp.Not: "logical_not",
+}  # fmt: skip
+_COMPARED = {sp.Lt: "<", sp.Le: "<=", sp.Gt: ">", sp.Ge: ">=", sp.Eq: "==", sp.Ne: "!="}
+_JOINED = {sp.And: " & ", sp.Or: " | "}
+_WORLD = {name: getattr(np, name, numpy_asinh_exp) for name in (*_NUMPY.values(), "where", "sqrt", "nan", "inf")}
 
 
-class _Printer(NumPyPrinter):  # type: ignore[misc]  # SymPy's printers are untyped
-    """SymPy's own NumPy printer, powers of two and the primitive above added."""
+def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
+    """All parts of expressions, and how often each is needed if every part is computed once."""
+    found: dict[sp.Basic, int] = {}
+    waiting = list(expressions)
+    while waiting:
+        one = waiting.pop()
+        found[one] = found.get(one, 0) + 1
+        if found[one] == 1:
+            waiting += one.args
+    return found
 
-    def _print_asinh_exp(self, expr: sp.Expr) -> str:
-        return f"asinh_exp({', '.join(self._print(a) for a in expr.args)})"
 
-    def _print_Piecewise(self, expr: sp.Piecewise) -> str:  # noqa: N802
-        """`numpy.where` takes numbers and arrays alike; `numpy.select`, which SymPy writes, arrays only."""
-        where, text = self._module_format("numpy.where"), str(self._module_format("numpy.nan"))
-        for branch, condition in reversed(expr.args):
-            text = f"{where}({self._print(condition)}, {self._print(branch)}, {text})"
+class _Text:
+    """Expressions as lines of Python for NumPy; what occurs several times is computed once."""
+
+    def __init__(self, names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Basic]) -> None:
+        self.lines: list[str] = []
+        self._known: dict[sp.Basic, str] = dict(names)
+        self._count = occurrences(expressions)
+        self.results = [self._of(expression) for expression in expressions]
+
+    def _of(self, e: Any) -> str:
+        known = self._known.get(e)
+        if known is not None:
+            return known
+        text = self._composed(e)
+        if e.args and self._count[e] > 1:
+            self.lines.append(f"t{len(self.lines)} = {text}")
+            text = self._known[e] = f"t{len(self.lines) - 1}"
         return text
+
+    def _composed(self, e: Any) -> str:
+        if e.is_Number or e.is_NumberSymbol:
+            return _number(e)
+        if e.is_Add:
+            return f"({self._sum(e)})"
+        if e.is_Mul:
+            return f"({self._product(e.args)})"
+        if e.is_Pow:
+            return self._power(e.base, e.exp)
+        if isinstance(e, sp.Piecewise):
+            text = "nan"
+            for branch, condition in reversed(e.args):
+                text = f"where({self._of(condition)}, {self._of(branch)}, {text})"
+            return text
+        if e in (sp.true, sp.false):
+            return str(bool(e))
+        if e is sp.zoo:
+            return "nan"
+        parts = [self._of(argument) for argument in e.args]
+        if e.func in _COMPARED:
+            return f"({parts[0]} {_COMPARED[e.func]} {parts[1]})"
+        if e.func in _JOINED:
+            return f"({_JOINED[e.func].join(parts)})"
+        if e.func not in _NUMPY:
+            raise NotAvailable(f"the equations contain {e.func.__name__}(...), which has no counterpart for arrays")
+        while e.func in (sp.Max, sp.Min) and len(parts) > 2:
+            parts = [f"{_NUMPY[e.func]}({parts[0]}, {parts[1]})", *parts[2:]]
+        return f"{_NUMPY[e.func]}({', '.join(parts)})"
+
+    def _sum(self, e: Any) -> str:
+        text = ""
+        for term in e.args:
+            first = term.args[0] if term.is_Mul else term
+            if first.is_Number and first.is_negative and (term.is_Number or self._count[term] == 1):
+                text += f" - {self._product((-first, *term.args[1:]) if term.is_Mul else (-first,))}"
+            else:
+                text += f" + {self._of(term)}"
+        return text.removeprefix(" + ") if text.startswith(" + ") else text.removeprefix(" ")
+
+    def _product(self, factors: Sequence[Any]) -> str:
+        above, below = [], []
+        for factor in factors:
+            if factor.is_Pow and factor.exp.is_Rational and factor.exp.is_negative and self._count[factor] == 1:
+                below.append(self._power(factor.base, -factor.exp))
+            elif factor is not sp.S.One:
+                above.append(self._of(factor))
+        text = "*".join(above) or "1.0"
+        if text.startswith("-1.0*"):
+            text = f"-{text[5:]}"
+        return text + (f"/({'*'.join(below)})" if len(below) > 1 else f"/{below[0]}" if below else "")
+
+    def _power(self, base: Any, exponent: Any) -> str:
+        if exponent is sp.S.One:
+            return self._of(base)
+        if exponent.is_Rational and exponent.is_negative:
+            return f"(1.0/{self._power(base, -exponent)})"
+        if exponent == sp.S.Half:
+            return f"sqrt({self._of(base)})"
+        return f"({self._of(base)}**{exponent if exponent.is_Integer else self._of(exponent)})"
+
+
+def _number(e: Any) -> str:
+    value = repr(float(e))
+    return value if value[0] != "-" else f"({value})"
 
 
 def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Callable[..., list[Any]]:
@@ -68,18 +161,19 @@ def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr
 
     Common subexpressions are computed once; every argument may be a scalar or an array. What leaves the range of
     floating point is inf or NaN, without a warning: Python's own floats would raise instead.
+
+    Raises
+    ------
+    NotAvailable
+        If an expression has a function in it that NumPy does not have.
     """
-    order = sorted(arguments, key=lambda symbol: symbol.name)
-    names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(order)}
-    renamed = [sp.sympify(e).xreplace(names) for e in expressions]
-    function = sp.lambdify(
-        [names[symbol] for symbol in arguments],
-        renamed,
-        modules=[{"asinh_exp": numpy_asinh_exp}, "numpy"],
-        printer=_Printer,
-        cse=True,
-        docstring_limit=0,  # nobody reads it, and writing it takes long
-    )
+    names = {symbol: f"p{i}" for i, symbol in enumerate(arguments)}
+    written = _Text(names, [sp.sympify(e) for e in expressions])
+    body = [*written.lines, f"return [{', '.join(written.results)}]"]
+    text = f"def function({', '.join(names.values())}):\n    " + "\n    ".join(body)
+    world = dict(_WORLD)
+    exec(text, world)
+    function = world["function"]
 
     def evaluate(*values: Any) -> list[Any]:
         with np.errstate(all="ignore"):

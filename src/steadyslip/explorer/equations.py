@@ -45,8 +45,7 @@ def program(model: Model, name: str, expressions: Sequence[Any], number: sp.Symb
     if number is not None:
         names[number] = "number"
     formulas = Formulas(expressions, names)
-    used = {s.name for e in (*formulas.results, *(e for _, e in formulas.temporaries)) for s in e.free_symbols}
-    values = {n: made.load(i) for i, n in enumerate(names.values()) if n in used and n != "number"}
+    values = {n: made.load(i) for i, n in enumerate(names.values()) if n in formulas.symbols and n != "number"}
     values["number"] = made.number
     for place, value in enumerate(formulas(values)):
         made.store(place, value, "y")

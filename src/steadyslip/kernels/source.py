@@ -16,7 +16,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import array_function, occurrences
 from steadyslip.kernels.nodes import PRIMITIVES, Value, as_node, primitive, select
 
 
@@ -113,68 +113,130 @@ class Formulas:
     """
 
     def __init__(self, expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str]) -> None:
-        called = {s: sp.Symbol(n, real=True) for s, n in names.items()}
-        renamed = [sp.sympify(expression).xreplace(called) for expression in expressions]
-        symbols = (sp.Symbol(f"_{i}", real=True) for i in range(10**6))
-        self.temporaries, self.results = sp.cse(renamed, symbols=symbols)
+        self.expressions = [sp.sympify(expression) for expression in expressions]
+        self.names = names
+        self._count = occurrences(self.expressions)
+
+    @property
+    def symbols(self) -> set[str]:
+        """What its symbols are called where values are given."""
+        return {self.names.get(e, e.name) for e in self._count if e.is_Symbol}
 
     def __call__(self, values: Mapping[str, Value]) -> list[Value]:
         """The value of each expression; values are numbers or nodes of a program."""
-        known = dict(values)
-        for symbol, expression in self.temporaries:
-            known[symbol.name] = _value(expression, known)
-        return [_value(expression, known) for expression in self.results]
+        evaluation = _Evaluation(values, self.names, self._count)
+        return [evaluation.value(expression) for expression in self.expressions]
 
 
-def _value(e: Any, known: Mapping[str, Value]) -> Any:
-    """An expression from the values of its symbols: products for small powers, selections for branches."""
-    if e.is_Symbol:
-        return known[e.name]
-    if e.is_Add:
-        return _sum(e, known)
-    if e.is_Mul:
-        negative, value = _product(e, known)
-        return -value if negative else value
-    if e.is_Pow:
-        return _power(_value(e.base, known), e.exp, known)
-    if isinstance(e, sp.Piecewise):
-        return _piecewise(e, known)
-    if isinstance(e, (sp.Number, sp.NumberSymbol)):
-        return float(e)
-    if isinstance(e, Boolean):  # a condition that several branches share
-        return _condition(e, known)
-    return _called(e, known)
+class _Evaluation:
+    """Values of expressions; what occurs several times is computed once."""
 
+    def __init__(self, values: Mapping[str, Value], names: Mapping[sp.Symbol, str], count: dict[sp.Basic, int]) -> None:
+        self.given, self.names, self.count = values, names, count
+        self.known: dict[sp.Basic, Any] = {}
 
-def _sum(e: sp.Expr, known: Mapping[str, Value]) -> Any:
-    total: Any = None
-    for term in e.as_ordered_terms():
-        negative, value = _product(term, known)
-        if total is None:
-            total = -value if negative else value
-            continue
-        total = total - value if negative else total + value
-    return total
+    def value(self, e: Any) -> Any:
+        """An expression from the values of its symbols: products for small powers, selections for branches."""
+        if e.is_Symbol:
+            return self.given[self.names.get(e, e.name)]
+        if e not in self.known:
+            self.known[e] = self._computed(e)
+        return self.known[e]
 
+    def _computed(self, e: Any) -> Any:
+        if e.is_Number or e.is_NumberSymbol:
+            return float(e)
+        if e.is_Add:
+            return self._sum(e)
+        if e.is_Mul:
+            negative, value = self._product(e)
+            return -value if negative else value
+        if e.is_Pow:
+            return self._power(e.base, e.exp)
+        if isinstance(e, sp.Piecewise):
+            return self._piecewise(e)
+        return self._condition(e) if isinstance(e, Boolean) else self._called(e)
 
-def _product(e: Any, known: Mapping[str, Value]) -> tuple[bool, Any]:
-    """Whether a term is subtracted, and what is: the first factor negated where it stands alone comes to the same."""
-    coefficient, rest = e.as_coeff_Mul()
-    if e.is_Number or not e.is_Mul:
-        return (True, float(-e)) if e.is_Number and e < 0 else (False, _value(e, known))
-    negative = bool(coefficient < 0)
-    if negative and rest.is_Add:
-        e = rest if coefficient == -1 else sp.Mul(-coefficient, rest, evaluate=False)
-    elif negative:
-        e = -coefficient * rest
-    above, below = [], []
-    for factor in e.as_ordered_factors() if e.is_Mul else [e]:
-        if factor.is_Pow and factor.exp.is_Rational and factor.exp.is_negative:
-            below.append(_power(_value(factor.base, known), -factor.exp, known))
-        else:
-            above.append(_value(factor, known))
-    value = _multiplied(above or [1.0])
-    return negative, value / _multiplied(below) if below else value
+    def _sum(self, e: sp.Expr) -> Any:
+        total: Any = None
+        for term in sorted(e.args, key=_is_number):
+            negative, value = self._term(term)
+            if total is None:
+                total = -value if negative else value
+                continue
+            total = total - value if negative else total + value
+        return total
+
+    def _term(self, e: Any) -> tuple[bool, Any]:
+        """Whether a term is subtracted, and what is."""
+        if e.is_Number and e.is_negative:
+            return True, float(-e)
+        return self._product(e) if e.is_Mul and self.count[e] == 1 else (False, self.value(e))
+
+    def _product(self, e: Any) -> tuple[bool, Any]:
+        first, *others = e.args
+        negative = bool(first.is_Number and first.is_negative)
+        if negative:
+            others = others if first is sp.S.NegativeOne else [-first, *others]
+        above, below = [], []
+        for factor in others if negative else e.args:
+            if factor.is_Pow and factor.exp.is_Rational and factor.exp.is_negative and self.count.get(factor, 1) == 1:
+                below.append(self.value(factor.base**-factor.exp))
+            else:
+                above.append(self.value(factor))
+        value = _multiplied(above or [1.0])
+        return negative, value / _multiplied(below) if below else value
+
+    def _power(self, base: Any, exponent: Any) -> Any:
+        if exponent.is_Integer and 0 < abs(int(exponent)) <= 8:
+            value = _multiplied([self.value(base)] * abs(int(exponent)))
+            return value if exponent > 0 else 1.0 / value
+        if abs(exponent) == sp.Rational(1, 2):
+            root = primitive("sqrt", self.value(base))
+            return root if exponent > 0 else 1.0 / root
+        return primitive("power", self.value(base), self.value(exponent))
+
+    def _piecewise(self, e: sp.Piecewise) -> Any:
+        value: Any = np.nan
+        for branch, condition in reversed(e.args):
+            holds = self._condition(condition)
+            value = self.value(branch) if holds is True else select(as_node(holds, "bool"), self.value(branch), value)
+        return value
+
+    def _condition(self, c: Any) -> Any:
+        if c in (sp.true, sp.false):
+            return bool(c)
+        if c.is_Symbol:
+            return self.value(c)
+        if isinstance(c, Relational):
+            left, right = (self.value(side) for side in (c.lhs, c.rhs))
+            compared = {"<": lambda: left < right, "<=": lambda: left <= right, ">": lambda: left > right,
+                        ">=": lambda: left >= right, "==": lambda: (left <= right) & (left >= right),
+                        "!=": lambda: (left < right) | (left > right)}  # fmt: skip
+            return compared[c.rel_op]()
+        parts = [as_node(self._condition(part), "bool") for part in c.args]
+        if isinstance(c, sp.Not):
+            return ~parts[0]
+        value = parts[0]
+        for part in parts[1:]:
+            value = value & part if isinstance(c, sp.And) else value | part
+        return value
+
+    def _called(self, e: sp.Expr) -> Any:
+        name = type(e).__name__
+        arguments = [self.value(argument) for argument in e.args]
+        if name == "Abs":
+            return abs(arguments[0])
+        if name == "tan":
+            return primitive("sin", *arguments) / primitive("cos", *arguments)
+        if name == "DiracDelta":
+            return 0.0  # the derivative of sign, but for one point
+        if name not in PRIMITIVES:
+            raise NotAvailable(
+                f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
+                f"{', '.join(PRIMITIVES)}, tan, abs, powers and Piecewise"
+            )
+        return primitive(name, *arguments)
 
 
 def _multiplied(factors: Sequence[Any]) -> Any:
@@ -184,56 +246,5 @@ def _multiplied(factors: Sequence[Any]) -> Any:
     return value
 
 
-def _power(base: Any, exponent: Any, known: Mapping[str, Value]) -> Any:
-    if exponent.is_Integer and 0 < abs(int(exponent)) <= 8:
-        value = _multiplied([base] * abs(int(exponent)))
-        return value if exponent > 0 else 1.0 / value
-    if abs(exponent) == sp.Rational(1, 2):
-        root = primitive("sqrt", base)
-        return root if exponent > 0 else 1.0 / root
-    return primitive("power", base, _value(exponent, known))
-
-
-def _piecewise(e: sp.Piecewise, known: Mapping[str, Value]) -> Any:
-    value: Any = np.nan
-    for branch, condition in reversed(e.args):
-        holds = _condition(condition, known)
-        value = _value(branch, known) if holds is True else select(as_node(holds, "bool"), _value(branch, known), value)
-    return value
-
-
-def _condition(c: Any, known: Mapping[str, Value]) -> Any:
-    if c in (sp.true, sp.false):
-        return bool(c)
-    if c.is_Symbol:
-        return known[c.name]
-    if isinstance(c, Relational):
-        left, right = (_value(side, known) for side in (c.lhs, c.rhs))
-        compared = {"<": lambda: left < right, "<=": lambda: left <= right, ">": lambda: left > right,
-                    ">=": lambda: left >= right, "==": lambda: (left <= right) & (left >= right),
-                    "!=": lambda: (left < right) | (left > right)}  # fmt: skip
-        return compared[c.rel_op]()
-    parts = [as_node(_condition(part, known), "bool") for part in c.args]
-    if isinstance(c, sp.Not):
-        return ~parts[0]
-    value = parts[0]
-    for part in parts[1:]:
-        value = value & part if isinstance(c, sp.And) else value | part
-    return value
-
-
-def _called(e: sp.Expr, known: Mapping[str, Value]) -> Any:
-    name = type(e).__name__
-    arguments = [_value(argument, known) for argument in e.args]
-    if name == "Abs":
-        return abs(arguments[0])
-    if name == "tan":
-        return primitive("sin", *arguments) / primitive("cos", *arguments)
-    if name == "DiracDelta":
-        return 0.0  # the derivative of sign, but for one point
-    if name not in PRIMITIVES:
-        raise NotAvailable(
-            f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
-            f"{', '.join(PRIMITIVES)}, tan, abs, powers and Piecewise"
-        )
-    return primitive(name, *arguments)
+def _is_number(e: sp.Expr) -> bool:
+    return bool(e.is_Number)

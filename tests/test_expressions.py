@@ -1,0 +1,69 @@
+"""Expressions become array functions and programs; both are what SymPy's own translation gives."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import steadyslip as ss
+from steadyslip.core.expressions import array_function, occurrences
+from steadyslip.kernels.nodes import Program
+from steadyslip.kernels.source import Formulas
+
+X, Y = sp.symbols("x y", real=True)
+Z = sp.Symbol("z", positive=True)
+EXPRESSIONS = {
+    "sum": X - 2 * Y + sp.Rational(1, 3) - Z,
+    "negative first": -X - Y,
+    "product": -3 * X * Y / (Z * (1 + Z)),
+    "reciprocal": 1 / (X**2 + Z),
+    "shared": (X + Y) ** 2 / (1 + X**2) + sp.exp(X + Y) / (1 + X**2) - 1 / (1 + X**2),
+    "powers": Z**-3 + X**3 + Z ** sp.Rational(1, 2) + Z ** sp.Rational(-3, 2) + Z**Y,
+    "roots": sp.sqrt(1 + X**2) / sp.sqrt(Z),
+    "functions": sp.sinh(X) - sp.cosh(Y) * sp.tanh(X) + sp.asinh(Y) + sp.sin(X) * sp.cos(Y) + sp.tan(X) + sp.log(Z),
+    "sizes": sp.Abs(X - Y) + sp.sign(X) * sp.sign(Y - X),
+    "branches": sp.Piecewise((X, X > Y), (Y**2, X <= -1), (sp.exp(-Z), True)),
+    "conditions": sp.Piecewise((1, sp.And(X > 0, Y > 0)), (2, sp.Or(X > 1, sp.Not(Y > -1))), (3, True)),
+    "numbers": sp.pi * X + sp.E + sp.Float("0.1") * Y + sp.Rational(2, 7),
+}
+
+
+@pytest.mark.parametrize("name", EXPRESSIONS)
+def test_values_are_those_of_sympy(name):
+    expression = EXPRESSIONS[name]
+    random = np.random.default_rng(len(name))
+    x, y, z = random.uniform(-2, 2, 50), random.uniform(-2, 2, 50), random.uniform(0.1, 3, 50)
+    expected = np.array([float(expression.subs({X: a, Y: b, Z: c})) for a, b, c in zip(x, y, z, strict=True)])
+    (found,) = array_function([X, Y, Z], [expression])(x, y, z)
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-14)
+    (single,) = array_function([X, Y, Z], [expression])(float(x[0]), float(y[0]), float(z[0]))
+    assert single == pytest.approx(expected[0], rel=1e-13, abs=1e-14)
+
+
+def test_extremes_of_several():
+    (found,) = array_function([X, Y, Z], [sp.Max(X, Y, Z) - sp.Min(X, Y, Z)])(np.array([1.0, -3.0]), 2.0, 0.5)
+    np.testing.assert_array_equal(found, [1.5, 5.0])
+
+
+def test_nothing_is_computed_twice():
+    """Every part that several need is one operation."""
+    part = sp.exp(X) + Y
+    expressions = [1 / part, part**2, sp.sin(part) / part]
+    assert occurrences(expressions)[part] >= 3
+    formulas = Formulas(expressions, {X: "y0", Y: "y1"})
+    assert formulas.symbols == {"y0", "y1"}
+    program = Program("shared")
+    for i, value in enumerate(formulas({"y0": program.load(0), "y1": program.load(1)})):
+        program.store(2 + i, value)
+    operations = [node.op for node in program.nodes()]
+    assert (operations.count("exp"), operations.count("add"), operations.count("div")) == (1, 1, 1)
+
+
+def test_what_leaves_floating_point_is_no_traceback():
+    function = array_function([X, Y], [1 / X, sp.log(X), sp.exp(Y), sp.sqrt(X - 1), sp.zoo, sp.nan, sp.oo])
+    found = function(0.0, 1000.0)
+    assert [str(float(one)) for one in found] == ["inf", "-inf", "inf", "nan", "nan", "nan", "inf"]
+
+
+def test_functions_that_arrays_do_not_have_are_named():
+    with pytest.raises(ss.NotAvailable, match=r"zeta\(\.\.\.\)"):
+        array_function([X], [sp.zeta(X)])

@@ -739,3 +739,62 @@ def test_cycles_end_where_no_velocity_balances_the_forces():
     assert len(branch) > 5
     for name in ("peak_velocity", "lowest_velocity", "stress_drop"):
         assert np.all(np.isfinite(branch[name]))
+
+
+def test_steps_are_long_where_equations_are_bent():
+    """x follows a slow curve, and an equation as steep as that of an unstable cycle holds it there."""
+
+    def steep(u):
+        x, p = u
+        off = x - 0.5 * p * p
+        return np.array([np.expm1(1e4 * off)]), np.array([[1e4, -1e4 * p]]) * np.exp(1e4 * off)
+
+    curve, points = Track(steep), []
+    first = curve.start(np.array([0.0, 0.0]), np.array([0.0, 1.0]))
+    for point in curve.follow(first, 0.01, 1e-9, 0.5):
+        points.append(point)
+        assert point.u[0] == pytest.approx(0.5 * point.u[1] ** 2, abs=1e-9)
+        if point.u[1] > 1:
+            break
+    assert len(points) < 30  # 95 along the tangent alone
+
+
+def test_what_lies_between_distant_neighbours_is_found_on_the_parabola_through_them():
+    """A tenth of a circle apart the tangent is five hundredths off; where equations are steep that is too far."""
+
+    def circle(u):
+        off = u @ u - 1
+        return np.array([np.expm1(40 * off)]), 80 * u[None] * np.exp(40 * off)
+
+    curve = Track(circle)
+    low = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    high = curve.corrected(np.array([np.cos(0.6), np.sin(0.6)]), low.tangent, np.sin(0.6))
+    measure = lambda point: point.u[0] - np.cos(0.4)  # noqa: E731
+    found = curve.located(low, high, measure, measure(low), measure(high))[1]
+    assert found.u == pytest.approx([np.cos(0.4), np.sin(0.4)], abs=1e-9)
+
+
+def test_a_branch_begins_at_larger_cycles_where_small_ones_drown_in_rounding():
+    """An onset so nearly degenerate that the edge moves by a millionth while cycles grow a thousandfold."""
+    friction = ss.LuGre(mu_coulomb=0.1189310343, mu_static=0.1882742085, v_stribeck=1.6888334216e-3,
+                        viscous=2.3663122754, bristle_stiffness=255249.776917, bristle_damping=7.12855521)  # fmt: skip
+    contact = ss.InclinedSpring(preload=1292214.83, angle=-0.05289007)
+    heavy = ss.Slider(friction=friction, contact=contact, stiffness=1e10, mass=962.847238,
+                      drive=ss.Steady(1.5017969314e-3))  # fmt: skip
+    edge = ss.hopf(heavy).value
+    branch = ss.cycles(heavy, between=(0.5 * edge, 1.2 * edge))
+    assert branch.end.startswith("end of the range")
+    (cycle,) = branch.at(0.5 * edge * (1 + 1e-9))
+    assert cycle.stable
+    assert cycle.period == pytest.approx(5.8737658898e-5, rel=1e-6)  # of a long simulation
+
+
+def test_a_run_that_leads_nowhere_is_cut_short():
+    """Far more steps than the last run took are no continuation of it."""
+    flow = Flow(unit_rig("slip", 0.5, 0.4, damping=1e-3), "slider.stiffness")
+    setting, start = flow.setting(0.4), flow.steady(0.4)[None] + 0.1
+    flow.run(setting, start, np.array([1.0]))
+    before = flow.steps
+    with pytest.raises(Failure, match="too many steps"):
+        flow.run(setting, start, np.array([1e6]))
+    assert flow.steps - before <= 2 * flow_module.FEW_STEPS

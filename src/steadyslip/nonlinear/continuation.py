@@ -106,8 +106,9 @@ class Track:
         """Points along the curve from `first`, which is not among them.
 
         A point is taken for the continuation of the one before only if it is as close to the tangent there as an arc
-        would be that turns no more than is allowed, and does turn no more. Steps grow up to `most`, or to a fifth of
-        the largest unknown where that is more.
+        would be that turns no more than is allowed, and does turn no more. It is looked for on the parabola that the
+        last two tangents make: where equations are strongly bent, steps along the tangent alone would stay tiny. Steps
+        grow up to `most`, or to a fifth of the largest unknown where that is more.
 
         Parameters
         ----------
@@ -119,11 +120,11 @@ class Track:
         Failure
             Where steps of `least` no longer succeed.
         """
-        here = first
+        here, curvature = first, np.zeros(len(first.u))
         while True:
             try:
                 reach = self.bend * step + 100 * self.tolerance
-                guess = here.u + step * here.tangent
+                guess = here.u + step * here.tangent + 0.5 * step**2 * curvature
                 ahead = self.corrected(guess, here.tangent, here.length + step, reach)
                 turned = float(ahead.tangent @ (self.weights * here.tangent))
                 if turned < self.most_turn and step > 4 * least:
@@ -141,6 +142,8 @@ class Track:
                 step = min(step * (FASTER if straight else GROW), max(most, 0.2 * float(np.max(np.abs(ahead.u)))))
             elif ahead.iterations > 6:
                 step *= 0.7
+            curvature = (ahead.tangent - here.tangent) / (ahead.length - here.length)
+            curvature -= ahead.tangent * (ahead.tangent @ (self.weights * curvature))
             here = ahead
 
     def located(

@@ -18,9 +18,11 @@ from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.flow import Flow
 from steadyslip.nonlinear.orbits.search import search_on
+from steadyslip.nonlinear.orbits.special import SMALL
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, Sheet, Tracer
 
 Array = np.ndarray
+LARGER = (1e-4, 1e-3, 1e-2)  # amplitudes to begin with where smaller cycles cannot be followed
 
 
 @checked(
@@ -55,11 +57,12 @@ def cycles(
         Range in which to follow, SI units or text; by default a factor of a thousand to each side of the edge
         for positive parameters, the whole domain for others.
     amplitude : float, optional
-        Of ln(v/v0) at which the branch starts; 1e-6, with mass 1e-4, unless given.
+        Of ln(v/v0) at which the branch starts; 1e-6, with mass 1e-4, unless given, and more where no branch of such
+        small cycles can be followed.
     doublings : int, optional
         How many period doublings to follow onto the branch of twice the period, one after another.
     most_points : int, optional
-        Limit of cycles on a branch. Fifteen million steps of integration are the limit of work: what was found until
+        Limit of cycles on a branch. Five million steps of integration are the limit of work: what was found until
         then is kept, and ``end`` says so.
     rtol : float, optional
         Error allowed per step of integration; 1e-10, with mass 1e-9, unless given.
@@ -95,7 +98,7 @@ def cycles(
         raise ParameterError([Problem("amplitude", f"got {amplitude!r}; allowed: above 0, up to 0.1")])
     flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol)
     tracer = Tracer(flow, onset, _limits(rig, onset, between), most_points, progress)
-    sheets = [_from_the_edge(tracer, amplitude or max(1e-6, 1e9 * flow.noise))]
+    sheets = [_from_the_edge(tracer, amplitude)]
     search_on(tracer, sheets)
     return _branch(tracer, sheets, rtol, doublings)
 
@@ -121,8 +124,23 @@ def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: 
     )  # fmt: skip
 
 
-def _from_the_edge(tracer: Tracer, amplitude: float) -> Sheet:
-    """The sheet that begins at the edge."""
+def _from_the_edge(tracer: Tracer, amplitude: float | None) -> Sheet:
+    """The sheet that begins at the edge.
+
+    Where small cycles drown in rounding, as next to an almost degenerate onset, it begins at larger ones.
+    """
+    smallest = max(1e-6, 1e9 * tracer.flow.noise)
+    tried: list[Sheet] = []
+    for size in (smallest, *(size for size in LARGER if size > smallest)) if amplitude is None else (amplitude,):
+        tried.append(_of_amplitude(tracer, size))
+        known = tried[-1].known
+        if tried[-1].whole or tracer.interrupted or (known and known[-1].cycle.amplitude > SMALL):
+            break
+    return max(tried, key=lambda sheet: sheet.known[-1].cycle.amplitude if sheet.known else 0.0)
+
+
+def _of_amplitude(tracer: Tracer, amplitude: float) -> Sheet:
+    """The sheet that begins with the cycle of a small amplitude."""
     try:
         shooting, first = tracer.small(amplitude)
     except np.linalg.LinAlgError:

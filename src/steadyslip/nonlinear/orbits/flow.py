@@ -32,7 +32,9 @@ from steadyslip.protocol import Segments
 Array = np.ndarray
 DONE = WORDS.index("done")
 NEVER = np.empty(0)
-MOST_STEPS = 100_000  # of one run, some tenths of a second
+STIFF = "rodas5p"  # of the Rosenbrock methods the one of order 5: tolerances are tight
+MOST_STEPS = 100_000  # of one run, some tenths of a second; and where runs have been shorter,
+FAR_MORE, FEW_STEPS = 20, 5_000  # so many times those of the last that succeeded, but no fewer than these
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
 
@@ -118,13 +120,14 @@ class Runs:
         self.reduction, self.size = jobs.reduction, len(jobs.reduction.state)
         method = automatic_method(self.reduction)
         stiff = method != "tsit5"
+        method = STIFF if stiff else method
         self.options = Options(rtol=rtol or (1e-9 if stiff else 1e-10), most_steps=MOST_STEPS)
         self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
         self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
         self.sensitive = _with_sensitivities(self.reduction, method)
-        self.steps = 0
+        self.steps, self._usual = 0, MOST_STEPS
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
         own = jobs.point.part(slice(which, which + 1))
         inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
@@ -179,6 +182,7 @@ class Runs:
         count, n = len(states), self.size
         initial = np.hstack([self._continuous(setting, states), self._unit(count)])
         settings = self._finer(setting.varied[1], amplitude)
+        settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, FAR_MORE * self._usual))
         final = self._advanced(self.sensitive, setting.varied[0], settings, initial, setting.inputs, times)
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return final[:, :n], matrix, final[:, n + n * n :]
@@ -206,9 +210,11 @@ class Runs:
         call = Call(machine, tables, len(times), np.empty(0))
         call.go(2**62)
         outcome = call.outcome()
-        self.steps += int(np.nansum(outcome.steps))
+        taken = np.nansum(outcome.steps, axis=1)
+        self.steps += int(taken.sum())
         if np.any(call.status != DONE):
             raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
+        self._usual = int(taken.max())
         return outcome.state
 
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:

@@ -55,6 +55,8 @@ LAWS = [
     ss.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3),
     ss.LuGre(**BRISTLE, bristle_stiffness=1e5),
     ss.CoulombStribeck(**BRISTLE),
+    ss.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3, stribeck_exponent=0.7),
+    ss.CoulombStribeck(**BRISTLE, stribeck_exponent=1.3),
 ]
 
 
@@ -516,6 +518,36 @@ def test_machine_friction_is_odd(law):
     back = tuple(-z for z in bent)
     assert float(law.strength(-3e-6, 5e6, back, 0)) == -float(law.strength(3e-6, 5e6, bent, 0)) < 0
     assert [float(r) for r in law.rates(-3e-6, 5e6, back, 0)] == [-float(r) for r in law.rates(3e-6, 5e6, bent, 0)]
+
+
+def curve(v, exponent):
+    """The Stribeck curve, typed by hand."""
+    return 0.3 + 0.15 * np.exp(-((np.abs(v) / 2e-6) ** exponent))
+
+
+@pytest.mark.parametrize("exponent", [None, 0.5, 1.0, 1.7, 2.0, 4.0])
+def test_stribeck_exponent(exponent):
+    """Strength and its slope are those of the curve; the exponent is 2 unless given."""
+    law = ss.CoulombStribeck(**BRISTLE, stribeck_exponent=exponent)
+    v = np.geomspace(1e-9, 1e-3, 60)
+    expected = curve(v, exponent or 2.0) + 0.1 * v
+    found = np.array([float(law.strength(one, 1.0, (), 0)) for one in v])
+    assert found == pytest.approx(expected, rel=1e-14)
+    assert float(law.strength(1e-30, 1.0, (), 0)) == pytest.approx(0.45, rel=1e-5)
+
+
+@pytest.mark.parametrize(("exponent", "stable"), [(1.0, False), (2.0, False), (4.0, True)])
+def test_stribeck_exponent_can_flip_a_verdict(exponent, stable):
+    """With mass and without memory the rig is stable where friction rises: m s² + σ μ'(v) s + k = 0."""
+    v, sigma = 0.5e-6, 5e6
+    law = ss.CoulombStribeck(**(BRISTLE | {"viscous": 2.6e4}), stribeck_exponent=exponent)
+    a_rig = ss.Slider(friction=law, contact=ss.Constant(preload=sigma), mass=1e6, stiffness=1e10, drive=ss.Steady(v))
+    u = (v / 2e-6) ** exponent
+    slope = -0.15 * exponent / v * u * np.exp(-u) + 2.6e4
+    roots = np.roots([1e6, sigma * slope, 1e10])
+    found = np.sort_complex(ss.eigenvalues(a_rig))
+    assert found == pytest.approx(np.sort_complex(roots), rel=1e-10)
+    assert ss.analyze(a_rig).stable is stable is bool(np.all(roots.real < 0))
 
 
 def test_statement_of_a_law_is_symbolic_throughout():

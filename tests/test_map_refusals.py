@@ -146,6 +146,19 @@ def test_a_read_only_folder_is_said(tmp_path):
         made(chart(), folder)
 
 
+@pytest.mark.parametrize("name", ["slider.stiffness/c/0", "noise/c/0/0", "complete/c/0/0", "zarr.json"])
+def test_a_folder_where_a_file_belongs_is_said(tmp_path, name):
+    """Of coordinates, results, marks or the description: one message with the folder's name, or it is no map."""
+    made(noise_map(), tmp_path)
+    store = tmp_path / "map.zarr"
+    place = next(store / one for one in (name, name.removesuffix("/0")) if (store / one).is_file())
+    place.unlink()
+    place.mkdir()
+    with pytest.raises(ss.SteadyslipError) as caught:
+        made(noise_map(), tmp_path)
+    assert str(place if name != "zarr.json" else store) in str(caught.value)
+
+
 def test_a_full_disk_keeps_what_is_finished(tmp_path):
     """The system refuses files above a size here; a write that fails half way is the same to the program."""
     program = (

@@ -79,6 +79,19 @@ def test_kernels_follow_the_model(law, contact, mass):
     assert np.max(np.abs(got - expected) / scale) < (5e-6 if law == "lugre" else 2e-8)
 
 
+@pytest.mark.parametrize("exponent", [0.7, 3.0])
+def test_bristles_with_a_stribeck_exponent(exponent):
+    """Another exponent than 2 takes a power of velocity instead of a square."""
+    friction = ss.LuGre(
+        mu_coulomb=0.1, mu_static=0.2, v_stribeck=1e-3, viscous=10.0, bristle_stiffness=1e5, bristle_damping=100.0,
+        stribeck_exponent=exponent,
+    )  # fmt: skip
+    a_rig = rig(friction=friction, contact=ss.Constant(preload=5e6), mass=1e3, stiffness=1e9, drive=ss.Steady(1e-4))
+    got, _ = interpreted(a_rig, None, 0.01, {"v": 1.3e-4}, 1e-9)
+    x, v, *memory = Oracle(a_rig, plain=True).run(0.01, v=1.3e-4)
+    assert got == pytest.approx([x, v, *memory], rel=1e-7)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_times_are_exact(seed):
     """Own steps never go back, land on every breakpoint (twice: before and after) and on the end, to the last bit."""

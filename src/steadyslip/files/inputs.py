@@ -116,6 +116,19 @@ def inside(root: Path, key: str) -> Path:
     return path
 
 
+def check_room(path: Path) -> Path:
+    """The path of a file that is to be written.
+
+    Raises
+    ------
+    UnreadableFile
+        If there is a folder in its place.
+    """
+    if path.is_dir():
+        raise UnreadableFile(str(path), "it is a folder, where a file belongs; remove it")
+    return path
+
+
 def check_kind(name: str, found: os.stat_result) -> None:
     """Refuse what is not a regular file.
 

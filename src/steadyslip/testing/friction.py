@@ -159,13 +159,15 @@ def check_derivatives(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None
             with mpmath.workdps(DIGITS):
                 point = list(said.steady(v, sigma))
                 point[0], point[1] = point[0] * 1.5, point[1] * 1.25
-                for i, (name, slope) in enumerate(zip(said.inputs, gradient(*point), strict=True)):
+                slopes = gradient(*point)
+                terms = sum(abs(slope * x) for slope, x in zip(slopes, point, strict=True))
+                for i, (name, slope) in enumerate(zip(said.inputs, slopes, strict=True)):
                     scale = abs(point[i]) or size[i]
 
                     def along(x: Any, i: int = i, point: list[Any] = point, f: Any = function) -> Any:
                         return f(*point[:i], x, *point[i + 1 :])[0]
 
-                    found, excess = disagreement(along, slope, point[i], scale)
+                    found, excess = disagreement(along, slope, point[i], scale, terms)
                     require(
                         excess <= 0,
                         law,

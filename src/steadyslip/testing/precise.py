@@ -109,11 +109,14 @@ def precise_function(
     return function
 
 
-def disagreement(function: Callable[[Any], Any], derivative: Any, at: Any, scale: Any) -> tuple[mpmath.mpf, mpmath.mpf]:
+def disagreement(
+    function: Callable[[Any], Any], derivative: Any, at: Any, scale: Any, terms: Any = 0
+) -> tuple[mpmath.mpf, mpmath.mpf]:
     """A derivative against central differences: the central difference, and by how much the two differ too much.
 
     The error of a central difference with step h is c h² + O(h⁴); from steps h and h/2 the error of the
-    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed. The
+    second is a third of their difference. Three times that, and the rounding of fifty digits, is allowed; `terms`
+    is the size of those that may cancel in the function. The
     bend f(x+h) − 2f(x) + f(x−h) over h must halve with h, else there is a kink, where a symmetric difference
     may agree by chance.
     """
@@ -123,7 +126,7 @@ def disagreement(function: Callable[[Any], Any], derivative: Any, at: Any, scale
         values = {d: function(at + d * step) for d in (-1.0, -0.5, 0.5, 1.0)}
         wide = (values[1.0] - values[-1.0]) / (2 * step)
         narrow = (values[0.5] - values[-0.5]) / step
-        size = max(abs(value) for value in values.values()) + abs(derivative * at)
+        size = max(abs(value) for value in values.values()) + abs(derivative * at) + terms
         rounding = 10**6 * mpmath.eps * size / step  # a million: the terms inside may be larger than the value
         wide_bend = abs(values[1.0] - 2 * middle + values[-1.0]) / step
         narrow_bend = abs(values[0.5] - 2 * middle + values[-0.5]) / (step / 2)

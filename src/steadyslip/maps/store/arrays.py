@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.files.inputs import UnreadableFile, inside, read_bytes
+from steadyslip.files.inputs import UnreadableFile, check_room, inside, read_bytes
 from steadyslip.files.specifications import rig_from_text
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE
@@ -149,7 +149,7 @@ class Store:
         """Write a chunk's arrays, then its mark; `samples` are generated parameters, (n,)."""
         region = self.region(number)
         for file in self._files(number):
-            file.unlink(missing_ok=True)  # what is left of a damaged chunk must not be read
+            check_room(file).unlink(missing_ok=True)  # what is left of a damaged chunk must not be read
         for name, values in results.items():
             array = self.array(name)
             extra = (slice(None),) * (array.ndim - len(region))

@@ -12,7 +12,7 @@ from typing import Any
 
 from zarr.storage import LocalStore
 
-from steadyslip.files.inputs import UnreadableFile, check_kind, inside
+from steadyslip.files.inputs import UnreadableFile, check_kind, check_room, inside
 from steadyslip.maps.plan.axes import COMPLETE
 
 METADATA = 2**26
@@ -91,15 +91,15 @@ class MapFolder(LocalStore):  # type: ignore[misc]  # Zarr is followed no furthe
         return bool(await super().exists(key))
 
     async def set(self, key: str, value: Any) -> None:
-        inside(self.root, key)
+        check_room(inside(self.root, key))
         await super().set(key, value)
 
     def set_sync(self, key: str, value: Any) -> None:
-        inside(self.root, key)
+        check_room(inside(self.root, key))
         super().set_sync(key, value)
 
     async def set_if_not_exists(self, key: str, value: Any) -> None:
-        inside(self.root, key)
+        check_room(inside(self.root, key))
         await super().set_if_not_exists(key, value)
 
     async def delete(self, key: str) -> None:

@@ -14,7 +14,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.progress import progress_bar
 from steadyslip.maps.plan.map import Map
-from steadyslip.maps.store.arrays import Store, check_path, open_or_create
+from steadyslip.maps.store.arrays import Store, cannot_write, check_path, open_or_create
 from steadyslip.maps.store.layout import versions
 from steadyslip.maps.view.result import MapResult
 from steadyslip.maps.work.chunk import Done, job_of
@@ -68,7 +68,14 @@ def run_map(
     target = Path(path)
     _check(cluster)
     check_path(target)
-    store = open_or_create(target, plan)
+    try:
+        return _gone_on(plan, open_or_create(target, plan), workers, cluster, progress)
+    except OSError as error:
+        raise cannot_write(target, error) from error
+
+
+def _gone_on(plan: Map, store: Store, workers: int | None, cluster: str | None, progress: bool | None) -> MapResult:
+    """Compute what is missing in a store."""
     with store.held():
         store.restore(plan)
         _remark(store, plan)

@@ -722,6 +722,9 @@ def test_work_is_bounded_and_what_it_found_is_kept(monkeypatch):
     part = ss.cycles(unit_rig("slip", 0.5, 0.6), most_points=60)
     assert 0 < len(part) < len(whole)
     assert part.end.startswith("0.02 million steps of integration taken")
+    assert [cycle.period for cycle in part] == list(part["period"])
+    with pytest.raises(KeyError, match="did you mean 'period'"):
+        part["perod"]
     np.testing.assert_array_equal(part["period"], whole["period"][: len(part)])
 
 

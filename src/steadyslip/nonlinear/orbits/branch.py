@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from os import PathLike
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.errors import unknown_name
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, stress_name, total, totals
@@ -64,8 +66,13 @@ class CycleBranch(Displayed):
     def __len__(self) -> int:
         return len(self.cycles)
 
+    def __iter__(self) -> Iterator[Cycle]:
+        return iter(self.cycles)
+
     def __getitem__(self, name: str) -> Array:
         """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ..."""
+        if name not in (known := ("value", *UNITS, "stable", "trivial", "multipliers")):
+            raise KeyError(unknown_name("quantity", name, known))
         return np.array([getattr(cycle, name) for cycle in self.cycles])
 
     def at(self, value: float) -> tuple[Cycle, ...]:

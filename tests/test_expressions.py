@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import steadyslip as ss
-from steadyslip.core.expressions import array_function, occurrences
+from steadyslip.core.expressions import array_function, asinh_exp, derivative, occurrences
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.source import Formulas
 
@@ -42,6 +42,22 @@ def test_values_are_those_of_sympy(name):
 def test_extremes_of_several():
     (found,) = array_function([X, Y, Z], [sp.Max(X, Y, Z) - sp.Min(X, Y, Z)])(np.array([1.0, -3.0]), 2.0, 0.5)
     np.testing.assert_array_equal(found, [1.5, 5.0])
+
+
+@pytest.mark.parametrize("name", [*EXPRESSIONS, "regularised"])
+def test_derivatives_are_those_of_sympy(name):
+    expression = EXPRESSIONS.get(name, asinh_exp(X * Z, Y - sp.log(Z)) * Z)
+    random = np.random.default_rng(len(name))
+    numbers = random.uniform(-2, 2, 20), random.uniform(-2, 2, 20), random.uniform(0.1, 3, 20)
+    for symbol in (X, Y, Z):
+        own, theirs = derivative(expression, symbol), sp.diff(expression, symbol)
+        if own.has(sp.DiracDelta, sp.Derivative):  # a fall-back to SymPy itself
+            own, theirs = (
+                own.doit().replace(sp.DiracDelta, lambda *_: sp.S.Zero),
+                theirs.doit().replace(sp.DiracDelta, lambda *_: sp.S.Zero),
+            )
+        found, expected = (np.broadcast_to(array_function([X, Y, Z], [e])(*numbers)[0], 20) for e in (own, theirs))
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
 
 
 def test_nothing_is_computed_twice():

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
@@ -75,9 +76,9 @@ class ExperimentProgram:
         residual = model.contact.steady_stress - sigma
         found = []
         for symbol in model.parameters.values():
-            stress = -sp.diff(residual, symbol) / sp.diff(residual, sigma)
+            stress = -derivative(residual, symbol) / derivative(residual, sigma)
             for expression in expressions:
-                found.append(sp.diff(expression, symbol) + sp.diff(expression, sigma) * stress)
+                found.append(derivative(expression, symbol) + derivative(expression, sigma) * stress)
         return model.function(found)
 
     def arrays(self, point: OperatingPoint, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from steadyslip.core.expressions import derivative
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Layout, make_layout
 from steadyslip.kernels.methods import METHODS, Method
@@ -97,12 +98,12 @@ class Formulation:
 
         def explicit(e: sp.Expr) -> sp.Expr:
             known = [*self.constants.symbols.values(), *self.varied_inputs]
-            return sp.Add(*(sp.diff(e, c) * self.constants.rate_of(c, direction) for c in known if e.has(c)))
+            return sp.Add(*(derivative(e, c) * self.constants.rate_of(c, direction) for c in known if e.has(c)))
 
         added = explicit(expression)
         if self.reduction.residual is not None and self.reduction.unknown is not None:
             residual, unknown = self._fixed(self.reduction.residual), self.reduction.unknown
-            added -= sp.diff(expression, unknown) * explicit(residual) / sp.diff(residual, unknown)
+            added -= derivative(expression, unknown) * explicit(residual) / derivative(residual, unknown)
         return added
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
@@ -111,10 +112,12 @@ class Formulation:
         if i not in self.driven:
             return entry
         variable, unknown = self.reduction.state[k], self.reduction.unknown
-        entry += sp.diff(self.driven[i], variable)
+        entry += derivative(self.driven[i], variable)
         if self.reduction.residual is not None and unknown is not None:
             residual = self._fixed(self.reduction.residual)
-            entry -= sp.diff(self.driven[i], unknown) * sp.diff(residual, variable) / sp.diff(residual, unknown)
+            entry -= (
+                derivative(self.driven[i], unknown) * derivative(residual, variable) / derivative(residual, unknown)
+            )
         return entry
 
     # -- the equations
@@ -128,7 +131,7 @@ class Formulation:
         outputs = [self._fixed(reduction.outputs[name]) for name in OUTPUTS]
         self.residual: Formulas | None = None
         if reduction.unknown is not None and reduction.residual is not None:
-            pair = (reduction.residual, sp.diff(reduction.residual, reduction.unknown))
+            pair = (reduction.residual, derivative(reduction.residual, reduction.unknown))
             self.residual = self._formulas([self._fixed(e) for e in pair])
         self.rates = self._formulas(self._rates)
         self.full = self._formulas(self._rates + outputs[:3])
@@ -148,7 +151,7 @@ class Formulation:
         if reduction.restart is not None:
             w = sp.Symbol("w", real=True)
             known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | {w: "w"} | _INPUT_NAMES | _SLOPE_NAMES
-            pair = (reduction.restart, sp.diff(reduction.restart, w))
+            pair = (reduction.restart, derivative(reduction.restart, w))
             self.restart = Formulas([self._fixed(e) for e in pair], known)
 
     def _write_velocity(self) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import Num
+from steadyslip.core.expressions import Num, derivative
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
@@ -110,14 +110,14 @@ def response(model: Model) -> Response:
         return expression.xreplace(model.steady).doit()
 
     # the law states strength(v, σ, memory, τ) − τ = 0; τ itself occurs in strength where the state depends on it only
-    own = -at_steady(sp.diff(balance, tau))
-    f = at_steady(sp.diff(balance, v)) / own
-    f1 = at_steady(sp.diff(balance, sigma)) / own
-    by_memory = at_steady(sp.diff(balance, memory)) / own
-    r = -(at_steady(sp.diff(rate, memory)) + at_steady(sp.diff(rate, tau)) * by_memory)
+    own = -at_steady(derivative(balance, tau))
+    f = at_steady(derivative(balance, v)) / own
+    f1 = at_steady(derivative(balance, sigma)) / own
+    by_memory = at_steady(derivative(balance, memory)) / own
+    r = -(at_steady(derivative(rate, memory)) + at_steady(derivative(rate, tau)) * by_memory)
     v0 = model.parameters["drive.velocity"]
     tau_ss = model.steady[tau]
-    slope, mu = sp.diff(tau_ss, v0), sp.diff(tau_ss, contact.sigma_ss)
+    slope, mu = derivative(tau_ss, v0), derivative(tau_ss, contact.sigma_ss)
     m, c, eta, k = _mechanics(model)
     b0, b1, b2, b3 = contact_coefficients(model)
     return Response(f + c + eta, slope + c + eta, r, f1, mu, b0, b1, b2, b3, m, k)
@@ -128,10 +128,10 @@ def _mechanics(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]:
     contact = model.contact
     spring, friction = model.definitions[contact.spring], model.definitions[contact.friction]
     return (
-        -sp.diff(friction, contact.acceleration),
-        -sp.diff(spring, contact.velocity),
-        -sp.diff(friction, contact.velocity),
-        -sp.diff(spring, contact.slip),
+        -derivative(friction, contact.acceleration),
+        -derivative(spring, contact.velocity),
+        -derivative(friction, contact.velocity),
+        -derivative(spring, contact.slip),
     )
 
 
@@ -147,13 +147,13 @@ def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Ex
     m, c, eta, k = _mechanics(model)
 
     def partial(symbol: sp.Symbol) -> sp.Expr:
-        return sp.diff(law, symbol).xreplace(model.steady).doit()
+        return derivative(law, symbol).xreplace(model.steady).doit()
 
     by_spring, by_friction = partial(contact.spring), partial(contact.friction)
     through_spring = by_spring + by_friction
     by_slip = partial(contact.slip)
     spring_constant = model.parameters["slider.stiffness"]
-    by_stiffness = sp.diff(by_slip, spring_constant)
+    by_stiffness = derivative(by_slip, spring_constant)
     b0 = partial(contact.acceleration) - m * by_friction
     b1 = partial(contact.velocity) - c * through_spring - eta * by_friction
     b2 = by_stiffness - through_spring

@@ -14,6 +14,7 @@ import sympy as sp
 from sympy.polys.domains import ZZ
 from sympy.polys.matrices import DomainMatrix
 
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 
@@ -57,10 +58,10 @@ def linearise(model: Model) -> Linearisation:
         total: Row = {}
         free = expression.free_symbols
         for name in basis:
-            value = model.at_steady(sp.diff(expression, name)) if name in free else sp.Integer(0)
+            value = model.at_steady(derivative(expression, name)) if name in free else sp.Integer(0)
             for middle, row in intermediate.items():
                 if middle in free and row.get(name, 0) != 0:
-                    value += model.at_steady(sp.diff(expression, middle)) * row[name]
+                    value += model.at_steady(derivative(expression, middle)) * row[name]
             total[name] = value
         return total
 
@@ -125,5 +126,5 @@ def stiffness_split(model: Model, name: str = "slider.stiffness") -> tuple[tuple
     symbol = model.parameters[name]
     coefficients = characteristic_coefficients(model)
     without = tuple(c.xreplace({symbol: sp.Integer(0)}) for c in coefficients)
-    slope = tuple(sp.diff(c, symbol) for c in coefficients)
+    slope = tuple(derivative(c, symbol) for c in coefficients)
     return without, slope

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from steadyslip.core.errors import InternalError
-from steadyslip.core.expressions import asinh_exp
+from steadyslip.core.expressions import asinh_exp, derivative
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model.equations import Model
 
@@ -89,10 +89,10 @@ class Reduction(Keeper):
 
     def derivative(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         """Derivative along the solution of the balance, where there is an unknown left to solve for."""
-        total = sp.diff(expression, variable)
+        total = derivative(expression, variable)
         if self.unknown is not None and expression.has(self.unknown):
-            slope = -sp.diff(self.residual, variable) / sp.diff(self.residual, self.unknown)
-            total += sp.diff(expression, self.unknown) * slope
+            slope = -derivative(self.residual, variable) / derivative(self.residual, self.unknown)
+            total += derivative(expression, self.unknown) * slope
         return total
 
     def jacobian(self) -> list[list[sp.Expr]]:
@@ -227,7 +227,7 @@ def reduce_model(model: Model, eliminate: int | None = 0) -> Reduction:
         return _inertial(model, equations)
     if eliminate is not None and equations.velocity == "logarithm" and len(equations.memory) > eliminate:
         victim = equations.memory[eliminate]
-        slope = sp.diff(equations.balance, victim)
+        slope = derivative(equations.balance, victim)
         if slope != 0 and not slope.has(victim) and not slope.has(W):
             return _eliminated(model, equations, victim, slope)
     return _massless(model, equations)
@@ -235,7 +235,7 @@ def reduce_model(model: Model, eliminate: int | None = 0) -> Reduction:
 
 def _solved(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
     """The unknown, if the residual is linear in it."""
-    slope = sp.diff(residual, unknown)
+    slope = derivative(residual, unknown)
     if slope.has(unknown):
         return None
     return -residual.xreplace({unknown: sp.Integer(0)}) / slope
@@ -260,10 +260,10 @@ def _inertial(model: Model, eq: _Equations) -> Reduction:
     memory_rates = {symbol: written(eq.rates[symbol]) for symbol in eq.memory}
     push = written(eq.acceleration)
     for symbol, rate in memory_rates.items():
-        slope = sp.diff(eq.of_w, symbol)
+        slope = derivative(eq.of_w, symbol)
         if slope != 0:
             push -= slope * rate
-    rates = {eq.x: written(eq.rates[eq.x]), W: push / sp.diff(eq.of_w, W), **memory_rates}
+    rates = {eq.x: written(eq.rates[eq.x]), W: push / derivative(eq.of_w, W), **memory_rates}
     rates |= {symbol: eq.rates[symbol] for symbol in eq.integrals}
     if eq.velocity == "logarithm":
         rates = {symbol: _kept_moving(rate) for symbol, rate in rates.items()}
@@ -281,7 +281,9 @@ def _kept_moving(rate: sp.Expr) -> sp.Expr:
     Whoever pulls the block back far below its strength would else divide by a velocity beneath floating point.
     """
     least = sp.Piecewise((W, W > STANDSTILL), (sp.Integer(STANDSTILL), True))
-    return rate.replace(lambda e: isinstance(e, sp.exp) and e.has(W), lambda e: e.xreplace({W: least}))
+    bounded = sp.Dummy(real=True)  # put in last: a condition must not be bounded by itself
+    slowed = rate.replace(lambda e: isinstance(e, sp.exp) and e.has(W), lambda e: e.xreplace({W: bounded}))
+    return slowed.xreplace({bounded: least})
 
 
 def _outputs(eq: _Equations, written: object, acceleration: sp.Expr) -> dict[str, sp.Expr]:
@@ -309,9 +311,9 @@ def _massless(model: Model, eq: _Equations) -> Reduction:
 
     rates = {symbol: written(eq.rates[symbol]) for symbol in state}
     raw = {symbol: eq.inlined(eq.rates[symbol]) for symbol in state}
-    w_rate = -_change(residual, raw) / sp.diff(residual, W)
-    acceleration = sp.diff(eq.of_w, W) * w_rate
-    acceleration += sp.Add(*(sp.diff(eq.of_w, s) * raw[s] for s in eq.memory))
+    w_rate = -_change(residual, raw) / derivative(residual, W)
+    acceleration = derivative(eq.of_w, W) * w_rate
+    acceleration += sp.Add(*(derivative(eq.of_w, s) * raw[s] for s in eq.memory))
     outputs = _outputs(eq, written, acceleration.xreplace(found))
     return Reduction(
         model, "explicit" if unknown is None else "implicit", eq.velocity, state, _names(eq, state),
@@ -322,8 +324,8 @@ def _massless(model: Model, eq: _Equations) -> Reduction:
 
 def _change(residual: sp.Expr, rates: Row) -> sp.Expr:
     """Rate of a residual at fixed w."""
-    terms = [sp.diff(residual, symbol) * rate for symbol, rate in rates.items()]
-    terms += [sp.diff(residual, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
+    terms = [derivative(residual, symbol) * rate for symbol, rate in rates.items()]
+    terms += [derivative(residual, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
     return sp.Add(*terms)
 
 
@@ -335,14 +337,14 @@ def _eliminated(model: Model, eq: _Equations, victim: sp.Symbol, slope: sp.Expr)
     given = sp.expand_mul(sp.Add(*(-term / slope for term in sp.Add.make_args(rest))))  # so that ln σ cancels
     residual = eq.inlined(eq.balance)
     raw = {symbol: eq.inlined(eq.rates[symbol]) for symbol in (eq.x, *eq.memory, *eq.integrals)}
-    w_rate = -_change(residual, raw) / sp.diff(residual, W)
+    w_rate = -_change(residual, raw) / derivative(residual, W)
 
     def written(expression: sp.Expr) -> sp.Expr:
         return eq.inlined(expression.xreplace({victim: given}))
 
     rates = {symbol: written(rate) for symbol, rate in raw.items() if symbol is not victim}
     rates[W] = written(w_rate)
-    acceleration = sp.diff(eq.of_w, W) * rates[W]
+    acceleration = derivative(eq.of_w, W) * rates[W]
     outputs = _outputs(eq, written, acceleration)
     continuous = (eq.x, *eq.memory, *eq.integrals)
     restored = tuple(written(symbol) for symbol in continuous)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
@@ -51,9 +52,13 @@ def weighed(model: Model) -> list[sp.Expr]:
     contact = model.contact
     v, memory = contact.velocity, [item.symbol for item in model.memory]
     inlined = model.inlined(contact.balance)
-    wanted = [v * sp.diff(contact.balance, v), sp.diff(inlined, contact.slip), sp.diff(inlined, contact.unknown)]
-    wanted += [sp.diff(contact.balance, m) for m in memory]
-    wanted += [sp.diff(model.rate_of[m], m) for m in memory]
+    wanted = [
+        v * derivative(contact.balance, v),
+        derivative(inlined, contact.slip),
+        derivative(inlined, contact.unknown),
+    ]
+    wanted += [derivative(contact.balance, m) for m in memory]
+    wanted += [derivative(model.rate_of[m], m) for m in memory]
     return [e.doit().xreplace(model.steady) for e in (*wanted, *memory)]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, unknown_name
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
@@ -54,7 +55,7 @@ def _balance(reduction: Reduction, index: int) -> Callable[..., list[Any]]:
     at_rest = {V_LP: model.parameters["drive.velocity"], Q: sp.Integer(0), P: sp.Integer(0), TIME: sp.Integer(0)}
     at_rest |= {item.symbol: sp.Integer(0) for item in model.integrals}
     expression = reduction.restart.xreplace({W: reduction.w_of_v}).xreplace(at_rest)
-    slope = sp.diff(expression, memory[index])
+    slope = derivative(expression, memory[index])
     return model.function([expression, slope], model.contact.slip, model.contact.velocity, *memory)
 
 

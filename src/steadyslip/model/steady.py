@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import array_function, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 
@@ -53,7 +53,7 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
     others = {other.sigma_ss for other in model.contacts} - {sigma}
     if others & contact.steady_stress.free_symbols:
         raise NotAvailable("contacts that press on each other in steady sliding are not offered yet")
-    slope = sp.diff(contact.steady_coupling, sigma)
+    slope = derivative(contact.steady_coupling, sigma)
     given = contact.steady_load is None
     # where σss is given, the contact hands back that parameter and sigma_ss does not occur
     load = contact.steady_stress if contact.steady_load is None else contact.steady_load

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
@@ -67,11 +68,11 @@ def system(model: Model) -> System:
         for order in (1, 2, 3):
             for index in combinations_with_replacement(present, order):
                 below = derivatives.get(index[:-1], sp.Integer(0))
-                derivative = sp.diff(below, unknowns[index[-1]]) if below != 0 else sp.Integer(0)
-                if derivative == 0:
+                above = derivative(below, unknowns[index[-1]]) if below != 0 else sp.Integer(0)
+                if above == 0:
                     continue
-                derivatives[index] = derivative
-                value = model.at_steady(derivative)
+                derivatives[index] = above
+                value = model.at_steady(above)
                 if value != 0:
                     entries[order - 1].append((row, *index))
                     expressions[order - 1].append(value)

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import mpmath
-import sympy as sp
 
 from steadyslip.core.errors import QuantityError
+from steadyslip.core.expressions import derivative
 from steadyslip.core.quantities import unit
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import (
@@ -114,7 +114,9 @@ def check_steady_state(law: FrictionLaw, conditions: Conditions = MIDDLE) -> Non
 def check_signs(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
     """Strength and direct effect are positive, and the memory relaxes, in steady sliding."""
     said = statement(law)
-    values = said.function(said.strength, sp.diff(said.strength, said.v).doit(), 1 - sp.diff(said.strength, said.tau))
+    values = said.function(
+        said.strength, derivative(said.strength, said.v).doit(), 1 - derivative(said.strength, said.tau)
+    )
     relaxation = said.relaxation()
     for v, sigma in conditions.grid():
         with mpmath.workdps(DIGITS):

@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import array_function, derivative
 from steadyslip.core.questions import Keeper, question
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import in_symbols, precise_function, stated
@@ -94,15 +94,15 @@ class Statement(Keeper):
     @question
     def gradient(self, expression: sp.Expr) -> tuple[sp.Expr, ...]:
         """Partial derivatives with respect to v, σ, memory variables, τ."""
-        return tuple(sp.diff(expression, name).doit() for name in self.inputs)
+        return tuple(derivative(expression, name).doit() for name in self.inputs)
 
     @question
     def relaxation(self) -> Callable[..., Any]:
         """The matrix of ∂(rates)/∂(memory) at fixed v and σ, τ following the strength, as a function of numbers."""
-        slope = 1 - sp.diff(self.strength, self.tau)
+        slope = 1 - derivative(self.strength, self.tau)
         function = self.function(
             *(
-                sp.diff(rate, y) + sp.diff(rate, self.tau) * sp.diff(self.strength, y) / slope
+                derivative(rate, y) + derivative(rate, self.tau) * derivative(self.strength, y) / slope
                 for rate in self.rates
                 for y in self.memory
             )

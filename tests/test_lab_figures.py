@@ -110,8 +110,8 @@ def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
     assert ax.get_xlabel() == "d_c (µm)"
 
 
-def test_laws_and_experiments_as_bars(record):
-    found = ss.compare_laws(ss.lab_rig(normal_memory="linker-dieterich"), record, ("slip", "aging"))
+def test_laws_and_experiments_as_bars():
+    found = ss.compare_laws(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300), ("slip", "aging"))
     ax = found.plot(Figure().subplots())
     assert [label.get_text() for label in ax.get_yticklabels()] == list(found.fits)[::-1]
     assert min(bar.get_width() for bar in ax.patches) == 0.0

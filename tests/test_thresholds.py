@@ -146,7 +146,7 @@ def test_close_to_a_subcritical_edge_the_unstable_cycle_is_the_limit(above):
     """A displacement kick leaves normal stress as it is: it fails where it starts outside the small unstable cycle."""
     a_rig = inclined(30, 1 + above)
     (cycle,) = ss.cycles(a_rig).at(a_rig.stiffness)
-    found = ss.threshold(a_rig, "displacement", precision=1e-5)
+    found = ss.threshold(a_rig, "displacement", precision=1e-3)
     assert found.outcome in ("oscillation", "blow-up")
     around = ss.orbit(a_rig, cycle)
     assert found.amount > 0

@@ -2,9 +2,11 @@
 
 import signal
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import lab_records as lab
 import steadyslip as ss
@@ -13,6 +15,7 @@ from steadyslip import cli, reproduce as reproducing
 from steadyslip.experiments.answers import laws, predict as predicting, uncertainty
 from steadyslip.experiments.fitting import forward
 from steadyslip.maps.sensitivity import LEAST
+from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
 
@@ -126,6 +129,22 @@ def test_figures_that_are_written_are_named(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt, match=r"these files are written: fig1\.png, fig1\.svg"):
         reproducing.reproduce(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"fig1.png", "fig1.svg"}
+
+
+@pytest.mark.parametrize(("ending", "owner", "writer"), [(".csv", np, "savetxt"), (".png", Figure, "savefig")])
+def test_a_file_that_was_there_stays_whole_until_the_new_one_is(ending, owner, writer, monkeypatch, tmp_path):
+    def begun(*arguments, **_):
+        path = next(given for given in arguments if isinstance(given, (str, Path)))
+        Path(path).write_text("half of")
+        raise KeyboardInterrupt
+
+    run = ss.simulate(rig(), until=1.0)
+    path = tmp_path / f"run{ending}"
+    path.write_text("the last run")
+    monkeypatch.setattr(owner, writer, begun)
+    with pytest.raises(KeyboardInterrupt):
+        write_history(run, path)
+    assert [found.read_text() for found in tmp_path.iterdir()] == ["the last run"]
 
 
 @pytest.mark.parametrize("words", ["", "after 3 of 9"])

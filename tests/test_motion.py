@@ -1,6 +1,7 @@
 """Simulated motion against laws of nature, closed forms and independent numbers."""
 
 import csv
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -461,6 +462,17 @@ def test_a_run_out_of_steps_says_so():
     assert run.status == "too many steps"
     assert "most_steps" in run.message
     assert 0 < run.end < 1e4
+
+
+def test_steps_that_all_stay_in_memory_are_fewer(monkeypatch):
+    single = sys.modules["steadyslip.motion.single"]
+    monkeypatch.setattr(single, "OWN_STEPS", 50)
+    asked = rig(stiffness=9e9), ss.VelocityStep(at=1.0, to=2e-6)
+    own = ss.simulate(*asked, until=100.0)
+    assert own.status == "too many steps"
+    assert "--samples" in own.message
+    assert ss.simulate(*asked, until=100.0, times=[0.0, own.end]).status == "done"
+    assert ss.simulate(*asked, until=100.0, most_steps=51).steps > own.steps
 
 
 def test_ill_posed_and_absent_steady_sliding_are_refused():

@@ -11,6 +11,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from steadyslip.core.errors import NotAvailable
 
 FIGURES = (".png", ".svg", ".pdf")
@@ -81,7 +83,8 @@ def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]],
             return
         axes = figure()
         first = axes.flat[0] if hasattr(axes, "flat") else axes
-        first.figure.savefig(path, dpi=150)
+        with whole_file(path) as temporary:
+            first.figure.savefig(temporary, dpi=150)
     except OSError as error:
         raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
 
@@ -113,6 +116,19 @@ def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[
         if isinstance(error, OSError):
             raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
         raise
+
+
+def write_columns(path: str | PathLike[str], columns: Mapping[str, np.ndarray], form: str) -> None:
+    """Write numbers as comma-separated text under their titles, each in a `form` such as ``%.12g``.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    with whole_file(path) as temporary:
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(temporary, table, form, ",", header=",".join(columns), comments="", encoding="utf-8")
 
 
 def write_dataset(dataset: Any, path: str | PathLike[str]) -> None:

@@ -24,6 +24,7 @@ from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
+from steadyslip.files.output import whole_file
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.maps.plan.axes import SAMPLE
@@ -97,10 +98,8 @@ class Refined(ReadOnly):
             sides: Any = self.sides[:, side] if len(self.sides) else []
             columns.append([words[int(s)] if words else ("below", "above")[int(s)] for s in sides])
         rows = [",".join([*names, "one side", "other side"]), *(",".join(row) for row in zip(*columns, strict=True))]
-        try:
-            Path(path).write_text("\n".join(rows) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+        with whole_file(path) as temporary:
+            Path(temporary).write_text("\n".join(rows) + "\n", encoding="utf-8")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw new points and edge; see `steadyslip.figures.refined`."""

@@ -24,6 +24,9 @@ from steadyslip.motion.status import WORDS, remedy
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
 
+OWN_STEPS = 500_000
+"""Limit of steps of a run that reports them all: some hundred bytes each, up to four times."""
+
 
 @checked(
     until=finite(0), arrest=finite(0, 1, closed=True), times=NUMBERS, rtol=finite(0, 0.1), most_steps=whole(1, 10**12)
@@ -38,7 +41,7 @@ def simulate(
     events: bool = True,
     method: str = "auto",
     rtol: float = 1e-7,
-    most_steps: int = 10_000_000,
+    most_steps: int | None = None,
     arrest: float = 1e-3,
     branch: int = 0,
     progress: Callable[[float], None] | None = None,
@@ -67,7 +70,8 @@ def simulate(
     rtol : float, optional
         Error allowed per step, relative to the size of each variable or to its scale (1 for ln v).
     most_steps : int, optional
-        Limit of steps.
+        Limit of steps; unless given 10 million, or half a million where the solver's own steps are reported, which
+        all stay in memory.
     arrest : float, optional
         Share of the drive velocity below which the block counts as arrested.
     branch : int, optional
@@ -90,7 +94,8 @@ def simulate(
     NotAvailable
         If the rig's motion is ill-posed, or a law cannot move as asked.
     """
-    options = Options(method, rtol, most_steps, arrest)
+    most = most_steps or (OWN_STEPS if times is None else Options.most_steps)
+    options = Options(method, rtol, most, arrest)
     plan = Protocol.of(protocol)
     jobs = prepare(rig, plan, until, {}, initial or {}, options, branch)
     if not jobs.sigma[0] > 0:

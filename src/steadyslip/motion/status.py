@@ -11,7 +11,8 @@ REMEDIES = {
     "contact lost": "the normal stress fell to zero; press harder (preload), or change what takes the load off",
     "blow-up": "the massless model reaches infinite velocity at this time; give the slider a mass or "
     "radiation_damping to follow the motion further",
-    "too many steps": "the limit of steps is used up; raise most_steps, shorten until, or loosen rtol",
+    "too many steps": "the limit of steps is used up; shorten until, loosen rtol, report at given times (times, "
+    "--samples), for which more steps are allowed, or raise most_steps",
     "stuck": "no step is small enough: the equations have no solution beyond this point (with mass zero, friction "
     "that falls at once when the block speeds up; or a normal stress that answers too strongly to acceleration); "
     "give the slider mass or damping, or check the contact law",

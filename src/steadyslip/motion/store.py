@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, SteadyslipError
 from steadyslip.core.quantities import outside
+from steadyslip.files.output import write_columns
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
@@ -149,9 +150,7 @@ def to_csv(history: HistoryData, path: str | PathLike[str]) -> None:
     """
     names = list(history.data)
     written = [outside(history.units[name], history.rig.area) for name in names]
-    header = ",".join(f"{name} ({unit})" for name, (_, unit) in zip(names, written, strict=True))
-    table = np.column_stack([history.data[name] * factor for name, (factor, _) in zip(names, written, strict=True)])
-    try:
-        np.savetxt(path, table, "%.15g", ",", header=header, comments="")
-    except OSError as error:
-        raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+    columns = {
+        f"{name} ({unit})": history.data[name] * factor for name, (factor, unit) in zip(names, written, strict=True)
+    }
+    write_columns(path, columns, "%.15g")

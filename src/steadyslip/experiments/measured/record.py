@@ -21,6 +21,7 @@ from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
 from steadyslip.experiments.measured.steps import LoadStep, steps_of
 from steadyslip.experiments.numerics.noise import lasting
+from steadyslip.files.output import write_columns
 
 Array = np.ndarray
 FEWEST_ROWS = 20
@@ -235,12 +236,7 @@ class Record(Displayed):
         if self.integrated:
             del names["displacement"]
         present = {title: getattr(self, n) for n, title in names.items() if getattr(self, n) is not None}
-        try:
-            np.savetxt(
-                path, np.column_stack(list(present.values())), "%.12g", ",", header=",".join(present), comments=""
-            )
-        except OSError as error:
-            raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
+        write_columns(path, present, "%.12g")
 
 
 _OPTIONAL = ("normal", "shear", "displacement", "velocity")

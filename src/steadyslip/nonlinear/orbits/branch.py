@@ -14,6 +14,7 @@ from steadyslip.core.errors import unknown_name
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, stress_name, total, totals
+from steadyslip.files.output import write_columns
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import UNITS, Cycle, SpecialCycle
@@ -120,15 +121,18 @@ class CycleBranch(Displayed):
         return xr.Dataset(data, attrs=attributes)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write one row for each cycle, units in the header."""
+        """Write one row for each cycle, units in the header.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
         names = {"value": self.unit} | UNITS
         written = {name: outside(unit, self.rig.area) for name, unit in names.items()}
-        columns = [self[name].astype(float) * factor for name, (factor, _) in written.items()]
-        table = np.column_stack([*columns, self["stable"].astype(float)])
-        header = ",".join([*(f"{name} ({unit})" for name, (_, unit) in written.items()), "stable"]).replace(
-            "value", self.along, 1
-        )
-        np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.12g")
+        titles = {name: f"{self.along if name == 'value' else name} ({unit})" for name, (_, unit) in written.items()}
+        columns = {titles[name]: self[name].astype(float) * factor for name, (factor, _) in written.items()}
+        write_columns(path, columns | {"stable": self["stable"].astype(float)}, "%.12g")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``steadyslip cycles --json`` prints it."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, NUMBERS, THREADS, checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
@@ -113,6 +113,11 @@ def basin(
     -------
     Basin
 
+    Raises
+    ------
+    NotAvailable
+        If numbers leave the range of floating point.
+
     Notes
     -----
     All motions together take two billion steps of integration at most, some minutes on two cores; what is open then is
@@ -123,6 +128,8 @@ def basin(
     options = options_for(operating_point(rig, branch=branch).model.inertial, rtol)
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
     rest = rest_of(own, np.full(1, drive), np.zeros(1))
+    if not rest.exists[0]:
+        raise NotAvailable(OUT_OF_RANGE)
     length = float(rest.scales[0, own.reduction.names.index("x")])
     x = length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
     v = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else v  # type: ignore[assignment]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, total
@@ -188,7 +188,7 @@ def threshold(
     NoSteadySliding
         If there is none to kick.
     NotAvailable
-        If the kick is not possible, or the motion ill-posed.
+        If the kick is not possible, the motion ill-posed, or numbers leave the range of floating point.
     ParameterError
         If an argument is wrong.
 
@@ -206,6 +206,8 @@ def threshold(
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
     steady_states(rig)  # raises, and says why
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol)
+    if not kicked.exists[0]:
+        raise NotAvailable(OUT_OF_RANGE)
     if not kicked.stable[0]:
         nothing = float(kicked.amount(0.0)[0])
         return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), nothing, kicked.kick.unit, "unstable", kicked.highest,

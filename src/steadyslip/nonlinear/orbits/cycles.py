@@ -22,11 +22,12 @@ from steadyslip.nonlinear.orbits.special import SMALL
 from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, Sheet, Tracer
 
 Array = np.ndarray
+SMALLEST = 1e-12  # amplitude that differs from none by more than rounding
 LARGER = (1e-4, 1e-3, 1e-2)  # amplitudes to begin with where smaller cycles cannot be followed
 
 
 @checked(
-    amplitude=finite(0, 0.1),
+    amplitude=finite(SMALLEST, 0.1, closed=True),
     most_points=whole(1),
     doublings=whole(0, 100),
     rtol=finite(0, 0.1),
@@ -94,8 +95,6 @@ def cycles(
     multiplier −1.
     """
     onset = hopf(rig, along, branch=branch)
-    if amplitude is not None and not 0 < amplitude <= 0.1:
-        raise ParameterError([Problem("amplitude", f"got {amplitude!r}; allowed: above 0, up to 0.1")])
     flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol)
     tracer = Tracer(flow, onset, _limits(rig, onset, between), most_points, progress)
     sheets = [_from_the_edge(tracer, amplitude)]

@@ -25,7 +25,7 @@ def measured(
     """End states (count, 2) and the best CPU time of some runs, s per trajectory."""
     vary = problem.vary(count) if count > 1 else {}
     jobs = prepare(problem.rig(), None, problem.until, vary, problem.start, Options(rtol=rtol, method=method))
-    machine = jobs.program(lanes=lanes, dense=False)
+    machine = jobs.runner(lanes=lanes, dense=False)
     _ = machine.code.advance
     tables, best = jobs.tables(machine, 0, count, False, False), np.inf
     for _ in range(repeat):

@@ -36,7 +36,7 @@ from steadyslip.kernels.build import machine_code
 from steadyslip.kernels.jump import jump
 from steadyslip.kernels.layout import Final
 from steadyslip.kernels.nodes import Program
-from steadyslip.kernels.record import Record
+from steadyslip.kernels.record import Evaluator
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.jobs import Options, prepare
 
@@ -48,7 +48,7 @@ Curve = list[tuple[float, float]]  # (error, seconds per trajectory)
 def ours_single(problem: Problem, tolerance: float, variants: np.ndarray) -> tuple[np.ndarray, float]:
     """The kernel call for one trajectory, no events."""
     jobs = prepare(problem.rig(), None, problem.until, {}, problem.start, Options(rtol=tolerance))
-    machine = jobs.program(lanes=1, dense=False)
+    machine = jobs.runner(lanes=1, dense=False)
     _ = machine.code.advance
     call = Call(machine, jobs.tables(machine, 0, 1, False, False), 1, np.empty(0))
     begin = time.process_time()
@@ -141,8 +141,8 @@ def repeated(address: int, record: np.ndarray, scratch: np.ndarray, rounds: int)
 def bare_rate(problem: Problem) -> tuple[float, float]:
     """ns per right-hand side: alone in vector code, and in the ensemble kernel (rejected steps counted)."""
     jobs = prepare(problem.rig(), None, problem.until, {}, problem.start, Options(rtol=1e-6))
-    kernel = jobs.program(lanes=LANES, dense=False).kernel
-    bare = Record(kernel, Program("step"))
+    kernel = jobs.runner(lanes=LANES, dense=False).kernel
+    bare = Evaluator(kernel, Program("step"))
     for i, rate in enumerate(bare.evaluated(kernel.rates, bare.point(0.0))):
         place = kernel.layout.state + i
         bare.program.store(place, bare.program.load(place) + 1e-12 * rate)
@@ -153,7 +153,7 @@ def bare_rate(problem: Problem) -> tuple[float, float]:
         begin = time.process_time()
         repeated(address, work, scratch, rounds)
         best = min(best, time.process_time() - begin)
-    machine = jobs.program(lanes=LANES, dense=False)
+    machine = jobs.runner(lanes=LANES, dense=False)
     evaluations = kernel.method.stages - 1  # the first of a step is the last of the one before
     jobs = prepare(problem.rig(), None, problem.until, problem.vary(2048), problem.start, Options(rtol=1e-6))
     quickest, total = np.inf, 1.0

@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 
 from javascript import Script
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Point, Recorded
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Recorded, Sampled
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
-from steadyslip.kernels.program import TALLY
+from steadyslip.kernels.runner import TALLY
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
 
@@ -19,7 +19,7 @@ function run(machine, tables, times) {{
   const {{ layout, routines }} = machine, size = layout[1];
   const S = zeros(layout[30]), ids = zeros(1), cursor = zeros({len(Cursor)});
   cursor[{Cursor.LAST_JOB}] = 1; cursor[{Cursor.BUSY}] = 1; cursor[{Cursor.PAUSED}] = -1;
-  const point = {int(Point.STATE)} + size;
+  const point = {int(Sampled.STATE)} + size;
   const out = [zeros(1), zeros(1, {int(Final.POINT)} + point), zeros(1, {len(TALLY)}), zeros(1, times.length,
     point)];
   const log = zeros(4000, {LOG_COLUMNS}), recorded = zeros(0, {int(Recorded.POINT)} + point);
@@ -47,7 +47,7 @@ def moved(moving, protocol, until, most_steps=10_000_000):
     outcomes = []
     for rtol in (1e-7, 1e-9):
         jobs = prepare(moving, protocol, until, {}, {}, Options(rtol=rtol, most_steps=most_steps), 0)
-        machine = jobs.program(lanes=1, dense=True)
+        machine = jobs.runner(lanes=1, dense=True)
         outcomes.append(run_single(jobs, machine, times, watch=True, record=False))
         if rtol == 1e-7:
             tables = jobs.tables(machine, 0, 1, True, False)

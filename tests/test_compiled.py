@@ -24,7 +24,7 @@ from steadyslip.kernels.layout import Cursor, Out, Routines, Row, make_layout
 from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
 from steadyslip.kernels.printers import python as plain
-from steadyslip.kernels.program import Program, program
+from steadyslip.kernels.runner import Runner, runner
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
@@ -167,7 +167,7 @@ def test_measured_order(case):
     squares = np.zeros(2)
     for kick in (-2e-6, -1e-6, 1e-6, 2e-6):
         jobs = prepare(a_rig, waves if varying else None, until, {}, {"x": kick}, Options(method=method))
-        machine = program(jobs.reduction.model, jobs.choice(1, True), jobs.eliminate)
+        machine = runner(jobs.reduction.model, jobs.choice(1, True), jobs.eliminate)
         ends = [fixed_step(machine, jobs, until, n) for n in (*counts, 1500)]
         scale = np.array([1e-6, *[1.0] * (len(ends[0]) - 1)])
         squares += [np.sum(((end - ends[-1]) / scale) ** 2) for end in ends[:2]]
@@ -281,7 +281,7 @@ def test_machine_code_equals_the_text(branch):
     jobs = prepare(a_rig, protocol, 0.3, {}, kick, Options())
     ends = []
     for is_plain in (False, True):
-        machine = Program(jobs.reduction, jobs.choice(1, True), plain=is_plain)
+        machine = Runner(jobs.reduction, jobs.choice(1, True), plain=is_plain)
         with np.errstate(all="ignore"):
             ends.append(run_single(jobs, machine, np.empty(0), True, False).final[0])
     assert ends[0][:4] == pytest.approx(ends[1][:4], abs=1.5)  # a step more or less after contraction to fma

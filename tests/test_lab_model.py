@@ -13,7 +13,7 @@ from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.kernels.experiment import ExperimentProgram
-from steadyslip.kernels.program import Program
+from steadyslip.kernels.runner import Runner
 from steadyslip.model.reduction import reduce_model
 from steadyslip.motion.jobs import Jobs
 
@@ -149,7 +149,7 @@ RIGS = {
 def test_every_law_contact_and_regime(name, monkeypatch):
     """On the texts themselves, not compiled: the simulator's motion, and derivatives in every parameter."""
     monkeypatch.setattr(
-        Jobs, "program", lambda jobs, lanes, dense: Program(jobs.reduction, jobs.choice(lanes, dense), plain=True)
+        Jobs, "runner", lambda jobs, lanes, dense: Runner(jobs.reduction, jobs.choice(lanes, dense), plain=True)
     )
     rig = RIGS[name]
     times = np.linspace(0.0, 14.0, 20)

@@ -215,7 +215,7 @@ def test_kicks_leave_the_scales_of_motion_alone():
 def test_tables_of_other_lengths_do_not_reach_the_kernel():
     """Machine code reads where it is told to: too few rows would be somebody else's memory."""
     jobs = prepare(RIG, (), 1.0, {"stiffness": np.full(4, 2e9)}, {}, Options())
-    machine = jobs.program(1, dense=False)
+    machine = jobs.runner(1, dense=False)
     tables = jobs.tables(machine, 0, 4, False, False)
     with pytest.raises(ValueError, match="rows for 4 jobs"):
         Call(machine, (*tables[:2], tables[2][:3], tables[3]), 4, np.empty(0))

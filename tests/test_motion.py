@@ -14,8 +14,8 @@ import steadyslip as ss
 from dimensionless import MU, A, phi_of, unit_rig, y_of
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.core.roles import positive, real
-from steadyslip.kernels.layout import SLIP_EVENT, Point
-from steadyslip.kernels.program import Program
+from steadyslip.kernels.layout import SLIP_EVENT, Sampled
+from steadyslip.kernels.runner import Runner
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
 from test_motion_oracle import LAWS, half
@@ -214,11 +214,11 @@ def test_small_kicks_grow_as_the_eigenvalues_say(law, contact, mass):
     times = np.linspace(0.2 * until, until, 40)
     kick, rtol = (1e-9, 1e-9) if law == "lugre" else (1e-12, 1e-11)  # stiff bristles need more to stand out of rounding
     jobs = prepare(a_rig, None, until, {}, {"x": kick}, Options(rtol=rtol))
-    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
+    machine = Runner(jobs.reduction, jobs.choice(1, True), plain=True)
     with np.errstate(all="ignore"):
         outcome = run_single(jobs, machine, times, False, False)
     assert outcome.status[0] == 1
-    x = outcome.samples[0][:, Point.STATE]
+    x = outcome.samples[0][:, Sampled.STATE]
     right = misfit(times, rates, x)
     assert right < (1e-3 if law == "lugre" else 1e-4)
     if len(rates) < 4:  # with more modes than that, wrong ones can fit forty points of a short record

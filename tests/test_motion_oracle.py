@@ -6,7 +6,7 @@ import pytest
 import steadyslip as ss
 from oracle import Oracle
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.kernels.program import Program
+from steadyslip.kernels.runner import Runner
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.motion.observe import observe
@@ -29,7 +29,7 @@ LAWS = {
 def interpreted(a_rig, protocol, until, initial, rtol):
     """x, v, memory at the end, and the outcome, from the kernel's text as plain Python."""
     jobs = prepare(a_rig, protocol, until, {}, initial, Options(rtol=rtol))
-    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
+    machine = Runner(jobs.reduction, jobs.choice(1, True), plain=True)
     with np.errstate(all="ignore"):
         outcome = run_single(jobs, machine, np.empty(0), False, False)
         final = outcome.final[0]
@@ -100,7 +100,7 @@ def test_times_are_exact(seed):
     breakpoints = np.sort(random.uniform(0, until, 6))
     pieces = [ss.VelocityStep(at=t, to=1e-6 * (1 + i % 2)) for i, t in enumerate(breakpoints)]
     jobs = prepare(rig(stiffness=2e10), ss.Protocol.of(pieces), until, {}, {}, Options(rtol=1e-4))
-    machine = Program(jobs.reduction, jobs.choice(1, True), plain=True)
+    machine = Runner(jobs.reduction, jobs.choice(1, True), plain=True)
     requested = np.sort(np.concatenate([[0.0, until], breakpoints, random.uniform(0, until, 5)]))
     outcome = run_single(jobs, machine, requested, True, True)
     own = outcome.recorded[:, 0]

@@ -14,7 +14,7 @@ from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Out, Recorded, Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
-from steadyslip.kernels.program import STATUSES, TALLY
+from steadyslip.kernels.runner import STATUSES, TALLY
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model

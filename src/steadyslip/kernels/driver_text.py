@@ -8,21 +8,23 @@ from typing import Any, cast
 
 from steadyslip.kernels.layout import (
     Cursor,
-    Event,
+    EventPlace,
     Final,
     Kind,
     Layout,
     Out,
-    Point,
     Recorded,
     Routines,
     Row,
+    Sampled,
     Setting,
     Status,
 )
 
 DRIVER = "steadyslip.kernels.driver"
-_ENUMS = {enum.__name__: enum for enum in (Row, Setting, Cursor, Status, Event, Kind, Point, Recorded, Final, Out)}
+_ENUMS = {
+    enum.__name__: enum for enum in (Row, Setting, Cursor, Status, EventPlace, Kind, Sampled, Recorded, Final, Out)
+}
 _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 

@@ -13,7 +13,7 @@ from steadyslip.kernels.events import faster
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import Out, Row
 from steadyslip.kernels.nodes import Program, Value
-from steadyslip.kernels.record import Record, horner, slope_of
+from steadyslip.kernels.record import Evaluator, horner, slope_of
 from steadyslip.kernels.step import Step
 from steadyslip.kernels.watch import Watch
 
@@ -46,7 +46,7 @@ class Kernel(Formulation):
     # -- programs of one record, for the driver
 
     def _rates_program(self) -> Program:
-        record = Record(self, Program("rates"))
+        record = Evaluator(self, Program("rates"))
         point = record.point(record.program.load(Row.TAU))
         found = record.evaluated(self.full, point)
         for i in range(self.size):
@@ -63,7 +63,7 @@ class Kernel(Formulation):
         return record.program
 
     def _outputs_program(self) -> Program:
-        record = Record(self, Program("outputs"))
+        record = Evaluator(self, Program("outputs"))
         program, n = record.program, self.size
         point = record.inputs(program.number) | {f"y{i}": program.load(i, "y") for i in range(n)}
         if self.reduction.unknown is not None:
@@ -84,7 +84,7 @@ class Kernel(Formulation):
         return program
 
     def _restore_program(self) -> Program:
-        record = Record(self, Program("restore"))
+        record = Evaluator(self, Program("restore"))
         point = record.point(record.program.load(Row.TAU))
         for i, value in enumerate(record.evaluated(self.restored, point)):
             record.program.store(self.layout.continuous + i, value)
@@ -94,7 +94,7 @@ class Kernel(Formulation):
 
     def _balance_program(self) -> Program:
         """The balance as a function of w, after a jump or now; without one, velocity simply continues."""
-        record = Record(self, Program("balance"))
+        record = Evaluator(self, Program("balance"))
         program = record.program
         found: list[Value] = [0.0, 1.0]
         if self.restart is not None:
@@ -119,7 +119,7 @@ class Kernel(Formulation):
 
     def _extend_program(self) -> Program:
         """The dense output of the last step as polynomials."""
-        record = Record(self, Program("extend"))
+        record = Evaluator(self, Program("extend"))
         for i in range(self.size):
             for j, coefficient in enumerate(record.polynomial(i)):
                 record.program.store(self.layout.curve + i * self.terms + j, coefficient)
@@ -127,7 +127,7 @@ class Kernel(Formulation):
         return record.program
 
     def _dense_program(self) -> Program:
-        record = Record(self, Program("dense"), extended=True)
+        record = Evaluator(self, Program("dense"), extended=True)
         program = record.program
         theta = program.number
         if self.choice.dense:

@@ -95,7 +95,7 @@ class Status(IntEnum):
     RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
 
 
-class Event(IntEnum):
+class EventPlace(IntEnum):
     """Places of the events that the driver knows in `steadyslip.kernels.events.EVENTS`."""
 
     SLIP, TURN, CONTACT = 0, 1, 2
@@ -115,7 +115,7 @@ LOG_COLUMNS = 8
 # forces balance at several velocities, the state alone does not say which of them is meant.
 
 
-class Point(IntEnum):
+class Sampled(IntEnum):
     """Columns of a point, and of the samples at requested times."""
 
     UNKNOWN, STATE = 0, 1

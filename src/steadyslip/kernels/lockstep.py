@@ -15,7 +15,7 @@ import sympy as sp
 from steadyslip.kernels.formulation import Choice, Formulation
 from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
-from steadyslip.kernels.record import Record
+from steadyslip.kernels.record import Evaluator
 from steadyslip.kernels.step import Step
 from steadyslip.model.reduction import V_LP, P, Q, Reduction
 
@@ -87,7 +87,7 @@ class LockstepKernel(Formulation):
         return step.program
 
     def _lanes_program(self, name: str) -> Program:
-        record = Record(self, Program(name))
+        record = Evaluator(self, Program(name))
         point = record.point(record.program.load(Row.TAU))
         rates = name == "rates_lanes"
         place = self.layout.rate if rates else self.layout.seen

@@ -16,7 +16,7 @@ from steadyslip.kernels.source import Formulas
 from steadyslip.protocol.inputs import integral_to, level_at, slope_at
 
 NEWTON_STEPS = 6
-Point = dict[str, Value]
+Values = dict[str, Value]
 
 
 def sine(x: Value) -> Node:
@@ -54,8 +54,8 @@ def slope_of(coefficients: Sequence[Value]) -> list[Value]:
 class Moment:
     """What is `steadyslip.kernels.events.Observed` at one moment; what is not asked for is not computed."""
 
-    record: Record
-    point: Point
+    record: Evaluator
+    point: Values
     v: Any
     acceleration: Any
     sigma: Any
@@ -76,19 +76,19 @@ class Moment:
         return self.record.kernel.outputs(self.record.constants | self.point | {"z": self.record.z})[place]
 
 
-class Record:
+class Evaluator:
     """What every evaluation within one program reads: constants, inputs, the unknown."""
 
     def __init__(self, kernel: Formulation, program: Program, extended: bool = False) -> None:
         self.kernel, self.program = kernel, program
         self.extended = extended  # whether the dense output of the last step is there as polynomials
         layout, load = kernel.layout, program.load
-        self.constants: Point = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
+        self.constants: Values = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
         self.z: Value = 0.0
         if kernel.reduction.unknown is not None:
             self.z, self.z_scale = load(Row.Z), load(Row.Z_SCALE)
 
-    def inputs(self, moment: Value) -> Point:
+    def inputs(self, moment: Value) -> Values:
         """Inputs and their slopes at a local time of the segment."""
         load, found, constant = self.program.load, {}, self.kernel.choice.level == "constant"
         for i, c in enumerate(CHANNELS):
@@ -116,17 +116,17 @@ class Record:
         """The record's own state."""
         return [self.program.load(self.kernel.layout.state + i) for i in range(self.kernel.size)]
 
-    def point(self, moment: Value) -> Point:
+    def point(self, moment: Value) -> Values:
         """The record's state and the inputs at a local time."""
         return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
 
-    def evaluated(self, formulas: Formulas, point: Point, solved: bool = True) -> list[Value]:
+    def evaluated(self, formulas: Formulas, point: Values, solved: bool = True) -> list[Value]:
         """Formulas at a point, the unknown solved for there."""
         if solved and self.kernel.residual is not None:
             self.z = self._solved(self.kernel.residual, point)
         return formulas(self.constants | point | {"z": self.z})
 
-    def _solved(self, residual: Formulas, point: Point) -> Value:
+    def _solved(self, residual: Formulas, point: Values) -> Value:
         """Newton's method for the unknown, a fixed number of steps; the failure is NaN."""
         reduction = self.kernel.reduction
         clamped = not (str(reduction.unknown) == "a_x" or reduction.velocity == "linear")
@@ -196,7 +196,7 @@ class Record:
 
     # -- events
 
-    def moment(self, point: Point, found: Sequence[Value], h: Value = 1.0) -> Moment:
+    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> Moment:
         """What events are functions of, from the outputs v, acceleration and sigma at a point."""
         v, acceleration, sigma = found[:3]
         limits = {"v_low": self.program.load(Row.V_LOW), "sigma_low": self.program.load(Row.SIGMA_LOW)}

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from steadyslip.kernels.events import COUNTED, EVENTS
 from steadyslip.kernels.formulation import Formulation
-from steadyslip.kernels.layout import MOST_FAILURES, Event, Row
+from steadyslip.kernels.layout import MOST_FAILURES, EventPlace, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, exp, larger, log, select, smaller, weighted
-from steadyslip.kernels.record import Point, Record, total
+from steadyslip.kernels.record import Evaluator, Values, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
@@ -16,7 +16,7 @@ PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the saf
 # hardly any rejections, and an end error near rtol after tens of cycles
 
 
-class Step(Record):
+class Step(Evaluator):
     """Writes one step."""
 
     def __init__(self, kernel: Formulation, name: str = "step") -> None:
@@ -64,13 +64,13 @@ class Step(Record):
         """Errors of an explicit method."""
         return [self.h * weighted(weights, [k[i] for k in self.stages]) for i in range(self.kernel.size)]
 
-    def _inputs_of(self, s: int) -> Point:
+    def _inputs_of(self, s: int) -> Values:
         """Inputs at stage s."""
         if self.steady is not None:
             return self.steady
         return self.inputs(self.tau + self.kernel.method.nodes[s] * self.h)
 
-    def _found(self, formulas: Formulas, y: Sequence[Value], inputs: Point) -> list[Value]:
+    def _found(self, formulas: Formulas, y: Sequence[Value], inputs: Values) -> list[Value]:
         return self.evaluated(formulas, inputs | {f"y{i}": value for i, value in enumerate(y)})
 
     def _runge_kutta(self) -> list[Value]:
@@ -173,7 +173,7 @@ class Step(Record):
                     place = layout.counted + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
             store(layout.mark + e, select(self.good, value, before))
-            if e not in tuple(Event):  # its count is all there is to the tally
+            if e not in tuple(EventPlace):  # its count is all there is to the tally
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)

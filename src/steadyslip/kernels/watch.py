@@ -10,23 +10,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from steadyslip.kernels.formulation import Formulation
-from steadyslip.kernels.layout import SLIP_EVENT, Event, Out, Row
+from steadyslip.kernels.layout import SLIP_EVENT, EventPlace, Out, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, larger, log, select, smaller
-from steadyslip.kernels.record import Record, horner, slope_of
+from steadyslip.kernels.record import Evaluator, horner, slope_of
 from steadyslip.kernels.source import Formulas
 
 ROUNDS = 2  # of Halley's method, from the root of a straight line
 FOUND = 3e-4  # last change, as a share of the step, of a root that is found to the cube of that
 
 
-class Watch(Record):
+class Watch(Evaluator):
     """Writes it."""
 
     def __init__(self, kernel: Formulation, speed: Formulas) -> None:
         super().__init__(kernel, Program("watch_lanes"))
         self.speed = speed
         load, layout = self.program.load, kernel.layout
-        slip, turn = load(layout.happened + Event.SLIP), load(layout.happened + Event.TURN)
+        slip, turn = load(layout.happened + EventPlace.SLIP), load(layout.happened + EventPlace.TURN)
         self.begins, self.ends = slip > 0.0, slip < 0.0
         self.peak, self.trough = turn < 0.0, turn > 0.0
         self.turns = self.peak | self.trough
@@ -38,7 +38,9 @@ class Watch(Record):
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
         self._locate()
         count = load(Row.HAPPENED)
-        left = (load(layout.happened + Event.CONTACT) < 0.0) | (self.turns & (self.begins | self.ends)) | ~self.found
+        left = (
+            (load(layout.happened + EventPlace.CONTACT) < 0.0) | (self.turns & (self.begins | self.ends)) | ~self.found
+        )
         if self.kernel.choice.level != "constant":
             left = left | self.begins | self.ends
         self.here = (count > 0.0) & ~left

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Point, Recorded, Row, Setting
-from steadyslip.kernels.program import STATUSES, TALLY, Program
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Recorded, Row, Sampled, Setting
+from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.motion.jobs import Jobs
 
 LANES = 24  # three vectors of eight doubles, see compiled.kernel
@@ -26,7 +26,7 @@ INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATU
 class Outcome:
     """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only; `tables` it was given.
 
-    ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Point`.
+    ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`.
     """
 
     status: np.ndarray
@@ -61,7 +61,7 @@ class Outcome:
 class Call:
     """The arrays of one chain of calls to a kernel."""
 
-    def __init__(self, machine: Program, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
+    def __init__(self, machine: Runner, tables: tuple[np.ndarray, ...], size: int, times: np.ndarray) -> None:
         layout = self.layout = machine.kernel.layout
         lanes = layout.lanes
         self.advance = machine.code.advance
@@ -75,7 +75,7 @@ class Call:
         self.status = np.zeros(size, dtype=np.int64)
         self.final = np.full((size, Final.STATE + layout.size), np.nan)
         self.tally = np.full((size, len(TALLY)), np.nan)
-        self.samples = np.full((size, len(times), Point.STATE + layout.size), np.nan)
+        self.samples = np.full((size, len(times), Sampled.STATE + layout.size), np.nan)
         self.log = np.zeros((0, LOG_COLUMNS))
         self.recorded = np.zeros((0, Recorded.STATE + layout.size))
 
@@ -106,7 +106,7 @@ class Call:
 
 
 def run_single(
-    jobs: Jobs, machine: Program, times: np.ndarray, watch: bool, record: bool,
+    jobs: Jobs, machine: Runner, times: np.ndarray, watch: bool, record: bool,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
     """One trajectory, with its events and, if asked, its own steps. Ctrl-C ends it early, with what there is."""
@@ -114,7 +114,7 @@ def run_single(
 
 
 def run_tables(
-    machine: Program, tables: tuple[np.ndarray, ...], times: np.ndarray,
+    machine: Runner, tables: tuple[np.ndarray, ...], times: np.ndarray,
     progress: Callable[[float], None] | None = None,
 ) -> Outcome:  # fmt: skip
     """`run_single` from the kernel's own arrays; what to watch and record stands in the settings.
@@ -141,7 +141,7 @@ def run_tables(
 
 
 def run_chunk(
-    jobs: Jobs, machine: Program, start: int, stop: int, times: np.ndarray, watch: bool, stopped: threading.Event
+    jobs: Jobs, machine: Runner, start: int, stop: int, times: np.ndarray, watch: bool, stopped: threading.Event
 ) -> Outcome:
     """Some jobs in lanes, until done or asked to stop."""
     call = Call(machine, jobs.tables(machine, start, stop, watch, False), stop - start, times)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.core.pages import Displayed
-from steadyslip.kernels.program import LOG_KINDS
+from steadyslip.kernels.runner import LOG_KINDS
 
 
 @dataclass(frozen=True)

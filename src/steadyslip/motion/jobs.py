@@ -14,7 +14,7 @@ from steadyslip.core.records import twin
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.methods import METHODS as TABLEAUS
-from steadyslip.kernels.program import Program, program
+from steadyslip.kernels.runner import Runner, runner
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.reduction import Reduction, reduce_model
@@ -108,10 +108,10 @@ class Jobs:
         harmonics = self.segments.amplitude.shape[-1]
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
 
-    def program(self, lanes: int, dense: bool) -> Program:
-        return program(self.reduction.model, self.choice(lanes, dense), self.eliminate)
+    def runner(self, lanes: int, dense: bool) -> Runner:
+        return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate)
 
-    def tables(self, machine: Program, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
+    def tables(self, machine: Runner, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
         """Constants, initial, settings and segment rows of some jobs."""
         point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
@@ -125,7 +125,7 @@ class Jobs:
         return machine.constants(point), initial, settings, self.segments.rows(start, stop)
 
 
-def _settings(point: OperatingPoint, machine: Program, reduction: Reduction, options: Options) -> np.ndarray:
+def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, options: Options) -> np.ndarray:
     """Rows of settings, but for what depends on the start and on what is wanted."""
     scales, unknown = natural_scales(point, reduction)
     sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))

@@ -16,8 +16,8 @@ from steadyslip.core.options import NUMBERS, checked, finite, whole
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
-from steadyslip.kernels.layout import Final, Point
-from steadyslip.kernels.program import STATUSES, TALLY
+from steadyslip.kernels.layout import Final, Sampled
+from steadyslip.kernels.runner import STATUSES, TALLY
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.engine import (
     ILL_POSED,
@@ -291,7 +291,7 @@ class _Store:
             if name in found:
                 array[rows[ran]] = found[name]
         if self.samples:
-            lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, Point.STATE]) & ~absent[:, None])
+            lane, k = np.nonzero(np.isfinite(outcome.samples[:, :, Sampled.STATE]) & ~absent[:, None])
             segment = segment_of(jobs.segments, first + lane, self.times[k])
             found = observe(
                 jobs, machine, first, lane, segment, self.times[k], outcome.samples[lane, k], outcome.tables
@@ -322,7 +322,7 @@ def _run(
     jobs: Jobs, store: _Store, index: np.ndarray | None, size: int, times: np.ndarray, threads: int | None,
     advanced: Callable[[int], None] | None,
 ) -> bool:  # fmt: skip
-    machine = jobs.program(LANES, dense=store.watch or len(times) > 0)
+    machine = jobs.runner(LANES, dense=store.watch or len(times) > 0)
     lock = threading.Lock()
 
     def work(start: int, stop: int, stopped: threading.Event) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.questions import question
-from steadyslip.kernels.layout import Point
-from steadyslip.kernels.program import Program
+from steadyslip.kernels.layout import Sampled
+from steadyslip.kernels.runner import Runner
 from steadyslip.model import Model
 from steadyslip.motion.jobs import Jobs
 
@@ -49,7 +49,7 @@ def _function(model: Model) -> tuple[list[str], Callable[..., list[Any]]]:
 
 
 def observe(
-    jobs: Jobs, machine: Program, first: int, lane: Array, segment: Array, time: Array, points: Array,
+    jobs: Jobs, machine: Runner, first: int, lane: Array, segment: Array, time: Array, points: Array,
     tables: Tables | None = None,
 ) -> dict[str, Array]:  # fmt: skip
     """All observables at given points.
@@ -62,7 +62,7 @@ def observe(
     time : ndarray (points,)
         Since the start of the run.
     points : ndarray (points, 1 + state)
-        The unknown of the balance (NaN where it is not known), then the state: see `Point`.
+        The unknown of the balance (NaN where it is not known), then the state: see `Sampled`.
     tables : tuple of ndarray, optional
         Those of the jobs from `first` on, if they are at hand.
     """
@@ -76,7 +76,7 @@ def observe(
         np.ascontiguousarray(segment, dtype=np.int64), np.ascontiguousarray(time), values,
     )  # fmt: skip
     found = dict(zip(OBSERVED, values, strict=False))
-    found["x"] = points[:, Point.STATE]
+    found["x"] = points[:, Sampled.STATE]
     continuous = dict(zip(reduction.continuous, values[len(OBSERVED) :], strict=True))
     found |= {item.name: continuous[item.symbol] for item in (*model.memory, *model.integrals)}
     found["slip"] = found["x"] + found["load_displacement"]

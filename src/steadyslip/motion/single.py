@@ -11,8 +11,8 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import NUMBERS, checked, finite, whole
-from steadyslip.kernels.layout import Final, Point, Recorded
-from steadyslip.kernels.program import Program
+from steadyslip.kernels.layout import Final, Recorded, Sampled
+from steadyslip.kernels.runner import Runner
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
@@ -104,7 +104,7 @@ def simulate(
         raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
     final = float(jobs.segments.end.max())
     requested = checked_times(times, final)
-    machine = jobs.program(lanes=1, dense=True)
+    machine = jobs.runner(lanes=1, dense=True)
     outcome = run_single(jobs, machine, requested, watch=events, record=times is None, progress=progress)
     return _history(rig, _ended(plan, final), jobs, machine, outcome, requested, times is None)
 
@@ -137,7 +137,7 @@ def checked_times(times: Any, until: float) -> np.ndarray:
 
 
 def _history(
-    rig: Slider, plan: Protocol, jobs: Jobs, machine: Program, outcome: Outcome, requested: np.ndarray, own: bool
+    rig: Slider, plan: Protocol, jobs: Jobs, machine: Runner, outcome: Outcome, requested: np.ndarray, own: bool
 ) -> History:
     status = WORDS[int(outcome.status[0])]
     steps, end = outcome.steps[0], float(outcome.final[0, Final.TIME])
@@ -146,7 +146,7 @@ def _history(
         time, segment = own_steps[:, Recorded.TIME], own_steps[:, Recorded.SEGMENT].astype(int)
         points = own_steps[:, Recorded.POINT :]
     else:
-        reached = np.isfinite(outcome.samples[0, :, Point.STATE])
+        reached = np.isfinite(outcome.samples[0, :, Sampled.STATE])
         time, points = requested[reached], outcome.samples[0][reached]
         segment = segment_of(jobs.segments, np.zeros(len(time), dtype=int), time)
     lane = np.zeros(len(time), dtype=int)
@@ -175,7 +175,7 @@ def _history(
     )
 
 
-def _last_event(kind: str, jobs: Jobs, machine: Program, outcome: Outcome) -> Event:
+def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome) -> Event:
     """The end of a run that could not go on, as an event."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
     segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]

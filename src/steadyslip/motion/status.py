@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steadyslip.kernels.program import STATUSES
+from steadyslip.kernels.runner import STATUSES
 
 WORDS = (*STATUSES, "interrupted", "no steady sliding", "ill-posed", "out of range")
 

@@ -14,7 +14,7 @@ from steadyslip.files.output import write_columns
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
-from steadyslip.kernels.program import LOG_KINDS
+from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.motion.events import Event
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.observe import observable_units

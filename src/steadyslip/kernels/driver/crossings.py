@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steadyslip.kernels.driver.looking import look_back, look_now
 from steadyslip.kernels.driver.slip import note, outrun, quicken
-from steadyslip.kernels.layout import SLIP_EVENT, Array, Event, Kind, Layout, Out, Routines, Row
+from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
 
 
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
@@ -52,7 +52,7 @@ def follow(
     count = 0
     for e in range(layout.events if R[Row.HAPPENED] > 0.0 else 0):
         change = R[layout.happened + e]
-        if change != 0.0 and (e <= Event.CONTACT or log.shape[0] > 0):
+        if change != 0.0 and (e <= EventPlace.CONTACT or log.shape[0] > 0):
             kind = 2 * e + (2 if change > 0.0 else 1)
             order[count, 0], order[count, 1] = located(R, layout, routines, kind, y), kind
             count += 1
@@ -92,7 +92,7 @@ def crossed(
     """A jump from the velocity `before` can begin or end a slip event at once."""
     look_now(R, layout, routines, 0.0, y)
     v = y[layout.size + Out.V]
-    slipping = R[layout.mark + Event.SLIP] > 0.0
+    slipping = R[layout.mark + EventPlace.SLIP] > 0.0
     if slipping != was_slipping:
         note(R, layout, Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS, 0.0, y, log, cursor)
     if slipping and R[Row.NOW_EVENT] == 0.0 and before < min(v, R[Row.NOW_FROM]):

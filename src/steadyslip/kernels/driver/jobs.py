@@ -13,7 +13,7 @@ from steadyslip.kernels.layout import (
     MOST_FAILURES,
     Array,
     Cursor,
-    Event,
+    EventPlace,
     Final,
     Kind,
     Layout,
@@ -95,7 +95,7 @@ def start_job(
     R[Row.NOW_BEGIN] = math.nan
     R[Row.LOG] = 1.0 if log.shape[0] > 0 else 0.0
     R[Row.NOW_FROM] = math.inf
-    if R[Row.WATCH] > 0.0 and R[layout.mark + Event.SLIP] > 0.0:
+    if R[Row.WATCH] > 0.0 and R[layout.mark + EventPlace.SLIP] > 0.0:
         look_now(R, layout, routines, 0.0, y)
         note(R, layout, Kind.SLIP_BEGINS, 0.0, y, log, cursor)
     return True
@@ -153,7 +153,7 @@ def go_on(
         s = j if segments.shape[0] > 1 else 0
         if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
             return Status.DONE
-        h, before, slipping = R[Row.H], R[Row.V], R[layout.mark + Event.SLIP]
+        h, before, slipping = R[Row.H], R[Row.V], R[layout.mark + EventPlace.SLIP]
         if not enter_segment(R, layout, routines, j, k, segments, y):
             return Status.NO_VELOCITY
         await_sample(R, times)

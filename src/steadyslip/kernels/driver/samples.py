@@ -6,7 +6,7 @@ import math
 
 from steadyslip.kernels.driver.looking import between
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import Array, Cursor, Layout, Out, Point, Recorded, Routines, Row
+from steadyslip.kernels.layout import Array, Cursor, Layout, Out, Recorded, Routines, Row, Sampled
 
 BETWEEN = 3  # points that are recorded between the ends of a step whose dense output has stages of its own
 
@@ -38,9 +38,9 @@ def take_samples(
             if times[k] >= R[Row.STOP] or (tau >= R[Row.TAU] and not arrived):
                 break
             between(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
-        samples[row, k, Point.UNKNOWN] = y[layout.size + Out.UNKNOWN]
+        samples[row, k, Sampled.UNKNOWN] = y[layout.size + Out.UNKNOWN]
         for i in range(layout.size):
-            samples[row, k, Point.STATE + i] = y[i]
+            samples[row, k, Sampled.STATE + i] = y[i]
         k += 1
     R[Row.TAKEN] = k
     await_sample(R, times)

@@ -8,7 +8,7 @@ import numpy as np
 
 from steadyslip.kernels.driver.balance import solve_balance
 from steadyslip.kernels.driver.segments import begin_segment, set_inputs
-from steadyslip.kernels.layout import Array, Layout, Out, Point, Routines, Row, Setting, call
+from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Sampled, Setting, call
 
 
 def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
@@ -24,20 +24,20 @@ def place_point(R: Array, layout: Layout, routines: Routines, points: Array, m: 
 
     Where the point does not tell its unknown (NaN), what the record has is the guess.
     """
-    if math.isfinite(points[m, Point.UNKNOWN]):
-        R[Row.Z] = points[m, Point.UNKNOWN]
+    if math.isfinite(points[m, Sampled.UNKNOWN]):
+        R[Row.Z] = points[m, Sampled.UNKNOWN]
     for i in range(layout.size):
-        R[layout.state + i] = points[m, Point.STATE + i]
-        y[i] = points[m, Point.STATE + i]
+        R[layout.state + i] = points[m, Sampled.STATE + i]
+        y[i] = points[m, Sampled.STATE + i]
     if layout.solved:
         for i in range(layout.kept):
-            R[layout.continuous + i] = points[m, Point.STATE + i]
+            R[layout.continuous + i] = points[m, Sampled.STATE + i]
         near = R[Row.Z]
         R[Row.Z] = solve_balance(R, routines, near, y)
         if not math.isfinite(R[Row.Z]):
             R[Row.Z] = near
         for i in range(layout.size):  # what `solve_balance` left there
-            y[i] = points[m, Point.STATE + i]
+            y[i] = points[m, Sampled.STATE + i]
     y[layout.size + Out.UNKNOWN] = R[Row.Z]
 
 
@@ -72,7 +72,7 @@ def observe(
             R[Row.SEGMENT] = -1.0
             R[Row.LOAD_MOVED] = 0.0
         for i in range(layout.size):
-            R[layout.state + i] = points[m, Point.STATE + i]
+            R[layout.state + i] = points[m, Sampled.STATE + i]
         if R[Row.SEGMENT] > segment[m]:
             R[Row.SEGMENT] = -1.0
             R[Row.LOAD_MOVED] = 0.0

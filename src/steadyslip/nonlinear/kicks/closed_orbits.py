@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steadyslip.kernels.program import STATUSES
+from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.neighbourhood import rates_at
 from steadyslip.nonlinear.kicks.spans import Judged, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.flow import Runs as ConstantInputs

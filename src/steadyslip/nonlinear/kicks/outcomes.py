@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from steadyslip.kernels.program import STATUSES, TALLY
+from steadyslip.kernels.runner import STATUSES, TALLY
 from steadyslip.motion.jobs import automatic_method
 from steadyslip.nonlinear.kicks.closed_orbits import attracted, on_long_cycle
 from steadyslip.nonlinear.kicks.fold import at_fold

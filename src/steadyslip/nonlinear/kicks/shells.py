@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from steadyslip.kernels.program import STATUSES
+from steadyslip.kernels.runner import STATUSES
 from steadyslip.nonlinear.kicks.neighbourhood import LARGEST, rates_at
 from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, Judged, advanced_runs
 

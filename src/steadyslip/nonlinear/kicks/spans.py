@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from steadyslip.kernels.layout import Final
-from steadyslip.kernels.program import STATUSES, TALLY, Program
+from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.start import restored_of, velocity_at
@@ -183,7 +183,7 @@ def advanced_runs(
         jobs, point=point, initial=initial, velocity=speed,
         segments=constant_inputs(span, velocity, jump, pressure), size=len(which),
     )  # fmt: skip
-    machine: Program = jobs.program(LANES, dense=True)
+    machine: Runner = jobs.runner(LANES, dense=True)
     _ = machine.code.advance  # compile before the threads start
     count = len(which)
     found = Spans.empty(count, rest.state.shape[1])

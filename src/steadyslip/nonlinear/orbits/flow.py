@@ -15,8 +15,8 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
-from steadyslip.kernels.layout import Point
-from steadyslip.kernels.program import SETTINGS, Program, program
+from steadyslip.kernels.layout import Sampled
+from steadyslip.kernels.runner import SETTINGS, Runner, runner
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.reduction import V_LP, Reduction
@@ -48,8 +48,8 @@ class FlowFailure(Failure):
 
 
 @question
-def _with_sensitivities(reduction: Reduction, method: str) -> Program:
-    return Program(with_sensitivities(reduction), Choice(method, dense=False))
+def _with_sensitivities(reduction: Reduction, method: str) -> Runner:
+    return Runner(with_sensitivities(reduction), Choice(method, dense=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ class Runs:
         self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
-        self.machine = program(self.reduction.model, Choice(method), jobs.eliminate)
+        self.machine = runner(self.reduction.model, Choice(method), jobs.eliminate)
         self.sensitive = _with_sensitivities(self.reduction, method)
         self.steps, self._usual = 0, MOST_STEPS
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
@@ -204,7 +204,7 @@ class Runs:
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
     def _advanced(
-        self, machine: Program, constants: Array, settings: Array, initial: Array, inputs: Array, times: Array
+        self, machine: Runner, constants: Array, settings: Array, initial: Array, inputs: Array, times: Array
     ) -> Array:
         tables = (constants, np.ascontiguousarray(initial), settings, _rows(inputs, times))
         call = Call(machine, tables, len(times), np.empty(0))
@@ -223,7 +223,7 @@ class Runs:
         full = np.hstack([np.full((count, 1), np.nan), states, self._unit(count)])
         inputs = np.zeros((count, 7))
         inputs[:, :3] = setting.inputs
-        values = np.empty((count, full.shape[1] - Point.STATE))
+        values = np.empty((count, full.shape[1] - Sampled.STATE))
         own = np.zeros(count, dtype=np.int64)
         self.sensitive.code.field(*setting.varied, full, inputs, own, values)
         matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.kernels.layout import Point, Recorded
+from steadyslip.kernels.layout import Recorded, Sampled
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.flow import FlowFailure
 from steadyslip.nonlinear.orbits.shooting import Shooting
@@ -66,7 +66,7 @@ def measured(shooting: Shooting, u: Array) -> Measured:
         velocity.append(np.concatenate([outcome.log[:, 2], seen["v"]]))
         normal.append(np.concatenate([outcome.log[:, 3], seen["normal_stress"]]))
         spring.append(np.concatenate([outcome.log[:, 5], seen["spring_stress"]]))
-        back.append(outcome.samples[0, :, Point.STATE :])
+        back.append(outcome.samples[0, :, Sampled.STATE :])
         if len(velocity) == 1:
             start = {name: float(seen[name][0]) for name in [v.name for v in flow.reduction.model.variables] + ["v"]}
     v, t, sigma = (np.concatenate(part) for part in (velocity, spring, normal))

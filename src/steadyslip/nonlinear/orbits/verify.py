@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.layout import Recorded
-from steadyslip.kernels.program import LOG_KINDS
+from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.flow import FlowFailure, FlowSetting, Runs

@@ -19,11 +19,11 @@ from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.reduction import Reduction, reduce_model
 
 STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
-__all__ = ["LOG_KINDS", "SETTINGS", "STATUSES", "TALLY", "Program", "program"]
+__all__ = ["LOG_KINDS", "SETTINGS", "STATUSES", "TALLY", "Runner", "runner"]
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Runner:
     """One kernel of one model.
 
     Attributes
@@ -72,12 +72,12 @@ class Program:
 
 
 @question
-def _constants(point: OperatingPoint, machine: Program) -> np.ndarray:
+def _constants(point: OperatingPoint, machine: Runner) -> np.ndarray:
     return machine._table(point)
 
 
 @question
-def program(model: Model, choice: Choice, eliminate: int | None = 0) -> Program:
+def runner(model: Model, choice: Choice, eliminate: int | None = 0) -> Runner:
     """The kernel of a model; made once per process."""
     reduction = reduce_model(model, eliminate)
-    return Program(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Program(reduction, choice)
+    return Runner(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Runner(reduction, choice)

@@ -14,11 +14,12 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.core.quantities import outside, shown, shown_range
 from steadyslip.maps import Map, run_map
+from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.threshold import Threshold
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 AREA = 0.01
-PER_AREA = re.compile(r"\b[kMG]?Pa\b|kg/m\^?2|kg/m²")
+PER_AREA = re.compile(r"\b[kMGmun]?Pa\b|kg/m\^?2|kg/m²")
 
 
 @pytest.fixture(scope="module")
@@ -34,10 +35,18 @@ def words_of(axes):
 
 
 def test_one_place_knows_what_a_contact_has():
-    for unit in ("Pa", "Pa/m", "kg/m^2", "Pa s/m", "Pa/m/s"):
+    for unit in (
+        "Pa",
+        "Pa/m",
+        "kg/m^2",
+        "Pa s/m",
+        "Pa/m/s",
+        *(kick.unit for kick in KICKS.values() if "Pa" in kick.unit),
+    ):
         factor, total = outside(unit, AREA)
         assert factor == AREA
         assert shown(2.0 / AREA, unit, area=AREA) == shown(2.0, total)
+        assert not PER_AREA.search(total), total
         assert shown_range(1.0 / AREA, 2.0 / AREA, unit, AREA) == shown_range(1.0, 2.0, total)
     for unit in ("m/s", "s", "1", "rad", "1/m"):
         assert outside(unit, AREA) == (1.0, unit)

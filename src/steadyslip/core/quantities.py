@@ -311,7 +311,7 @@ def total_unit(unit_name: str) -> str:
     """Name of the unit of the total that belongs to a per-area unit."""
     _, dimension = unit(unit_name)
     wanted = dimension.times(_AREA)
-    for candidate in ("N", "N/m", "N s/m", "N/m/s", "kg"):
+    for candidate in ("N", "N/m", "N s/m", "N/m/s", "kg", "N s"):
         if unit(candidate)[1] == wanted:
             return candidate
     return f"{unit_name} m^2"

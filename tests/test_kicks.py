@@ -13,7 +13,12 @@ from kicks_at_random import KINDS, Reference, drawn, outcome_of
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.kicks import kicks as kicks_module, outcomes as outcomes_module, spans as spans_module
+from steadyslip.nonlinear.kicks import (
+    kicks as kicks_module,
+    outcomes as outcomes_module,
+    spans as spans_module,
+    threshold as threshold_module,
+)
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.closed_orbits import _attraction
 from steadyslip.nonlinear.kicks.fold import at_fold
@@ -564,6 +569,50 @@ def test_random_kicks_equal_scipy(kind):
         assert found in (truth, "undecided") or truth == "?", str(case)
         told += found == truth
     assert told >= 2
+
+
+CLOSE_TO_A_FOLD = ss.Slider(
+    friction=ss.LuGre(mu_coulomb=0.30885889, mu_static=0.4471462411, v_stribeck=3.173016221e-4, viscous=0.6422815173,
+                      bristle_stiffness=11754.66919, bristle_damping=7.284784178),
+    contact=ss.Constant(preload=5e6), stiffness=10145846886.0, drive=ss.Steady(1.253958662e-4),
+)  # fmt: skip
+
+
+def test_next_to_a_fold_small_kicks_return():
+    """Sliding is steady, and a hundredth slower the forces would no longer balance: the motion is not at that fold."""
+    found = Kicked(CLOSE_TO_A_FOLD, "normal-stress", 1, "before", {}, 0, None)
+    assert set(found.outcomes(np.zeros(24, dtype=int), np.geomspace(1e-6, 1e-3, 24)).tolist()) == {RETURNS}
+    rest = found.rest
+    assert at_fold(rest, rest.state).tolist() == [True]
+    assert at_fold(rest, rest.state, rest.unknown).tolist() == [False]
+    limit = ss.threshold(CLOSE_TO_A_FOLD, "normal-stress")
+    assert (limit.decided, limit.outcome) == (True, "no solution")
+    assert 0.9 < limit.size < 1.1
+
+
+def test_a_rig_that_survives_not_even_the_smallest_kick_ends_the_search(monkeypatch):
+    """However small the kick, it fails: the bracket goes down to nothing in a few rounds, not for ever."""
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", doubtful(0.0, 0.0, 0.0))
+    found = ss.threshold(tilted(0.3, 1.2), "displacement", precision=1e-3)
+    assert found.bracket[0] == 0
+    assert 0 < found.bracket[1] < 1e-6
+    assert found.outcome == "blow-up"
+
+
+def test_beyond_an_edge_near_the_end_of_the_range_it_is_looked_at_the_end(monkeypatch):
+    """Where all normal stress is nearly gone, a hundredth more would be more than there is."""
+    a_rig, tried = tilted(0.3, 1.2), []
+
+    def made(runs, threads=None, advanced=None):
+        size = -runs.rest.pressure / runs.rest.sigma
+        tried.append(float(np.max(size)))
+        return np.where(size < 0.995, RETURNS, BLOW_UP)
+
+    monkeypatch.setattr("steadyslip.nonlinear.kicks.kicks.outcomes_of", made)
+    monkeypatch.setattr(threshold_module, "edges", lambda *_: np.array([0.995]))
+    found = ss.threshold(a_rig, "normal-stress", direction=-1)
+    assert (found.edge, found.outcome) == (True, "blow-up")
+    assert tried[-1] == pytest.approx(0.999)
 
 
 def test_where_the_balance_has_no_fold_no_state_is_at_one():

@@ -125,7 +125,7 @@ def basin(
     """
     steady_states(rig)  # raises, and says why
     drive = rig.drive.velocity
-    options = options_for(operating_point(rig, branch=branch).model.inertial, rtol)
+    options = options_for(operating_point(rig, branch=branch).model, rtol)
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
     rest = rest_of(own, np.full(1, drive), np.zeros(1))
     if not rest.exists[0]:

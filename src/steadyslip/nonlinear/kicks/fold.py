@@ -14,11 +14,16 @@ Array = np.ndarray
 REACH = 60.0  # of ln(velocity/drive), to both sides, within which a fold is looked for,
 COUNT = 2401  # at so many velocities first
 BISECTIONS = 60
-NEAR = 1e-7  # force that is missing, as a share of the normal stress, at a state that has come to a fold
+NEAR = 1e-7  # force that is missing, as a share of the normal stress, at a state that has come to a fold,
+CLOSE = 1e-3  # and difference of ln(velocity/drive), where its own velocity is known
 
 
-def at_fold(rest: Rest, states: Array) -> Array:
-    """Whether states (m, n), one for each rig, are where two velocities that balance forces meet (m,)."""
+def at_fold(rest: Rest, states: Array, unknown: Array | None = None) -> Array:
+    """Whether states (m, n), one for each rig, are where two velocities that balance forces meet (m,).
+
+    `unknown` (m,) is that of the balance at the states, NaN where it is lost: next to a fold forces may balance at a
+    velocity that is not at it.
+    """
     if rest.reduction.unknown is None or rest.reduction.model.inertial:
         return np.zeros(len(states), dtype=bool)
     turns = np.linspace(-REACH, REACH, COUNT)
@@ -32,8 +37,10 @@ def at_fold(rest: Rest, states: Array) -> Array:
             falls = _balance(part, where, middle[:, None])[1][:, 0] < 0
             low, high = np.where(falls == rising, middle, low), np.where(falls == rising, high, middle)
         missing = np.abs(_balance(part, where, low[:, None])[0][:, 0])
+        own = np.full(len(states), np.nan) if unknown is None else unknown
+        own = np.arcsinh(own / rest.velocity) if rest.reduction.velocity == "linear" else own
     found = np.zeros(len(states), dtype=bool)
-    found[which[missing < NEAR * part.sigma]] = True
+    found[which[(missing < NEAR * part.sigma) & ~(np.abs(own[which] - low) > CLOSE)]] = True
     return found
 
 

@@ -14,13 +14,15 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.machine.slider import Slider
+from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
+from steadyslip.model.reduction import reduce_model
 from steadyslip.model.start import initial_values
-from steadyslip.motion.jobs import Jobs, Options, prepare
+from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
-from steadyslip.nonlinear.kicks.spans import Budget, Judged, continuous_at
+from steadyslip.nonlinear.kicks.spans import STIFF, Budget, Judged, continuous_at
 
 Array = np.ndarray
 PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself
@@ -61,9 +63,13 @@ KICKS = {
 }
 
 
-def options_for(inertial: bool, rtol: float | None) -> Options:
-    """How kicked motion is integrated."""
-    return Options(rtol=rtol or (1e-8 if inertial else 1e-10), most_steps=400_000)
+def options_for(model: Model, rtol: float | None) -> Options:
+    """How kicked motion is integrated: less finely with mass or bristles, which need a Rosenbrock method.
+
+    Rounding in the force of stiff bristles is more than the finer tolerance allows.
+    """
+    stiff = automatic_method(reduce_model(model)) == STIFF
+    return Options(rtol=rtol or (1e-8 if stiff else 1e-10), most_steps=400_000)
 
 
 class Kicked:
@@ -119,7 +125,7 @@ class Kicked:
         if values.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no steady sliding to return to")
         self.size = max(values.size, 1)
-        self.jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model.inertial, rtol), branch)
+        self.jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model, rtol), branch)
         named = values.named()
         self.drive = np.broadcast_to(np.asarray(named["drive.velocity"], dtype=float), (self.size,))
         self.mass = np.broadcast_to(np.asarray(named.get("slider.mass", 0.0), dtype=float), (self.size,))

@@ -23,7 +23,7 @@ import numpy as np
 from steadyslip.nonlinear.kicks.rest import Rest, field_of
 
 Array = np.ndarray
-LARGEST, SMALLEST = 4.0, 1e-9  # radius, in natural sizes of the weakest mode
+LARGEST, SMALLEST = 4.0, 1e-12  # radius, in natural sizes of the weakest mode
 SHRINK = 0.6
 LONG = 30.0  # natural sizes of slip per natural size of all else, beyond which a mode is measured by all else
 SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions

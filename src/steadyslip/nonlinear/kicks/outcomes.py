@@ -30,6 +30,7 @@ from steadyslip.nonlinear.kicks.spans import (
     OSCILLATION,
     RETURNS,
     SPENT,
+    STIFF,
     STUCK,
     UNSEEN,
     Judged,
@@ -47,7 +48,6 @@ ALIKE = 1e-2  # relative change of the time between slip events from span to spa
 PEAKS = 40  # of velocity in the last span of irregular motion,
 HIGHER = 0.01  # by this share of ln(velocity/drive) they may be higher than all before,
 LEFT = 30.0  # and so many growth times of unstable steady sliding it has gone on for
-STIFF = "rodas4"  # the method for motions that an explicit one needs too many steps for
 CODE = {word: number for number, word in enumerate(STATUSES)}
 
 
@@ -222,7 +222,7 @@ def _seen(runs: Judged, which: Array, ended: Spans) -> Array:
     many = status == CODE["too many steps"]
     limited = np.flatnonzero((status == CODE["stuck"]) | many)
     if len(limited):  # the integrator's limits, or no solution
-        folded = at_fold(runs.rest.part(which[limited]), ended.state[limited])
+        folded = at_fold(runs.rest.part(which[limited]), ended.state[limited], ended.unknown[limited])
         lost = ~np.all(np.isfinite(ended.state[limited]), axis=1)
         further = np.where(many[limited], np.where(lost, EXHAUSTED, OPEN), STUCK)
         found[limited[~folded]] = further[~folded]

@@ -36,6 +36,7 @@ CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 """Outcomes that are not a return."""
 OPEN = -1
 
+STIFF = "rodas4"  # the method for stiff motions, among them those that an explicit one needs too many steps for
 LOADING = 40.0  # natural lengths that the load point moves at least, to take up what a kick has let go,
 TURNS = 3.0  # natural periods,
 DECAYS = 6.0  # and decay times in the first span of a run; each span is twice as long as the one before

@@ -172,7 +172,7 @@ def threshold(
     precision : float, optional
         Relative width of the bracket.
     rtol : float, optional
-        Error allowed per step of integration; 1e-10, with mass 1e-8, unless given.
+        Error allowed per step of integration; 1e-10, with mass or bristles 1e-8, unless given.
     branch : int, optional
         Which steady sliding, where there are several.
     progress : callable, optional
@@ -245,13 +245,15 @@ class _Search:
         sizes = np.geomspace(self.kicked.kick.low, self.kicked.highest, COARSE)
         self.edge = self.high = float(edges(self.kicked, np.zeros(1, dtype=int), sizes)[0])
         self._scan(sizes[sizes < self.edge])
-        while self.high - self.low > precision * self.high and np.isfinite(self.high):
+        least = precision * self.kicked.kick.low  # smaller kicks, where even they fail, are none
+        while np.isfinite(self.high) and self.high - self.low > max(precision * self.high, least):
             width = self.high - self.low
             self._narrow(self.low + width * np.arange(1, FINE + 1) / (FINE + 1), PATIENCE)
             if self.high - self.low > 0.5 * width:
                 break
-        if self.at_edge and self.high * BEYOND <= self.kicked.highest:
-            found = int(self._outcomes(np.array([self.high * BEYOND]), PATIENCE)[0])
+        beyond = min(BEYOND * self.high, self.kicked.highest)
+        if self.at_edge and beyond > self.high:
+            found = int(self._outcomes(np.array([beyond]), PATIENCE)[0])
             if found == INTERRUPTED:
                 raise KeyboardInterrupt
             self.outcome = LATE if found == RETURNS else found  # neutral sliding is no return there

@@ -15,6 +15,7 @@ import numpy as np
 from steadyslip.kernels.nodes import Node, larger, select, smaller
 
 ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer that sits in the low bits
+_DOUBLE, _LONG = struct.Struct("<d"), struct.Struct("<q")
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 
 
@@ -22,15 +23,20 @@ def bits(x: Any) -> Any:
     """The 64 bits of a float as an integer."""
     if isinstance(x, Node):
         return Node("bits", (x,), "int")
-    return int(struct.unpack("<q", struct.pack("<d", x))[0])
+    return _LONG.unpack(_DOUBLE.pack(x))[0]
 
 
 def real(i: Any) -> Any:
     """The float with the 64 bits of an integer."""
     if isinstance(i, Node):
         return Node("real", (i,))
-    number = struct.unpack("<d", struct.pack("<q", (i + 2**63) % 2**64 - 2**63))[0]
+    number = _DOUBLE.unpack(_LONG.pack((i + 2**63) % 2**64 - 2**63))[0]
     return np.float64(number)  # division by zero gives infinity, as in machine code
+
+
+def _quick(x: Any) -> Any:
+    """Numbers as Python's own, with which it computes several times as fast as with NumPy's."""
+    return x if isinstance(x, Node) else float(x)
 
 
 def as_float(i: Any) -> Any:
@@ -47,6 +53,7 @@ def sqrt(x: Any) -> Any:
 
 def exp(x: Any) -> Any:
     """e^x; saturates at e^±700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme."""
+    x = _quick(x)
     shifted = x * 1.4426950408889634 + ROUND
     n = shifted - ROUND
     r = (x - n * LN2_HIGH) - n * LN2_LOW
@@ -74,6 +81,7 @@ def expm1(x: Any) -> Any:
 
 def log(x: Any) -> Any:
     """ln x; NaN below zero, about -708 at 0 (so that v ln v is 0 at rest)."""
+    x = _quick(x)
     y = larger(x, 2.2250738585072014e-308)
     i = bits(y) - 4604544271217802189  # sqrt(1/2): leaves a mantissa in [sqrt(1/2), sqrt(2))
     k = i >> 52

@@ -645,7 +645,7 @@ def test_files_and_figure(damped, tmp_path):
         ({"along": "stifness"}, "stiffness"),
         ({"between": (1.0, 2.0)}, "must contain the edge"),
         ({"between": (2.0, 1.0)}, "low < high"),
-        ({"amplitude": 3.0}, "above 0"),
+        ({"amplitude": 3.0}, "up to 0.1"),
     ],
 )
 def test_bad_arguments_are_named(damped, options, message):

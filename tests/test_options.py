@@ -143,7 +143,7 @@ LEFT = {  # parameters that their functions check themselves, with words of thei
     "paths", "over", "of", "x", "v", "step", "fixed", "free", "separate", "weights", "folder", "area", "conditions",
     "candidates", "compute", "cluster", "normal_stress", "sampling", "rate", "time", "friction", "shear", "normal",
     "displacement", "velocity", "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick",
-    "precision", "rtol", "amplitude", "doublings", "most_points", "method", "points",
+    "precision", "rtol", "amplitude", "doublings", "most_points", "method", "points", "result",
 }  # fmt: skip
 PUBLIC = {
     name: getattr(ss, name) for name in dir(ss) if inspect.isfunction(getattr(ss, name)) and name not in DECLARE

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,12 @@ __all__ = ["Report", "brief", "report"]
 
 @checked(title=NAME)
 def report(
-    result: Any, *, title: str = "steadyslip report", explorer: bool = True, source: Path | None = None, **options: Any
+    result: Any,
+    *,
+    title: str = "steadyslip report",
+    explorer: bool = True,
+    source: str | PathLike[str] | None = None,
+    **options: Any,
 ) -> Report:
     """A printable document about a rig or a result.
 
@@ -48,7 +54,9 @@ def report(
     NotAvailable
         If the numbers of the rig leave the range of floating point.
     """
-    return Report(put_together(parts_of(result, **options), title, explorer, source), title)
+    return Report(
+        put_together(parts_of(result, **options), title, explorer, None if source is None else Path(source)), title
+    )
 
 
 def _whole(result: Any, **options: Any) -> str:

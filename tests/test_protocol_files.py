@@ -137,7 +137,7 @@ def test_a_bad_number_brings_no_second_problem():
         ("protocol = 3", "protocol", "a table [protocol]"),
         ("[protocoll]", "protocoll", "did you mean 'protocol'?"),
         ("[protocol]\npieces = [{kind = 3}]", "protocol.pieces.1.kind", "unknown protocol piece 3"),
-        (EXPERIMENT.replace("[0, \"1 min\"]", "[0, 'x']"), "protocol.pieces.2.time", "value 2: 'x' is not a quantity in s"),
+        (EXPERIMENT.replace('[0, "1 min"]', "[0, 'x']"), "protocol.pieces.2.time", "'x' is not a quantity in s"),
         (EXPERIMENT.replace("[0, \"1 min\"]", "[0, -1]"), "protocol.pieces.2.time", "value 2: got -1.0 after 0.0"),
         (EXPERIMENT.replace("time = [0, \"1 min\"]", ""), "protocol.pieces.2.time", "a list of numbers in s"),
         (EXPERIMENT + "[[protocol.pieces]]\nkind='hold'\nat=5\nduration=1", "protocol.pieces.3", "starts at 5 s, bef"),

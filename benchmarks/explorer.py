@@ -2,15 +2,20 @@
 
     python benchmarks/explorer.py verdicts [--first N]
     python benchmarks/explorer.py motion [--first N]
+    python benchmarks/explorer.py page
 
 Each kind of rig is judged at its own numbers and with some of them changed; each is moved through a velocity step.
-Printed are the kinds that differ, how many there were, and the largest differences.
+Printed are the kinds that differ, how many there were, and the largest differences. `page` opens pages of examples in
+Chromium: milliseconds until the verdict is there and painted, of redrawing while sliders move (script alone, and until
+the frame is out; median and 95 %), the same on a phone whose processor is four times slower; and of twenty stick-slip
+cycles in its engine.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import random
 import sys
 import time
@@ -20,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 import steadyslip as ss
 from explored import Explored, compared
@@ -96,11 +102,108 @@ def motion(first: int) -> None:
     print(f"the integration error; {events} begins and ends of slip, largest share of that {worst:.2g}")
 
 
+WATCH = """new MutationObserver((_, observer) => {
+  if (!document.querySelector("h1")?.textContent) return;
+  performance.mark("verdict");
+  observer.disconnect();
+}).observe(document, { subtree: true, childList: true, characterData: true });"""
+OPENED = """[performance.getEntriesByName("verdict")[0].startTime,
+  performance.getEntriesByName("first-contentful-paint")[0].startTime]"""
+SLIDE = """async () => {
+  const frame = () => new Promise(requestAnimationFrame), script = [], painted = [];
+  const after = () => new Promise((done) => {
+    const { port1, port2 } = new MessageChannel();
+    port1.onmessage = done;
+    port2.postMessage(0);
+  });
+  for (const slider of [...document.querySelectorAll(".row input[type=range]")]) {
+    const own = Number(slider.value);
+    for (let n = 0; n < 12; n++) {
+      await frame();
+      slider.value = String(own + (n - 6) * 8);
+      const began = performance.now();
+      slider.dispatchEvent(new Event("input"));
+      script.push(performance.now() - began);
+      await frame();
+      await after();
+      painted.push(performance.now() - began);
+    }
+    slider.dispatchEvent(new Event("change"));
+    await new Promise((done) => setTimeout(done, 300));
+  }
+  return [script, painted];
+}"""
+
+
+def page(_: int) -> None:
+    """How long a page takes, in milliseconds."""
+    import subprocess
+    import tempfile
+
+    from browser import chromium, driver
+
+    folder = Path(tempfile.mkdtemp())
+    with driver() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+        for name in ("inclined-spring", "stick-slip", "two-states", "slow-axis"):
+            began = time.perf_counter()
+            written = folder / f"{name}.html"
+            command = [sys.executable, "-m", "steadyslip", "explore", EXAMPLES / f"{name}.toml", "-o", written]
+            subprocess.run(command, check=True, capture_output=True)
+            made = time.perf_counter() - began
+            print(f"{name}: made in {made:.1f} s, {written.stat().st_size / 1e3:.0f} kB")
+            for width, height, slower in ((1440, 900, 1), (360, 740, 4)):
+                tab = browser.new_page(viewport={"width": width, "height": height})
+                tab.add_init_script(WATCH)
+                session = tab.context.new_cdp_session(tab)
+                session.send("Emulation.setCPUThrottlingRate", {"rate": slower})
+                tab.goto(written.as_uri())
+                tab.wait_for_function("document.querySelector('.steadyslip').dataset.ready")
+                tab.wait_for_timeout(1500)
+                verdict, paint = tab.evaluate(OPENED)
+                script, painted = (np.array(one) for one in tab.evaluate(SLIDE))
+                told = ", ".join(
+                    f"{what} {np.median(one):.1f} and {np.percentile(one, 95):.1f}"
+                    for what, one in (("script", script), ("frame", painted))
+                )
+                print(f"  {width} px, {slower} times slower: verdict {verdict:.0f}, painted {paint:.0f}; {told}")
+                tab.close()
+        browser.close()
+    _twenty_cycles()
+
+
+def _twenty_cycles() -> None:
+    """Twenty damped stick-slip cycles in the engine of the tests, the fastest of several runs."""
+    from javascript import Script
+    from steadyslip.explorer.motion import driver, motion_part
+    from steadyslip.kernels.printers import javascript
+    from steadyslip.linear.boundary import present_zeros
+    from steadyslip.model.point import operating_point
+    from test_explorer import motion_text
+
+    rig = ss.read_rig(EXAMPLES / "stick-slip.toml")
+    text, facts = motion_part(rig, 0)
+    base = f"{javascript.as_script(javascript.runtime(), driver())}\n{motion_text()}"
+    made = f"new Motion({text}, {json.dumps(facts)}, {{ advance, observe }})"
+    script = Script(f"{base}\nconst motion = {made};\nlet found = null;\nconst pause = async () => {{}};")
+    point = operating_point(rig, None, [name for name in present_zeros(rig) if name not in facts["missing"]])
+    ask = "(motion.set(values, sigma).run(asked, () => '', pause).then((r) => (found = r)), 0)"
+    asked = {"disturbance": "velocity", "size": 2, "at": 10.0, "until": 750.0}
+    given = {"values": [float(v) for v in point.arguments], "sigma": float(point.sigma), "asked": asked}
+    times = []
+    for _ in range(12):
+        began = time.perf_counter()
+        script(ask, **given)
+        times.append(1e3 * (time.perf_counter() - began))
+    cycles = len(script("found.events"))
+    print(f"{cycles} cycles: {min(times):.1f} ms, {20 * min(times) / cycles:.1f} ms for twenty")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("verdicts", "motion"))
+    parser.add_argument("what", choices=("verdicts", "motion", "page"))
     parser.add_argument("--first", type=int, default=10**6, help="kinds of rig, of those drawn first")
     given = parser.parse_args()
     began = time.process_time()
-    {"verdicts": verdicts, "motion": motion}[given.what](given.first)
+    {"verdicts": verdicts, "motion": motion, "page": page}[given.what](given.first)
     print(f"{time.process_time() - began:.0f} CPU s")

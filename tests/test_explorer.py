@@ -1,6 +1,7 @@
 """The explorer: its equations say in JavaScript what they say in Python, and its page holds what it promises."""
 
 import json
+import re
 from importlib.resources import files
 
 import numpy as np
@@ -14,6 +15,7 @@ from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.roles import positive
+from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import driver, motion_part
 from steadyslip.kernels.printers import javascript
@@ -184,6 +186,51 @@ def test_conditions_between_numbers_are_checked():
 def test_what_cannot_be_printed_is_refused_in_words():
     with pytest.raises(ss.NotAvailable, match=r"atan\(\.\.\.\)"):
         linear_part(rig(contact=Turning(preload=SIGMA)))
+
+
+# -- links and files
+
+OWN = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
+TEXT = st.text(max_size=200) | st.lists(
+    st.tuples(st.sampled_from(["friction.a", "contact.angle", "slider.stiffness", "__proto__", "constructor", "a=b"]),
+              st.text(max_size=20) | st.floats().map(repr)).map("=".join), max_size=5).map("&".join)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def page_of_own():
+    """The Rig of a page, as it is on the page."""
+    code, known = parts(OWN, "A rig", 0)
+    made = f"const known = {json.dumps(known)};\nconst rig = new Rig(known, programs);"
+    return Script(f"{code}\n{made}"), known
+
+
+@settings(max_examples=150, deadline=None)
+@given(text=TEXT)
+def test_links_bring_only_what_a_rig_may_have(page_of_own, text):
+    """Whatever stands in an address: numbers of the rig's own parameters, inside their domains, or nothing at all."""
+    script, known = page_of_own
+    values = script("rig.fromHash('#' + text)", text=text)
+    names = [one["name"] for one in known["parameters"]]
+    assert len(values) == len(names)
+    OWN.with_values(dict(zip(names, values, strict=True)))  # raises where a value is not allowed
+    said = [part.split("=") for part in text.split("&") if re.fullmatch(r"[^=]+=-?\d[\d.eE+-]*", part)]
+    for one, value in zip(known["parameters"], values, strict=True):
+        if value != one["value"]:
+            assert float(value) in [float(number) for name, number in said if name == one["name"]]
+
+
+@settings(max_examples=60, deadline=None)
+@given(a=st.floats(1e-4, 1), k=st.floats(1e6, 1e13), psi=st.floats(-0.9, 1.4))
+def test_links_and_files_keep_every_digit(page_of_own, a, k, psi):
+    """The critical stiffness of the file that a page writes is that of its values, and a link brings all of them."""
+    script, known = page_of_own
+    own = OWN.with_values({"friction.a": a, "slider.stiffness": k, "contact.angle": psi})
+    values = [float(own.value(one["name"])) for one in known["parameters"]]
+    link, text = script("(rig.values = values, [rig.hash().slice(1), rig.toml()])", values=values)
+    assert script("rig.fromHash(link)", link=link) == values
+    again = ss.rig_from_text(text)
+    assert again == own
+    assert ss.analyze(again).critical_stiffness == ss.analyze(own).critical_stiffness
 
 
 # -- motion

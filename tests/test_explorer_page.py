@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
@@ -14,6 +15,7 @@ from rigs_of_theory import ONE_MEMORY, SIGMA, rate_state, rig
 
 pytestmark = pytest.mark.slow  # a browser works in processes of its own, whose seconds are not measured
 INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
+MOVED = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=3e9)
 SIZES = [(360, 740), (390, 844), (768, 1024), (1280, 800), (1920, 1080)]
 
 
@@ -362,12 +364,14 @@ def own_time(visit, run):
 
 
 STOP = """() => new Promise((done) => {
-  const [told, length] = [document.querySelector(".told"), document.querySelector("[aria-label='length of the run']")];
+  const stop = [...document.querySelectorAll("button")].find((one) => one.textContent === "stop");
+  const length = document.querySelector("[aria-label='length of the run']");
   length.value = "100 yr";
   length.dispatchEvent(new Event("change"));
+  const began = performance.now();
   const look = () => {
-    if (!told.textContent.includes(" of ")) return setTimeout(look, 1);
-    [...document.querySelectorAll("button")].find((one) => one.textContent === "stop").click();
+    if (stop.disabled && performance.now() < began + 5000) return setTimeout(look);
+    stop.click();
     setTimeout(done, 100);
   };
   look();
@@ -398,6 +402,79 @@ def test_other_rigs_have_pages_too(browser, tmp_path, name):
     again = ss.rig_from_text(text)
     assert ss.analyze(again).critical_stiffness == analysis.critical_stiffness
     assert ss.analyze(again).eigenvalues == analysis.eigenvalues
+
+
+AXE = """async () => (await axe.run()).violations.filter((one) => ["serious", "critical"].includes(one.impact))
+  .map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 100)}`)"""
+
+
+@pytest.mark.parametrize("kind", ["explorer", "report"])
+def test_axe_finds_nothing_serious(browser, tmp_path, kind):
+    core = pytest.importorskip("axe_playwright_python", reason="axe-core is not installed")
+    made = ss.explore(MOVED) if kind == "explorer" else ss.report(MOVED)
+    made.save(tmp_path / "page.html")
+    script = Path(core.__file__).with_name("axe.min.js").read_text(encoding="utf-8")
+    for width, scheme in ((360, "dark"), (1280, "light")):
+        options = {"viewport": {"width": width, "height": 900}, "color_scheme": scheme}
+        with Visit(browser, tmp_path / "page.html", **options) as visit:
+            visit.told("slip event")
+            visit.page.locator(".events summary").click()
+            visit.page.evaluate(script)
+            assert visit.page.evaluate(AXE) == []
+
+
+def test_reports_ask_for_nothing_fit_every_width_and_print_without_the_explorer(browser, tmp_path):
+    path = tmp_path / "report.html"
+    ss.report(MOVED).save(path)
+    for width in (360, 768, 1920):
+        with Visit(browser, path, viewport={"width": width, "height": 900}) as visit:
+            assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
+            assert [one for one in visit.requests if not one.startswith(("blob:", "data:"))] == [path.as_uri()]
+            assert visit.page.locator(".steadyslip-root").is_visible()
+            visit.page.emulate_media(media="print")
+            assert not visit.page.locator(".steadyslip-root").is_visible()
+            assert visit.page.get_by_role("heading", name="How far is the edge?").is_visible()
+
+
+MODEL = """const listeners = [], state = { values: start };
+const model = {
+  get: (name) => state[name],
+  set: (name, value) => (state[name] = value),
+  save_changes: () => (window.saved = { ...state.values }),
+  on: (_, f) => listeners.push(f),
+};
+window.put = (values) => {
+  state.values = { ...state.values, ...values };
+  listeners.forEach((f) => f());
+};
+kind.render({ model, el: document.body });"""
+
+
+def test_a_widget_sends_its_values_and_takes_those_of_python(browser, tmp_path):
+    """What anywidget does in a notebook, done here: the module is loaded, a model given to it."""
+    pytest.importorskip("anywidget", reason="anywidget is not installed")
+    shown = ss.explore(INCLINED).widget()
+    assert shown.rig == INCLINED
+    code = shown._esm.replace("export default", "const kind =")
+    start = f"const start = {json.dumps(shown.values)};"
+    text = f"<body><style>{shown._css}</style><script type=module>{code}\n{start}\n{MODEL}</script></body>"
+    (tmp_path / "widget.html").write_text(f"<!doctype html><meta charset=utf-8>{text}", encoding="utf-8")
+    with Visit(browser, tmp_path / "widget.html") as visit:
+        assert visit.sentence().startswith("Unstable")
+        visit.type("slider.stiffness", "90 GPa/m")
+        saved = visit.page.evaluate("window.saved")
+        assert saved["slider.stiffness"] == 9e10
+        visit.page.evaluate("put({ 'slider.stiffness': 9e9 })")
+        assert visit.sentence().startswith("Unstable")
+        assert visit.page.evaluate("location.hash") == ""
+        assert visit.page.get_by_role("button", name="copy a link").count() == 0
+    shown.values = saved
+    assert shown.rig == INCLINED.with_values({"stiffness": 9e10})
+    assert ss.analyze(shown.rig).stable
+    shown.values = {"friction.a": 0.013}
+    assert shown.rig.friction.a == 0.013
+    with pytest.raises(ss.ParameterError, match=r"a: got -1\.0"):
+        shown.values = {"friction.a": -1.0}
 
 
 def test_the_command_writes_the_page(tmp_path):

@@ -1,7 +1,11 @@
 """The same programs and the same driver as JavaScript: they do what they do in Python."""
 
 import math
+import os
+import shutil
 import struct
+import subprocess
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -96,6 +100,16 @@ def test_numbers_survive_the_text(runtime):
     found = runtime(f"[{', '.join(map(javascript.literal, numbers))}]")
     assert np.array_equal(np.array(found, dtype=float), np.array(numbers), equal_nan=True)
     assert runtime(f"Object.is({javascript.literal(-0.0)}, -0)")
+
+
+def test_modules_have_the_types_that_they_say():
+    """JSDoc types of the page's modules, checked by TypeScript where it is."""
+    compiler = os.environ.get("STEADYSLIP_TSC") or shutil.which("tsc")
+    if compiler is None:
+        pytest.skip("there is no TypeScript here (npm install typescript)")
+    settings = files("steadyslip.explorer.web").joinpath("tsconfig.json")
+    found = subprocess.run([compiler, "-p", str(settings)], capture_output=True, text=True)
+    assert found.returncode == 0, found.stdout
 
 
 def test_modules_in_one_scope_must_not_share_names():

@@ -1,52 +1,19 @@
-"""One HTML file from one rig: equations, numbers, modules and style put together; it asks for nothing from outside."""
+"""The page of one rig, and what a user does with it."""
 
 from __future__ import annotations
 
 import html
-import json
-import math
-import re
 import tempfile
 import webbrowser
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable
 from steadyslip.core.options import BRANCH, NAME, checked
-from steadyslip.core.quantities import outside
-from steadyslip.core.records import Address, twin
-from steadyslip.explorer.equations import linear_part
-from steadyslip.explorer.motion import driver, motion_part
-from steadyslip.explorer.sketch import sketch
+from steadyslip.explorer.assembly import page
 from steadyslip.files.output import whole_file
-from steadyslip.files.specifications.write import rig_to_text
-from steadyslip.kernels.printers import javascript
-from steadyslip.linear.boundary import present_zeros
-from steadyslip.linear.search import Search
-from steadyslip.linear.status import STABLE, UNKNOWN, UNSTABLE, status
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import operating_point
-from steadyslip.verdict.analyze import linear_numbers
-
-MODULES = (
-    "dom", "quantities", "polynomials", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map", "locus",
-    "facts", "mover", "sketch", "course", "leaving", "page",
-)  # fmt: skip
-"""Modules of the page, each after those that it imports."""
-LIBRARY = ("motion",)
-"""Modules that a worker needs too, with the runtime and the driver: the page hands it their text."""
-POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data:; worker-src blob:; "
-    "base-uri 'none'; form-action 'none'"
-)
-"""What the page may ask for: nothing but itself; workers and pictures are made of its own text."""
-_SENTINEL = 1.2345678901e-211  # first of the numbers that stand for values in the template of a rig file
 
 
 @dataclass(frozen=True)
@@ -58,10 +25,14 @@ class Explorer:
     html : str
         The whole file.
     title : str
+    rig : Slider
+    branch : int
     """
 
     html: str = field(repr=False)
     title: str
+    rig: Slider = field(repr=False)
+    branch: int = field(default=0, repr=False)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the file.
@@ -82,6 +53,18 @@ class Explorer:
             to.write(self.html)
         webbrowser.open(Path(to.name).as_uri())
         return Path(to.name)
+
+    def widget(self) -> Any:
+        """The same as a widget for notebooks, with its values: ``widget.values``, ``widget.rig``.
+
+        Raises
+        ------
+        NotAvailable
+            If anywidget is not installed.
+        """
+        from steadyslip.explorer.widget import widget
+
+        return widget(self.rig, self.title, self.branch)
 
     def _repr_html_(self) -> str:
         """The page in a frame of its own, for notebooks."""
@@ -112,181 +95,4 @@ def explore(rig: Slider, *, title: str = "rig", branch: int = 0) -> Explorer:
     NotAvailable
         If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
     """
-    return Explorer(page(rig, title, branch), title)
-
-
-def page(rig: Slider, title: str, branch: int) -> str:
-    """The text of the file."""
-    return document(f"{title} – steadyslip", style(), fragment(rig, title, branch))
-
-
-def document(title: str, styles: str, body: str) -> str:
-    """A file that asks for nothing from outside."""
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{html.escape(title)}</title>\n<style>\nbody {{ margin: 0; }}\n{styles}</style>\n</head>\n"
-        f"<body>\n{body}</body>\n</html>\n"
-    )
-
-
-def style() -> str:
-    """The style of a `fragment`."""
-    return _web("style.css")
-
-
-def fragment(rig: Slider, title: str, branch: int) -> str:
-    """The explorer as a part of a document; several may be in one.
-
-    Raises
-    ------
-    NotAvailable
-        If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
-    """
-    text, facts = linear_part(rig)
-    machine, driven, moving, still = "null", "const advance = null, observe = null;", None, ""
-    try:
-        machine, moving = motion_part(rig, branch)
-        driven = driver()
-    except NotAvailable as refused:  # the verdict can be shown all the same
-        still = str(refused)
-    modules = [_web(f"{name}.js") for name in MODULES]
-    library = [_web(f"{name}.js") for name in LIBRARY]
-    script = _narrow(javascript.as_script(javascript.runtime(), *modules))
-    worker = _narrow(javascript.as_script(javascript.runtime(), *library, driven))
-    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still, "sketch": sketch(rig)}
-    data = json.dumps(known, ensure_ascii=False, allow_nan=False)
-    for letter in "<>&\u2028\u2029":  # nothing in a rig can end the element that its data are in
-        data = data.replace(letter, f"\\u{ord(letter):04x}")
-    return (
-        '<div class="steadyslip-root"></div>\n'
-        f'<script type="application/json" class="steadyslip-data">{data}</script>\n'
-        f'<script>\n"use strict";\n(() => {{\n{script}\nconst programs = {_narrow(text)};\n'
-        f"const library = () => {{\n{worker}\nconst machine = {_narrow(machine)};\n"
-        "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
-        "const place = document.currentScript.previousElementSibling;\n"
-        "mount(place.previousElementSibling, JSON.parse(place.textContent), programs, library);\n"
-        "})();\n</script>\n"
-    )
-
-
-def _web(name: str) -> str:
-    return files("steadyslip.explorer.web").joinpath(name).read_text(encoding="utf-8")
-
-
-def _narrow(text: str) -> str:
-    """Code without indentation and lines of comment, a fifth of its length; no string goes over several lines."""
-    bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
-    return re.sub(r"^ +", "", bare, flags=re.M)
-
-
-def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything about a rig but its equations."""
-    from steadyslip import __version__
-
-    names = list(_varied(rig, facts))
-    places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
-    point = operating_point(rig, None, present_zeros(rig), branch)
-    axial = "slider.axial_stiffness"
-    stiffness = axial if axial in names else rig.stiffness_name()
-    return {
-        "title": title,
-        "version": __version__,
-        "branch": branch,
-        "area": rig.area,
-        "parameters": [_parameter(rig, name, branch) for name in names],
-        "facts": dict(facts),
-        "places": places,
-        "fixed": [float(np.asarray(value)) for value in point.arguments],
-        "axial": names.index(axial) if axial in names else -1,
-        "speed": "drive.velocity",
-        "stiffness": stiffness if stiffness in names else None,
-        "toml": _template(rig, names),
-        "checks": _checks(rig, names, branch),
-    }
-
-
-def _varied(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Address]:
-    """The parameters that a page can vary: those in the equations that matter to the verdict.
-
-    An axial stiffness stands in place of that along the sliding.
-    """
-    known = set(facts["parameters"]) - {"slider.stiffness"} | {"slider.axial_stiffness"}
-    if rig.axial_stiffness is None and rig.stiffness is not None:
-        known |= {"slider.stiffness"}
-    return {
-        name: one
-        for name, one in rig.parameters().items()
-        if name in known and one.value is not None and not one.role.gauge
-    }
-
-
-def _parameter(rig: Slider, name: str, branch: int) -> dict[str, Any]:
-    one = rig.parameters()[name]
-    domain, value = one.role.domain, float(one.value or 0.0)
-    factor, unit = outside(one.role.unit, rig.area)
-    natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
-    return {
-        "name": name,
-        "label": name.rpartition(".")[2],
-        "doc": one.role.doc,
-        "unit": unit,
-        "factor": factor,
-        "value": value,
-        "natural": natural if math.isfinite(natural) else 1.0,
-        "low": domain.low if math.isfinite(domain.low) else None,
-        "high": domain.high if math.isfinite(domain.high) else None,
-        "lowAllowed": domain.low_allowed and not (one.role.adds_state and domain.low == 0),
-        "highAllowed": domain.high_allowed,
-        "whole": domain.whole,
-        "allowed": domain.text,
-    }
-
-
-def _template(rig: Slider, names: list[str]) -> str:
-    """The rig file with a place for each value, in SI units per unit area, so that every digit comes back."""
-    marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
-    lines = rig_to_text(twin(rig, marks)).splitlines()
-    for i, name in enumerate(names):
-        one = rig.parameters()[name].role
-        factor, _ = outside(one.unit, rig.area)
-        written = {repr(marks[name]), repr(marks[name] * factor), f'"{marks[name]!r} {one.unit}"'}
-        for k, line in enumerate(lines):
-            key, _, value = line.partition(" = ")
-            if value.partition("  #")[0] in written:
-                lines[k] = f"{key} = {{{{{i}}}}}" if one.unit == "1" else f'{key} = "{{{{{i}}}}} {one.unit}"'
-    return "\n".join(lines) + "\n"
-
-
-def _checks(rig: Slider, names: list[str], branch: int) -> list[dict[str, Any]]:
-    """Answers of Python at the rig's own numbers and at some others, for the page to compare."""
-    stiff = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
-    changes: list[dict[str, float]] = [{}]
-    for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
-        if name in names:
-            changes.append({name: factor * float(rig.value(name) or 0.0)})
-    found = []
-    for change in changes:
-        other = rig.with_values(change) if change else rig
-        word = " and ".join(f"{name} = {value!r}" for name, value in change.items()) or "the rig itself"
-        found.append({"name": word, **_answer(other, names, branch)})
-    return found
-
-
-def _answer(rig: Slider, names: list[str], branch: int) -> dict[str, Any]:
-    point = operating_point(rig, None, present_zeros(rig), branch)
-    answer: dict[str, Any] = {
-        "values": [float(rig.value(name) or 0.0) for name in names],
-        "status": int(status(point)),
-        "critical": None,
-        "eigenvalues": [],
-    }
-    if answer["status"] == UNKNOWN:
-        raise NotAvailable(OUT_OF_RANGE)
-    if answer["status"] in (STABLE, UNSTABLE):
-        with np.errstate(all="ignore"):
-            numbers = linear_numbers(rig, point)
-        answer["critical"] = numbers.get("critical_stiffness")
-        answer["eigenvalues"] = [[s.real, s.imag] for s in numbers["eigenvalues"]]
-    return answer
+    return Explorer(page(rig, title, branch), title, rig, branch)

@@ -73,7 +73,7 @@ def brief(result: Any) -> str:
         inside = "".join(_record(result))
     else:
         inside = "".join(_result(result))
-    return f'<div class="told"><style>{STYLE}</style>{inside}</div>'
+    return f'<div class="steadyslip-told"><style>{STYLE}</style>{inside}</div>'
 
 
 def rows_of(text: str) -> str:
@@ -104,7 +104,7 @@ def _model(model: Model) -> Iterator[str]:
     kind = "with inertia" if model.inertial else "quasistatic"
     yield heading(f"Model, {kind}", 3)
     for equation in model.equations():
-        yield f'<div class="formula">{formula(equation)}</div>'
+        yield f'<div class="formula" tabindex="0">{formula(equation)}</div>'
     yield table([(letter(one.symbol), one.unit, one.doc) for one in model.variables], ("variable", "unit", "meaning"))
     rows = [
         (name, letter(symbol), model.roles[name].unit, model.roles[name].doc)

@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.explorer.page import document, fragment, style
+from steadyslip.explorer.assembly import document, fragment, style
 from steadyslip.files.output import whole_file
 from steadyslip.machine.slider import Slider
 from steadyslip.reports.elements import STYLE, heading, listing, paragraph, table, typed
@@ -109,7 +109,8 @@ def put_together(parts: Parts, title: str, explorer: bool, source: Path | None) 
             still = paragraph(f"There is no explorer at the end: {refused}.", "small")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
     article = (
-        f'<article class="report told"><p class="kind">{typed(title)}</p><h1>{typed(parts.headline)}</h1>'
+        '<article class="report steadyslip-told" role="region" aria-label="report">'
+        f'<p class="kind">{typed(title)}</p><h1>{typed(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
         f"{''.join(parts.body)}{_provenance(parts.text, source)}{still}"
         f'<div class="on-screen">{shown}</div></article>\n'

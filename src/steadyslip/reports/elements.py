@@ -14,28 +14,29 @@ _SPOKEN = ((r"(?<![A-Za-z])um(?![A-Za-z])", "µm"), (r"\^2\b", "²"), (r"\^3\b",
            (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"))  # fmt: skip
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
-.told { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b2430; }
-.told h1 { font-size: 25px; line-height: 1.25; margin: 2px 0 6px; }
-.told h2 { font-size: 18px; margin: 26px 0 6px; break-after: avoid; }
-.told h3 { font-size: 15px; margin: 14px 0 4px; break-after: avoid; }
-.told table { border-collapse: collapse; margin: 6px 0; }
-.told td, .told th { padding: 3px 14px 3px 0; border-bottom: 1px solid #d5dae1; text-align: left; vertical-align: top;
+.steadyslip-told { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b2430; }
+.steadyslip-told h1 { font-size: 25px; line-height: 1.25; margin: 2px 0 6px; }
+.steadyslip-told h2 { font-size: 18px; margin: 26px 0 6px; break-after: avoid; }
+.steadyslip-told h3 { font-size: 15px; margin: 14px 0 4px; break-after: avoid; }
+.steadyslip-told table { border-collapse: collapse; margin: 6px 0; }
+.steadyslip-told td, .steadyslip-told th { padding: 3px 14px 3px 0; border-bottom: 1px solid #d5dae1;
+  text-align: left; vertical-align: top;
   font-variant-numeric: tabular-nums; background: none; }
-.told th { font-weight: 650; }
-.told .n { white-space: nowrap; }
-.told h1, .told p, .told td { overflow-wrap: anywhere; }
-.told tr { break-inside: avoid; }
-.told .wide { overflow-x: auto; max-width: 100%; }
-.told figure { margin: 10px 0; break-inside: avoid; }
-.told figure svg, .told figure img { max-width: 100%; height: auto; }
-.told figcaption, .told .small { color: #566173; font-size: 13px; }
-.told .warning { background: #fff3d6; border-left: 5px solid #e08a00; padding: 6px 12px; margin: 8px 0; }
-.told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
+.steadyslip-told th { font-weight: 650; }
+.steadyslip-told .n { white-space: nowrap; }
+.steadyslip-told h1, .steadyslip-told p, .steadyslip-told td { overflow-wrap: anywhere; }
+.steadyslip-told tr { break-inside: avoid; }
+.steadyslip-told .wide { overflow-x: auto; max-width: 100%; }
+.steadyslip-told figure { margin: 10px 0; break-inside: avoid; }
+.steadyslip-told figure svg, .steadyslip-told figure img { max-width: 100%; height: auto; }
+.steadyslip-told figcaption, .steadyslip-told .small { color: #566173; font-size: 13px; }
+.steadyslip-told .warning { background: #fff3d6; border-left: 5px solid #e08a00; padding: 6px 12px; margin: 8px 0; }
+.steadyslip-told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
   white-space: pre-wrap; overflow-wrap: anywhere; }
-.told math { font-size: 17px; }
-.told .formula { overflow-x: auto; overflow-y: hidden; margin: 8px 0; padding: 2px 0; }
+.steadyslip-told math { font-size: 17px; }
+.steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 8px 0; padding: 2px 0; }
 """
-"""Of everything inside an element of class ``told``."""
+"""Of everything inside an element of class ``steadyslip-told``."""
 
 
 def typed(text: Any) -> str:
@@ -65,7 +66,7 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
         side = f"<th scope=row>{first}</th>" if left else f"<td>{first}</td>"
         cells = (f"<td{_whole(cell)}>{cell}</td>" for cell in rest)
         lines.append(f"<tr>{side}{''.join(cells)}</tr>")
-    return f'<div class="wide"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>' if lines else ""
+    return f'<div class="wide" tabindex="0"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>' if lines else ""
 
 
 def _whole(cell: str) -> str:
@@ -82,7 +83,7 @@ def math(expression: Any, display: bool = True) -> Markup:
     text = MathMLPresentationPrinter().doprint(expression)
     for entity, character in _ENTITIES.items():
         text = text.replace(entity, character)
-    style = ' display="block" class="formula"' if display else ""
+    style = ' display="block"' if display else ""
     return Markup(f'<math xmlns="http://www.w3.org/1998/Math/MathML"{style}>{text}</math>')
 
 

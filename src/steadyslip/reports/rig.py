@@ -87,8 +87,8 @@ def _charts(analysis: Analysis) -> Iterator[str]:
     rig, stiffness = analysis.rig, analysis.rig.stiffness_name()
     near = [one.parameter for one in analysis.margins if one.edge is not None and one.parameter != stiffness]
     for name in near[:2]:
-        chart = drawn(lambda name=name: figures.stability_chart(rig, name, stiffness, points=101), "", 6.0)  # type: ignore[misc]
         words = f"Where sliding is stable over {name} and {stiffness}; the dot is this rig."
+        chart = drawn(lambda name=name: figures.stability_chart(rig, name, stiffness, points=101), words, 6.0)  # type: ignore[misc]
         yield figure(chart, words)
     if analysis.stable is not None:
         locus = drawn(lambda: figures.root_locus(rig), "root locus", 6.0)
@@ -102,12 +102,12 @@ def formulas(analysis: Analysis) -> Iterator[str]:
     try:
         found = analysis.formula()
         yield paragraph("The critical stiffness of every rig with the same terms, along the sliding direction:")
-        yield f'<div class="formula">{math(found)}</div>'
+        yield f'<div class="formula" tabindex="0">{math(found)}</div>'
     except NotAvailable as refused:
         yield paragraph(f"The critical stiffness has no formula here: {refused}.")
     yield paragraph("The equations of motion:")
     for equation in build_model(analysis.rig).equations():
-        yield f'<div class="formula">{math(equation)}</div>'
+        yield f'<div class="formula" tabindex="0">{math(equation)}</div>'
 
 
 def _confidence(prediction: Prediction | None) -> Iterator[str]:

@@ -14,7 +14,7 @@ export function leaving(page) {
   };
   const canvas = () => page.chart.canvas;
   return [
-    button("link", "copy a link to these values", () => link(page)),
+    ...(page.told ? [] : [button("link", "copy a link to these values", () => link(page))]),
     button("TOML", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())),
     button("SVG", "save the chart as a drawing", () => save("chart.svg", "image/svg+xml", drawing(canvas()))),
     button("PNG", "save the chart as a picture", () => picture(canvas()).then((blob) => save("chart.png", "image/png", blob), () => (page.banner.notice.textContent = "This browser cannot make a picture of the chart; save the drawing (SVG)."))),

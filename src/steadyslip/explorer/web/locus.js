@@ -4,6 +4,7 @@ import { axis, straight } from "./plot.js";
 import { roots } from "./polynomials.js";
 
 const POINTS = 90, DECADES = 2, VIEW = 2.2; // half the width of the view, in sizes of the eigenvalues that decide
+const SIZES = [1.8, 2.6, 3.4, 4.2]; // of dots, as the stiffness rises
 const BOX = { left: 62, top: 8, width: 290, height: 220 };
 
 /** Stiffnesses around those that matter, or none where there is nothing to start from. */
@@ -35,9 +36,11 @@ export class Locus {
       axis(BOX, across, [-half, half], 1, "1/s", "growth rate", false), axis(BOX, up, [up.at(0), up.at(1)], 1, "rad/s", "frequency", true),
       svg("line", { class: "zero", x1: BOX.left + BOX.width / 2, x2: BOX.left + BOX.width / 2, y1: BOX.top, y2: BOX.top + BOX.height }),
       svg("rect", { x: BOX.left, y: BOX.top, width: BOX.width, height: BOX.height, class: "frame" }));
+    const dots = SIZES.map(() => "");
     stiffnesses(answer).forEach((k, n) => {
-      for (const s of at(k)) if (shows(s)) this.canvas.append(svg("circle", { class: "dot", cx: x(s).toFixed(1), cy: y(s).toFixed(1), r: (0.8 + (1.6 * n) / POINTS).toFixed(1) }));
+      for (const s of at(k)) if (shows(s)) dots[Math.floor((n * SIZES.length) / POINTS)] += `M${x(s).toFixed(1)} ${y(s).toFixed(1)}h0`;
     });
+    this.canvas.append(...dots.map((d, n) => svg("path", { class: "dot", d, "stroke-width": SIZES[n] })));
     for (const k of answer.ends) {
       for (const s of at(k)) if (shows(s)) this.canvas.append(svg("path", { class: "crossing", d: `M${x(s) - 5} ${y(s)}l5 -5l5 5l-5 5z` }));
     }

@@ -2,7 +2,7 @@
 // stopped. Settings are those of steadyslip/motion/jobs.py, scales those of steadyslip/model/scales.py.
 import { zeros } from "../../kernels/printers/runtime.js";
 
-const SLICE = 2000, MOST_STEPS = 100000;
+const SLICE = 2000, MOST_STEPS = 100000, HEAR = 20; // ms between looks at what the page says
 
 /** A channel's new value behind the moment of the disturbance, or how long it lasts; a blow changes the start. */
 const SEGMENTS = {
@@ -37,6 +37,10 @@ export class Motion {
     this.facts = facts;
     this.driver = driver;
     this.R = new Float64Array(facts.parameters.length + 1);
+    this.log = []; // rows to write on, kept from run to run
+    this.recorded = [];
+    this.points = [];
+    this.grow();
     this.y = new Float64Array(Math.max(facts.constants, 3 + 3 * facts.memory.length, facts.kept + 1) + 1);
   }
 
@@ -95,15 +99,12 @@ export class Motion {
     cursor[c.LAST_JOB] = cursor[c.BUSY] = 1;
     cursor[c.PAUSED] = -1;
     const out = [zeros(1), zeros(1, facts.final + point), zeros(1, facts.tally), zeros(1, 0, point)];
-    const log = zeros(64, facts.logged), recorded = zeros(1024, facts.recorded + point), ids = zeros(1);
-    const done = (status, end) => this.observed(tables, recorded.slice(0, cursor[c.RECORDED]), log.slice(0, cursor[c.LOGGED]), status, end);
+    const { log, recorded } = this, ids = zeros(1);
+    const done = (status, end) => this.observed(tables, cursor[c.RECORDED], log.slice(0, cursor[c.LOGGED]), status, end);
     for (;;) {
       const reason = driver.advance(layout, routines, S, ids, cursor, ...tables, zeros(0), ...out, log, recorded, SLICE);
       if (reason === 0) return done(facts.statuses[out[0][0]], out[1][0][0]);
-      if (reason === 1) {
-        for (const buffer of [log, recorded]) for (const row of zeros(buffer.length, buffer[0].length)) buffer.push(row);
-        continue;
-      }
+      if (reason === 1) this.grow();
       const reached = cursor[c.RECORDED] ? recorded[cursor[c.RECORDED] - 1][0] : 0;
       told(reached);
       await pause();
@@ -113,12 +114,25 @@ export class Motion {
     }
   }
 
+  /** More room for what is written down. */
+  grow() {
+    const { logged, recorded, names } = this.facts;
+    for (const row of zeros(Math.max(128, this.log.length), logged)) this.log.push(row);
+    for (const row of zeros(Math.max(2048, this.recorded.length), recorded + 1 + names.length)) {
+      this.recorded.push(row);
+      this.points.push(row.subarray(recorded));
+    }
+  }
+
   /** Series over time, slip events and how it ended. */
-  observed(tables, recorded, log, status, end) {
-    const { facts, machine } = this, many = recorded.length, o = facts.out;
-    const points = recorded.map((row) => row.subarray(facts.recorded)), own = zeros(many), values = zeros(8 + facts.kept, many);
-    const segment = Float64Array.from(recorded, (row) => row[1]), times = Float64Array.from(recorded, (row) => row[0]);
-    points.shape = [many, 1 + facts.names.length];
+  observed(tables, many, log, status, end) {
+    const { facts, machine, recorded } = this, o = facts.out, own = zeros(many), values = zeros(8 + facts.kept, many);
+    const points = this.points.slice(0, many), segment = zeros(many), times = zeros(many);
+    for (let i = 0; i < many; i++) {
+      times[i] = recorded[i][0];
+      segment[i] = recorded[i][1];
+    }
+    /** @type {any} */ (points).shape = [many, 1 + facts.names.length];
     const [constants, , settings, segments] = tables;
     this.driver.observe(machine.layout, machine.routines, constants, settings, segments, points, own, segment, times, values);
     const events = [], { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind;
@@ -141,12 +155,12 @@ export class Motion {
  * @param {any} scope @param {(facts: any) => Motion} begin
  */
 export function serve(scope, begin) {
-  const { port1, port2 } = new MessageChannel();
-  let motion = /** @type {any} */ (null), wanted = 0, halted = false;
-  const pause = () => new Promise((done) => {
-    port1.onmessage = () => done(undefined);
-    port2.postMessage(0);
-  });
+  let motion = /** @type {any} */ (null), wanted = 0, halted = false, heard = 0;
+  const pause = async () => {
+    if (Date.now() < heard + HEAR) return;
+    await new Promise((done) => setTimeout(done)); // then the page is heard
+    heard = Date.now();
+  };
   scope.onmessage = async ({ data: { facts, stop, id, values, sigma, asked } }) => {
     if (facts) motion = begin(facts);
     else if (stop) halted = true;

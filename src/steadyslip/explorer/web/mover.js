@@ -23,6 +23,7 @@ export class Mover {
     }
   }
 
+  /** @param {{id: number, reached?: number, course?: any, fault?: string}} message */
   hear({ id, reached, course, fault }) {
     if (id !== this.id || !this.heard) return;
     if (reached !== undefined) this.heard.told(reached);

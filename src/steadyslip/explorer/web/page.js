@@ -14,15 +14,19 @@ const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66,
 const PARTS = 60; // of a track, at whose ends the status is asked for
 
 export class Page {
-  /** @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library */
-  constructor(root, data, programs, library) {
+  /**
+   * @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library
+   * @param {((values: number[]) => void) | null} [told] whom to tell of new values; then the address is not the page's own
+   */
+  constructor(root, data, programs, library, told = null) {
     this.root = root;
+    this.told = told;
     this.rig = new Rig(data, programs);
     this.past = /** @type {number[][]} */ ([]);
     this.future = /** @type {number[][]} */ ([]);
     this.sliding = false;
     this.differs = this.rig.differences();
-    this.rig.values = this.rig.fromHash(location.hash);
+    if (!told) this.rig.values = this.rig.fromHash(location.hash);
     this.banner = new Banner(data, this.differs);
     root.classList.add("steadyslip");
     root.replaceChildren(this.head(), this.banner.box);
@@ -58,7 +62,7 @@ export class Page {
       this.course.draw();
     }).observe(root);
     window.addEventListener("hashchange", () => {
-      if (location.hash !== rig.hash()) this.change(rig.fromHash(location.hash));
+      if (!this.told && location.hash !== rig.hash()) this.change(rig.fromHash(location.hash));
     });
     root.dataset.ready = "yes";
   }
@@ -209,6 +213,10 @@ export class Page {
     this.facts.show(this.answer);
     if (!this.sliding) this.facts.showEdges();
     this.course.soon();
+    if (this.told) {
+      if (!this.sliding) this.told(this.rig.values);
+      return;
+    }
     const hash = this.rig.hash();
     try {
       if (!this.sliding) history.replaceState(null, "", hash || location.pathname + location.search);
@@ -219,4 +227,24 @@ export class Page {
 /** Fill an element with the page of one rig. @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library */
 export function mount(root, data, programs, library) {
   return new Page(root, data, programs, library);
+}
+
+/**
+ * The same as a widget of a notebook: values go to Python and come from there, by name.
+ * @param {any} model anywidget's @param {HTMLElement} element @param {any} data @param {any} programs @param {() => any} library
+ */
+export function render(model, element, data, programs, library) {
+  const root = element.appendChild(make("div", {})), names = data.parameters.map((one) => one.name);
+  const page = new Page(root, data, programs, library, (values) => {
+    const now = Object.fromEntries(names.map((name, i) => [name, values[i]])), before = model.get("values");
+    if (names.every((name) => Object.is(now[name], before[name]))) return;
+    model.set("values", now);
+    model.save_changes();
+  });
+  const take = () => {
+    const given = model.get("values"), { values } = page.rig;
+    page.change(names.map((name, i) => (inside(data.parameters[i], given[name]) ? given[name] : values[i])));
+  };
+  take();
+  model.on("change:values", take);
 }

@@ -7,7 +7,7 @@ import { Linear, UNKNOWN } from "./linear.js";
  *   allowed: string}} Parameter
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
  *   axial: number, toml: string, branch: number, checks: any[], speed: string, area: number | null,
- *   stiffness: string | null}} Data
+ *   stiffness: string | null, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
@@ -92,7 +92,8 @@ export class Rig {
   fromHash(text) {
     const values = this.data.parameters.map((one) => one.value);
     for (const part of text.slice(0, 10000).replace(/^#/, "").split("&")) {
-      const [name, number] = part.split("=");
+      const [name, number, ...more] = part.split("=");
+      if (more.length) continue;
       const i = this.data.parameters.findIndex((one) => encodeURIComponent(one.name) === name);
       const value = number && /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(number) ? Number(number) : NaN;
       if (i >= 0 && inside(this.data.parameters[i], value)) values[i] = value;

@@ -350,3 +350,28 @@ def test_a_file_with_one_fault(text, message):
     front = FILE if not text.startswith("map =") else ""
     with pytest.raises(ss.SteadyslipError, match=message):
         ss.map_from_text((text + "\n" + FILE) if not front else front + "\n" + text)
+
+
+@pytest.mark.parametrize("how", ["missing", "of another array", "a folder", "of another chunk"])
+def test_chunks_that_are_not_those_that_were_written_are_no_results(tmp_path, how):
+    """Each file is one that Zarr reads, or takes for a chunk of nothing; the mark of the chunk knows better."""
+    over = {"stiffness": ss.Grid(1e9, 9e9, 6), "friction.a": ss.Grid(0.010, 0.014, 4)}
+    plan = ss.Map(rig(), over, ["growth_rate", "critical_stiffness"], chunk=6)
+    whole = ss.run_map(plan, tmp_path / "m.zarr", workers=1, progress=False).read("growth_rate")
+    chunks = [path for path in (tmp_path / "m.zarr" / "growth_rate" / "c").rglob("*") if path.is_file()]
+    last = max(chunks)
+    if how == "of another array":
+        shutil.copy(str(last).replace("growth_rate", "critical_stiffness"), last)
+    elif how == "of another chunk":
+        shutil.copy(min(chunks), last)
+    else:
+        last.unlink()
+        if how == "a folder":
+            last.mkdir()
+    found = ss.open_map(tmp_path / "m.zarr")
+    np.testing.assert_array_equal(found.read("growth_rate", (0, 0)), whole[0, 0])  # that chunk is as it was
+    corner = (slice(1, None, 2), -1)
+    for read in (lambda: found.read("growth_rate"), lambda: found.read("growth_rate", corner), found.statistics,
+                 lambda: found.dataset["growth_rate"].values):  # fmt: skip
+        with pytest.raises(ss.NotAvailable, match="not those that were written"):
+            read()

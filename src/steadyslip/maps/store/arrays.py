@@ -9,6 +9,7 @@ file, which the checksum covers as well.
 from __future__ import annotations
 
 import errno
+import itertools
 import json
 import os
 import shutil
@@ -65,6 +66,7 @@ class Store:
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise self.damage("zarr.json", error) from error
         self._arrays: dict[str, Any] = {}
+        self._intact: set[int] = set()  # chunks whose files have been seen to be those that were written
 
     def array(self, name: str) -> Any:
         """One of its Zarr arrays."""
@@ -80,13 +82,18 @@ class Store:
         return int(np.prod(self.grid, dtype=int))
 
     def read(self, name: str, region: Any = ...) -> np.ndarray:
-        """Values of one of its arrays.
+        """Values of one of its arrays, fill values where no chunk is done.
 
         Raises
         ------
         NotAvailable
-            If a file is damaged.
+            If a file is damaged, missing, or not the one that was written.
         """
+        for number in self._touched(name, region):
+            if number not in self._intact and (mark := self._mark(number)):
+                if not self._holds(number, mark):
+                    raise self.damage(name, ValueError(f"the files of chunk {number} are not those that were written"))
+                self._intact.add(number)
         try:
             values = np.asarray(self.array(name)[region])
         except (ValueError, RuntimeError, OSError) as error:  # as Zarr says it
@@ -95,6 +102,21 @@ class Store:
         if words is not None and values.size and not (values.min() >= -1 and values.max() + 1 < len(words.split())):
             raise self.damage(name, ValueError("it has kinds that it has no words for"))
         return values
+
+    def _touched(self, name: str, region: Any) -> Iterator[int]:
+        """Chunks that hold a part of a result or of generated samples, or lie between."""
+        axes = self.dims if name in self.results else self.dims[-1:] if name in self.generated else ()
+        first = len(self.dims) - len(axes)
+        given = list(region) if isinstance(region, tuple) else [region]
+        parts = [*itertools.takewhile(lambda part: part is not ..., given), *[slice(None)] * len(axes)]
+        spans = []
+        for axis, part in enumerate(parts[: len(axes)], first):
+            within = range(self.shape[axis])
+            chosen = within[part] if isinstance(part, slice) else [within[int(part)]]
+            low, high = sorted((chosen[0], chosen[-1])) if chosen else (0, -1)
+            spans.append(range(low // self.chunks[axis], high // self.chunks[axis] + 1))
+        for indices in itertools.product(*spans) if spans else ():
+            yield int(np.ravel_multi_index((0,) * first + indices, self.grid))
 
     def damage(self, what: str, error: Exception) -> NotAvailable:
         """What to say of files that cannot be read."""

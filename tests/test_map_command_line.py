@@ -77,6 +77,19 @@ def test_refinement_and_sensitivity(capsys, monkeypatch, tmp_path):
     assert Path(figure).exists()
 
 
+def test_a_map_that_is_not_finished_says_what_finishes_it(tmp_path, capsys, monkeypatch):
+    """Opened by itself it computes nothing, so that the same command would say the same for ever."""
+    store = str(tmp_path / "part.zarr")
+    part = ["map", SAFE, "--set", "map.over.contact.angle.points=3", "--set", "map.over.slider.stiffness.points=3"]
+    assert run(capsys, monkeypatch, *part, "-o", store)[0] == 0
+    next(path for path in (tmp_path / "part.zarr" / "complete" / "c").rglob("*") if path.is_file()).unlink()
+    status, _, error = run(capsys, monkeypatch, "map", store)
+    assert status == 130
+    assert error.strip().endswith("are finished and kept; map its rig file again to go on")
+    assert run(capsys, monkeypatch, *part, "-o", store)[0] == 0
+    assert run(capsys, monkeypatch, "map", store)[0] == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -376,7 +376,8 @@ def map_(
     found = map_file(source, output or (), changes or (), workers, cluster, refine > 0, figure, about)
     if not found.complete:
         done, count = found.finished
-        typer.secho(f"stopped: {done} of {count} chunks are finished and kept; the same command goes on", err=True)
+        again = "map its rig file again to go on" if source.suffix == STORE else "the same command goes on"
+        typer.secho(f"stopped: {done} of {count} chunks are finished and kept; {again}", err=True)
         raise typer.Exit(130)
     edge = refined(found, refine, **about, workers=workers, cluster=cluster) if refine else None
     others = [path for path in output or () if path.suffix != STORE]

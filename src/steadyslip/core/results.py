@@ -30,5 +30,5 @@ def read_only(value: Any) -> Any:
     if type(value) is tuple and any(type(one) is np.ndarray for one in value):
         return tuple(read_only(one) for one in value)
     if type(value) is dict:
-        return {name: read_only(one) for name, one in value.items()}
+        return {name: read_only(one) if type(one) in _HOLDERS else one for name, one in value.items()}
     return value

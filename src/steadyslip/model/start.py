@@ -46,8 +46,10 @@ def _velocity_variable(reduction: Reduction) -> Callable[..., list[Any]]:
 
 
 @question
-def _balance(reduction: Reduction, index: int) -> Callable[..., list[Any]]:
-    """The balance of a massless model before the protocol begins, and its slope in one memory variable."""
+def _balance(reduction: Reduction, index: int) -> tuple[Callable[..., list[Any]], bool]:
+    """The balance of a massless model before the protocol begins, its slope in one memory variable; whether that
+    is the same wherever that variable is.
+    """
     model = reduction.model
     memory = [item.symbol for item in model.memory]
     if reduction.restart is None:
@@ -56,7 +58,8 @@ def _balance(reduction: Reduction, index: int) -> Callable[..., list[Any]]:
     at_rest |= {item.symbol: sp.Integer(0) for item in model.integrals}
     expression = reduction.restart.xreplace({W: reduction.w_of_v}).xreplace(at_rest)
     slope = derivative(expression, memory[index])
-    return model.function([expression, slope], model.contact.slip, model.contact.velocity, *memory)
+    function = model.function([expression, slope], model.contact.slip, model.contact.velocity, *memory)
+    return function, not slope.has(memory[index])
 
 
 def initial_values(
@@ -117,9 +120,9 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
 
 def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any, memory: list[Any], index: int) -> Any:
     """The memory variable that balances forces at a given velocity, by Newton's method (one step where linear)."""
-    function = _balance(reduction, index)
+    function, linear = _balance(reduction, index)
     current = list(memory)
-    for _ in range(60):
+    for _ in range(1 if linear else 60):
         with np.errstate(all="ignore"):
             residual, slope = point.evaluate(function, x, v, *current)
             change = residual / slope

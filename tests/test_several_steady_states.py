@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.optimize import brentq
 
 import steadyslip as ss
 from steadyslip.core.roles import positive
+from steadyslip.model.build import build_model
+from steadyslip.model.point import operating_point
+from steadyslip.model.steady import steady_equation
 
 LOW, HIGH = 5e6, 15e6
 
@@ -35,6 +39,24 @@ LATCH = rig(Latch(preload=LOW, rise=(HIGH - LOW) / 2, centre=6e6, width=3e5))
 def test_there_are_three():
     found = [state.normal_stress for state in ss.steady_states(LATCH)]
     assert found == pytest.approx([LOW, 1e7, HIGH], rel=1e-3)
+
+
+def test_stresses_of_many_rigs_are_roots_found_one_by_one():
+    """Rigs are searched many at once: each stress is the root that SciPy finds in the same bracket."""
+    preloads = np.geomspace(2e6, 2e7, 150)
+    model = build_model(LATCH)
+    residual = steady_equation(model).residual
+    for branch in range(3):
+        point = operating_point(LATCH, {"contact.preload": preloads}, branch=branch)
+        own = [np.broadcast_to(one, preloads.shape) for one in point.arguments]
+        assert np.isfinite(point.sigma).any()
+        assert branch == 0 or np.isnan(point.sigma).any()
+        for i in np.flatnonzero(np.isfinite(point.sigma)):
+            low, high = point.sigma[i] * (1 - 1e-6), point.sigma[i] * (1 + 1e-6)
+            root = brentq(
+                lambda s, own=own, i=i: float(residual(*(a[i] for a in own), s)[0]), low, high, xtol=1e-9, rtol=1e-15
+            )
+            assert point.sigma[i] == pytest.approx(root, rel=2e-14)
 
 
 def test_branch_remembers_its_steady_sliding():

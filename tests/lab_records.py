@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 import steadyslip as ss
@@ -71,3 +73,30 @@ def record(
     found = columns(source, protocol, **options)
     found["friction"] = found["friction"] + noise * np.random.default_rng(seed).standard_normal(len(found["time"]))
     return ss.record_from_arrays(**found, source="synthetic")
+
+
+BASALT, SEPIOLITE = (f"examples/data/{name}_velocity_step.txt" for name in ("basalt_b819", "sepiolite_013"))
+
+
+@cache
+def stepped(seed=0):
+    """A fit to a velocity step, made once."""
+    return ss.fit(ss.lab_rig(), record(rig(), STEP, seed))
+
+
+@cache
+def basalt():
+    return ss.fit(ss.lab_rig(), ss.read_record(BASALT), trend=1)
+
+
+def deviations(fit, rig, jumps=()):
+    """Estimates less truth, in standard errors."""
+    truth = dict(zip((n for n in fit.names if n.startswith(("jump", "step"))), jumps, strict=True))
+    truth |= {name: a.value for name, a in rig.parameters().items()}
+    v_ref = fit.plan.rig.parameters()["friction.v_ref"].value
+    assert v_ref == SLOW
+    found = []
+    for i, one in enumerate(fit.space.unknowns):
+        z = one.coordinate(truth[one.parameter])
+        found.append((fit.coordinates[i] - z) / np.sqrt(fit.covariance[i, i]))
+    return np.array(found)

@@ -3,49 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import toeplitz
 from scipy.optimize import least_squares
-from scipy.stats import binom
 
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.comparison import lost
-from steadyslip.experiments.fitting.fit import finished
-from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.experiments.numerics.least_squares import minimise
-from steadyslip.experiments.numerics.noise import describe, lag_one
-
-BASALT, SEPIOLITE = (f"examples/data/{name}_velocity_step.txt" for name in ("basalt_b819", "sepiolite_013"))
-
-
-@cache
-def stepped(seed=0):
-    """A fit to a velocity step, made once."""
-    return ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, seed))
-
-
-@cache
-def basalt():
-    return ss.fit(ss.lab_rig(), ss.read_record(BASALT), trend=1)
-
-
-def deviations(fit, rig, jumps=()):
-    """Estimates less truth, in standard errors."""
-    truth = dict(zip((n for n in fit.names if n.startswith(("jump", "step"))), jumps, strict=True))
-    truth |= {name: a.value for name, a in rig.parameters().items()}
-    v_ref = fit.plan.rig.parameters()["friction.v_ref"].value
-    assert v_ref == lab.SLOW
-    found = []
-    for i, one in enumerate(fit.space.unknowns):
-        z = one.coordinate(truth[one.parameter])
-        found.append((fit.coordinates[i] - z) / np.sqrt(fit.covariance[i, i]))
-    return np.array(found)
-
+from steadyslip.experiments.numerics.noise import lag_one
 
 # -- truth
 
@@ -71,7 +39,7 @@ def test_the_truth_comes_back_from_no_guess(rig, protocol, guess, jumps):
         fit = ss.fit(guess, record)
         assert fit.search.converged
         assert not fit.unidentified
-        assert np.max(np.abs(deviations(fit, rig, jumps))) < 3.5
+        assert np.max(np.abs(lab.deviations(fit, rig, jumps))) < 3.5
         assert fit.rms == pytest.approx(lab.NOISE, rel=0.06)
 
 
@@ -99,7 +67,7 @@ def test_random_truths_come_back(seed):
 
 def test_scipy_finds_the_same_minimum():
     """The other route: SciPy's least squares from our minimum, disturbed."""
-    fit = stepped()
+    fit = lab.stepped()
     comparison = fit.comparison
 
     def residuals(z):
@@ -166,189 +134,6 @@ def test_a_problem_that_cannot_be_computed_is_left_alone():
     assert found.coordinates[0, 0] == pytest.approx(1.0)
     assert found.ssq[1] == np.inf
     assert not found.converged[1]
-
-
-# -- errors
-
-
-@pytest.mark.slow
-def test_intervals_cover_as_often_as_they_say():
-    """300 replicates: 68 and 95 % intervals contain the truth that often, within binomial bounds."""
-    rig, count = lab.rig(), 300
-    record = lab.record(rig, lab.STEP, noise=0.0, count=1000)
-    plan = make_plan(rig, record)
-    comparison = plan.comparison()
-    space = plan.space()
-    truth = space.coordinates(np.array([rig.value(u.parameter) for u in space.unknowns]))
-    data = record.friction + lab.NOISE * np.random.default_rng(5).standard_normal((count, len(record)))
-    found = minimise(
-        lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high
-    )
-    assert np.all(found.converged)
-    search = stepped().search
-    inside = np.zeros((count, 2, len(space)))
-    for i in range(count):
-        own = replace(plan, records=(replace(record, friction=data[i]),))
-        fit = finished(own, own.comparison(), found.coordinates[i], search, "auto", (space.low, space.high))
-        for k, level in enumerate((0.68, 0.95)):
-            ends = np.array([fit.interval(n, level) for n in fit.names])
-            values = np.array([rig.value(u.parameter) for u in space.unknowns])
-            inside[i, k] = (ends[:, 0] <= values) & (values <= ends[:, 1])
-    for k, level in enumerate((0.68, 0.95)):
-        low, high = binom.interval(0.999, count, level)
-        for covered in inside[:, k].sum(axis=0):
-            assert low <= covered <= high
-
-
-def correlated_noise(size, memory, seed):
-    fresh = np.random.default_rng(seed).standard_normal(size)
-    found = np.empty(size)
-    found[0] = fresh[0]
-    for i in range(1, size):
-        found[i] = memory * found[i - 1] + np.sqrt(1 - memory**2) * fresh[i]
-    return found
-
-
-@pytest.mark.slow
-def test_correlated_residuals_are_noticed_and_errors_honest():
-    """Noise with lag-1 correlation .8: plain errors are three times too small, ours are those of repetition."""
-    rig, count = lab.rig(), 64
-    record = lab.record(rig, lab.STEP, noise=0.0)
-    plan = make_plan(rig, record)
-    space = plan.space()
-    truth = space.coordinates(np.array([rig.value(u.parameter) for u in space.unknowns]))
-    data = record.friction + lab.NOISE * np.array([correlated_noise(len(record), 0.8, s) for s in range(count)])
-    comparison = plan.comparison()
-    found = minimise(
-        lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high
-    )
-    repeated = np.std(found.coordinates, axis=0)
-    noisy = replace(record, friction=data[0])
-    honest = ss.fit(ss.lab_rig(), noisy)
-    plain = ss.fit(ss.lab_rig(), noisy, errors="independent")
-    assert honest.correlated
-    assert honest.noise[0].lag1 == pytest.approx(0.8, abs=0.05)
-    ratio = np.sqrt(np.diag(honest.covariance)) / repeated
-    assert np.all((ratio > 0.7) & (ratio < 1.4))
-    assert np.all(np.sqrt(np.diag(plain.covariance)) < 0.5 * repeated)
-    assert not stepped().correlated
-
-
-def test_an_autoregression_is_recovered():
-    noise = describe(correlated_noise(20000, 0.7, 1))
-    assert noise.coefficients[0] == pytest.approx(0.7, abs=0.05)
-    assert noise.covariance[3] / noise.covariance[0] == pytest.approx(0.7**3, abs=0.05)
-    assert noise.inflation == pytest.approx(1.7 / 0.3, rel=0.2)
-    white = np.random.default_rng(2).standard_normal(20000)
-    assert not describe(white).correlated
-    rows = np.stack([np.ones(500), np.linspace(-1, 1, 500), np.random.default_rng(3).standard_normal(500)])
-    column = np.zeros(500)
-    count = min(500, len(noise.covariance))
-    column[:count] = noise.covariance[:count]
-    np.testing.assert_allclose(noise.spread(rows), rows @ toeplitz(column) @ rows.T, rtol=1e-9, atol=1e-9)
-    slow = noise.spread(rows)[0, 0] / (500 * noise.covariance[0])  # what is slow sees the memory
-    assert slow == pytest.approx(1.7 / 0.3, rel=0.2)
-
-
-def test_bootstrap_profile_and_covariance_agree_where_noise_is_white():
-    fit = stepped()
-    draws = ss.bootstrap(fit, 300)
-    assert draws.details["converged"] == 1
-    for name in fit.names:
-        assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.2)
-    outline = ss.profile(fit, "d_c")
-    assert outline.gaussian
-    low, high = outline.interval(0.95)
-    assert (low, high) == pytest.approx(fit.interval("d_c"), rel=0.01)
-    assert np.min(outline.rise) == pytest.approx(0, abs=1e-3)
-    assert str(outline).startswith("friction.d_c, 95 %")
-
-
-@pytest.mark.slow
-def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian():
-    fit = stepped()
-    draws = ss.posterior(fit, 500, walkers=24)
-    assert 0.2 < draws.details["acceptance"] < 0.8
-    for name in fit.names:
-        assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.3)
-        assert np.mean(draws[name]) == pytest.approx(fit.values[name], abs=0.5 * fit.errors[name])
-    handed = draws.to_arviz()
-    assert handed["posterior"].sizes["chain"] == 24
-    first = handed["posterior"]["friction.a"]
-    assert first.attrs["units"] == "1"
-    np.testing.assert_array_equal(first.values.ravel(), draws["friction.a"])
-    best = draws.log_probability.argmax()
-    assert abs(draws["friction.d_c"][best] / fit.values["friction.d_c"] - 1) < 3 * fit.errors["friction.d_c"] / 1e-5
-    assert handed["sample_stats"]["lp"].values.max() == draws.log_probability[best]
-    assert ss.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
-
-
-def test_blocks_keep_correlation():
-    fit = basalt()
-    assert fit.correlated
-    blocks = ss.bootstrap(fit, 64)
-    single = ss.bootstrap(fit, 64, kind="residual")
-    assert blocks.details["block"] == pytest.approx(19, abs=3)
-    for name in ("friction.a", "friction.d_c", "slider.stiffness"):
-        assert blocks.error(name) > 1.7 * single.error(name)
-        assert blocks.error(name) == pytest.approx(fit.errors[name], rel=0.5)
-
-
-def test_a_jump_at_an_unknown_time_makes_errors_that_are_not_gaussian():
-    """After a small step the first response is lost between samples; the fit says so, and the profile knows it."""
-    rig = lab.rig(alpha=0.45)
-    protocol = ss.Protocol(
-        pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressStep(at=140.37, by=-0.02 * lab.STRESS)), until=260.0
-    )
-    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(rig, protocol, 3, count=800))
-    assert "errors of what the jump tells" in " ".join(str(fit).split())
-    assert "the load point is measured" not in str(fit)
-    outline = ss.profile(fit, "alpha", reach=8, count=65)
-    low, high = outline.interval(0.999)
-    assert low < 0.45 < high
-    assert not outline.gaussian
-    assert "not Gaussian" in str(outline)
-
-
-# -- what the data cannot tell
-
-
-def test_alpha_is_not_given_an_absurd_error_from_a_velocity_step():
-    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(lab.rig(), lab.STEP))
-    (lost_one,) = fit.unidentified
-    assert set(lost_one.weights) == {"friction.normal_memory.alpha"}
-    assert not fit["alpha"].determined
-    assert fit["a"].determined
-    assert "friction.normal_memory.alpha is not determined by these data" in str(fit)
-    assert fit.to_dict()["parameters"]["friction.normal_memory.alpha"]["error"] is None
-
-
-def test_a_normal_stress_history_leaves_one_direction_open():
-    """At constant load-point velocity (a, b, d_c, alpha) have one direction without effect, to first order."""
-    protocol = ss.Protocol(
-        pieces=(ss.NormalStressHarmonic(amplitude=1e-4 * lab.STRESS, period=15.0, at=20.0),), until=200.0
-    )
-    small = ss.precision(lab.rig(alpha=0.4), protocol, fixed=["slider.stiffness"], noise=2e-6)
-    (open_one,) = small.unidentified
-    names = {"friction.a", "friction.b", "friction.d_c", "friction.normal_memory.alpha"}
-    assert set(open_one.weights) <= names
-    assert len(open_one.weights) >= 3
-    for name in names:
-        assert not np.isfinite(small.errors[name])
-    large = replace(protocol, pieces=(ss.NormalStressHarmonic(amplitude=0.05 * lab.STRESS, period=15.0, at=20.0),))
-    assert not ss.precision(lab.rig(alpha=0.4), large, fixed=["slider.stiffness"], noise=1e-4).unidentified
-    both = protocol + ss.VelocityStep(at=100.0, to=3e-6)
-    assert not ss.precision(lab.rig(alpha=0.4), both, fixed=["slider.stiffness"], noise=2e-7).unidentified
-
-
-def test_stiffness_and_slip_distance_of_a_short_record():
-    """Before the state has evolved, only slopes are seen."""
-    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=30.13, to=1.2e-6),), until=33.0)
-    fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol))
-    lost_names = {name for one in fit.unidentified for name in one.weights}
-    assert "friction.d_c" in lost_names
-    with pytest.raises(ss.NotAvailable, match="does not determine"):
-        ss.normal_draws(fit)
 
 
 # -- options
@@ -422,7 +207,7 @@ def test_joint_fits_share_what_they_should():
     assert fit["slider.stiffness@2"].value == pytest.approx(1.2e10, abs=4 * fit["slider.stiffness@2"].error)
     for name in ("friction.a", "friction.b", "friction.d_c"):
         assert fit[name].value == pytest.approx(lab.rig().value(name), abs=4 * fit[name].error)
-        assert fit[name].error < stepped().errors[name]
+        assert fit[name].error < lab.stepped().errors[name]
     assert fit.rig(1).stiffness == fit.values["slider.stiffness@2"]
     assert len(fit.noise) == 2
 
@@ -458,7 +243,7 @@ def test_a_measured_rate_drives_the_model_too():
     )
     fit = ss.fit(ss.lab_rig(), record)
     assert fit["step.1.at"].value == pytest.approx(60.13, abs=4 * fit["step.1.at"].error)
-    assert np.max(np.abs(deviations(fit, lab.rig(), (60.13,)))) < 3.5
+    assert np.max(np.abs(lab.deviations(fit, lab.rig(), (60.13,)))) < 3.5
 
 
 # -- real records
@@ -466,7 +251,7 @@ def test_a_measured_rate_drives_the_model_too():
 
 def test_basalt():
     """Figures of this fit, so that they cannot drift unseen; the minimum itself is checked by SciPy elsewhere."""
-    fit = basalt()
+    fit = lab.basalt()
     assert fit.search.converged
     assert fit.search.arrived >= 10
     assert fit.ssq == pytest.approx(3.8832e-3, rel=1e-3)
@@ -482,15 +267,15 @@ def test_basalt():
 
 def test_a_noisy_sensor_drives_the_model_on_request_only():
     """Errors in variables: the stiffness that the measured displacement leads to, and the warning."""
-    fit = ss.fit(ss.lab_rig(), ss.read_record(BASALT), trend=1, drive="measured")
+    fit = ss.fit(ss.lab_rig(), ss.read_record(lab.BASALT), trend=1, drive="measured")
     assert fit.ssq == pytest.approx(4.0799e-3, rel=1e-3)
-    assert fit.values["slider.stiffness"] < 0.6 * basalt().values["slider.stiffness"]
+    assert fit.values["slider.stiffness"] < 0.6 * lab.basalt().values["slider.stiffness"]
     assert "leave drive at 'commanded'" in " ".join(str(fit).split())
 
 
 def test_a_measured_history_is_integrated_as_scipy_does_it():
     """Interval by interval with SciPy at 1e-9, on the part of the basalt record around its step."""
-    record = ss.read_record(BASALT, between=(11675.5, 11678))
+    record = ss.read_record(lab.BASALT, between=(11675.5, 11678))
     fit = ss.fit(ss.lab_rig(), record, drive="measured")
     a, b, d_c, mu, k = (fit[n].value for n in ("friction.a", "friction.b", "d_c", "mu_ref", "stiffness"))
     time, stress = record.time - record.time[0], record.normal
@@ -513,7 +298,7 @@ def test_a_measured_history_is_integrated_as_scipy_does_it():
 
 @pytest.mark.slow
 def test_sepiolite_strengthens():
-    fit = ss.fit(ss.lab_rig("aging"), ss.read_record(SEPIOLITE), trend=2)
+    fit = ss.fit(ss.lab_rig("aging"), ss.read_record(lab.SEPIOLITE), trend=2)
     assert fit.search.converged
     assert fit["b"].high < 0
     assert fit.ssq == pytest.approx(1.5842e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
@@ -542,7 +327,7 @@ def test_criteria_prefer_the_law_that_made_the_record():
 
 def test_predictions_carry_the_uncertainty():
     """Against the linear propagation of theory: k_cr = σ(b − a)/d_c."""
-    fit = stepped()
+    fit = lab.stepped()
     kcr = (fit.values["friction.b"] - fit.values["friction.a"]) * lab.STRESS / fit.values["friction.d_c"]
     rig = lab.rig().with_values({"slider.stiffness": kcr, "friction.v_ref": lab.SLOW})
     found = ss.predict(rig, fit)
@@ -564,7 +349,7 @@ def test_predictions_carry_the_uncertainty():
 
 @pytest.mark.slow
 def test_kick_thresholds_are_predicted():
-    fit = stepped()
+    fit = lab.stepped()
     found = ss.predict(lab.rig(), ss.bootstrap(fit, 8), kick="velocity")
     single = ss.threshold(found.rig, "velocity").size
     _, _, middle, _, _ = np.quantile(found.thresholds["velocity"], [0.025, 0.16, 0.5, 0.84, 0.975])
@@ -573,12 +358,12 @@ def test_kick_thresholds_are_predicted():
 
 def test_a_prediction_keeps_the_memory_of_normal_stress_that_the_fit_has_not():
     rig = lab.rig(alpha=0.4)
-    found = ss.predict(replace(rig, contact=ss.InclinedSpring(preload=8e6, angle=0.2)), stepped())
+    found = ss.predict(replace(rig, contact=ss.InclinedSpring(preload=8e6, angle=0.2)), lab.stepped())
     assert found.rig.value("friction.normal_memory.alpha") == 0.4
-    moved = ss.predict(rig, stepped(), transfer=["slider.stiffness"])
-    assert moved.rig.stiffness == stepped().values["slider.stiffness"]
+    moved = ss.predict(rig, lab.stepped(), transfer=["slider.stiffness"])
+    assert moved.rig.stiffness == lab.stepped().values["slider.stiffness"]
     with pytest.raises(ss.ParameterError, match="was not fitted"):
-        ss.predict(rig, stepped(), transfer=["slider.mass"])
+        ss.predict(rig, lab.stepped(), transfer=["slider.mass"])
 
 
 # -- design of experiments
@@ -588,7 +373,7 @@ def test_promised_precision_is_what_a_fit_has():
     rig = lab.rig()
     promise = ss.precision(rig, lab.STEP, noise=lab.NOISE, samples=2000)
     for name, error in promise.errors.items():
-        assert error == pytest.approx(stepped().errors[name], rel=0.1)
+        assert error == pytest.approx(lab.stepped().errors[name], rel=0.1)
 
 
 def test_the_best_experiment_comes_first():
@@ -605,7 +390,7 @@ def test_the_best_experiment_comes_first():
 
 
 def test_a_fit_saved_is_the_same_fit(tmp_path):
-    fit = basalt()
+    fit = lab.basalt()
     fit.save(tmp_path / "fit.nc")
     again = ss.load_fit(tmp_path / "fit.nc")
     assert str(again) == str(fit)
@@ -656,7 +441,7 @@ def test_bad_records_are_named():
     with pytest.raises(ss.ParameterError, match="allowed: a Slider"):
         ss.fit("rig", record)
     with pytest.raises(ss.UnknownNameError, match="fitted parameter"):
-        stepped()["mass"]
+        lab.stepped()["mass"]
 
 
 def test_lag_one_of_a_constant_is_zero():

@@ -1,0 +1,199 @@
+"""Errors of fits mean what they say, and what the data cannot tell is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.stats import binom
+
+import lab_records as lab
+import steadyslip as ss
+from steadyslip.experiments.fitting.fit import finished
+from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.noise import describe
+
+# -- errors
+
+
+@pytest.mark.slow
+def test_intervals_cover_as_often_as_they_say():
+    """300 replicates: 68 and 95 % intervals contain the truth that often, within binomial bounds."""
+    rig, count = lab.rig(), 300
+    record = lab.record(rig, lab.STEP, noise=0.0, count=1000)
+    plan = make_plan(rig, record)
+    comparison = plan.comparison()
+    space = plan.space()
+    truth = space.coordinates(np.array([rig.value(u.parameter) for u in space.unknowns]))
+    data = record.friction + lab.NOISE * np.random.default_rng(5).standard_normal((count, len(record)))
+    found = minimise(
+        lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high
+    )
+    assert np.all(found.converged)
+    search = lab.stepped().search
+    inside = np.zeros((count, 2, len(space)))
+    for i in range(count):
+        own = replace(plan, records=(replace(record, friction=data[i]),))
+        fit = finished(own, own.comparison(), found.coordinates[i], search, "auto", (space.low, space.high))
+        for k, level in enumerate((0.68, 0.95)):
+            ends = np.array([fit.interval(n, level) for n in fit.names])
+            values = np.array([rig.value(u.parameter) for u in space.unknowns])
+            inside[i, k] = (ends[:, 0] <= values) & (values <= ends[:, 1])
+    for k, level in enumerate((0.68, 0.95)):
+        low, high = binom.interval(0.999, count, level)
+        for covered in inside[:, k].sum(axis=0):
+            assert low <= covered <= high
+
+
+def correlated_noise(size, memory, seed):
+    fresh = np.random.default_rng(seed).standard_normal(size)
+    found = np.empty(size)
+    found[0] = fresh[0]
+    for i in range(1, size):
+        found[i] = memory * found[i - 1] + np.sqrt(1 - memory**2) * fresh[i]
+    return found
+
+
+@pytest.mark.slow
+def test_correlated_residuals_are_noticed_and_errors_honest():
+    """Noise with lag-1 correlation .8: plain errors are three times too small, ours are those of repetition."""
+    rig, count = lab.rig(), 64
+    record = lab.record(rig, lab.STEP, noise=0.0)
+    plan = make_plan(rig, record)
+    space = plan.space()
+    truth = space.coordinates(np.array([rig.value(u.parameter) for u in space.unknowns]))
+    data = record.friction + lab.NOISE * np.array([correlated_noise(len(record), 0.8, s) for s in range(count)])
+    comparison = plan.comparison()
+    found = minimise(
+        lambda z, lanes: comparison.residuals(z, data[lanes]), np.tile(truth, (count, 1)), space.low, space.high
+    )
+    repeated = np.std(found.coordinates, axis=0)
+    noisy = replace(record, friction=data[0])
+    honest = ss.fit(ss.lab_rig(), noisy)
+    plain = ss.fit(ss.lab_rig(), noisy, errors="independent")
+    assert honest.correlated
+    assert honest.noise[0].lag1 == pytest.approx(0.8, abs=0.05)
+    ratio = np.sqrt(np.diag(honest.covariance)) / repeated
+    assert np.all((ratio > 0.7) & (ratio < 1.4))
+    assert np.all(np.sqrt(np.diag(plain.covariance)) < 0.5 * repeated)
+    assert not lab.stepped().correlated
+
+
+def test_an_autoregression_is_recovered():
+    noise = describe(correlated_noise(20000, 0.7, 1))
+    assert noise.coefficients[0] == pytest.approx(0.7, abs=0.05)
+    assert noise.covariance[3] / noise.covariance[0] == pytest.approx(0.7**3, abs=0.05)
+    assert noise.inflation == pytest.approx(1.7 / 0.3, rel=0.2)
+    white = np.random.default_rng(2).standard_normal(20000)
+    assert not describe(white).correlated
+    rows = np.stack([np.ones(500), np.linspace(-1, 1, 500), np.random.default_rng(3).standard_normal(500)])
+    column = np.zeros(500)
+    count = min(500, len(noise.covariance))
+    column[:count] = noise.covariance[:count]
+    np.testing.assert_allclose(noise.spread(rows), rows @ toeplitz(column) @ rows.T, rtol=1e-9, atol=1e-9)
+    slow = noise.spread(rows)[0, 0] / (500 * noise.covariance[0])  # what is slow sees the memory
+    assert slow == pytest.approx(1.7 / 0.3, rel=0.2)
+
+
+def test_bootstrap_profile_and_covariance_agree_where_noise_is_white():
+    fit = lab.stepped()
+    draws = ss.bootstrap(fit, 300)
+    assert draws.details["converged"] == 1
+    for name in fit.names:
+        assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.2)
+    outline = ss.profile(fit, "d_c")
+    assert outline.gaussian
+    low, high = outline.interval(0.95)
+    assert (low, high) == pytest.approx(fit.interval("d_c"), rel=0.01)
+    assert np.min(outline.rise) == pytest.approx(0, abs=1e-3)
+    assert str(outline).startswith("friction.d_c, 95 %")
+
+
+@pytest.mark.slow
+def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian():
+    fit = lab.stepped()
+    draws = ss.posterior(fit, 500, walkers=24)
+    assert 0.2 < draws.details["acceptance"] < 0.8
+    for name in fit.names:
+        assert draws.error(name) == pytest.approx(fit.errors[name], rel=0.3)
+        assert np.mean(draws[name]) == pytest.approx(fit.values[name], abs=0.5 * fit.errors[name])
+    handed = draws.to_arviz()
+    assert handed["posterior"].sizes["chain"] == 24
+    first = handed["posterior"]["friction.a"]
+    assert first.attrs["units"] == "1"
+    np.testing.assert_array_equal(first.values.ravel(), draws["friction.a"])
+    best = draws.log_probability.argmax()
+    assert abs(draws["friction.d_c"][best] / fit.values["friction.d_c"] - 1) < 3 * fit.errors["friction.d_c"] / 1e-5
+    assert handed["sample_stats"]["lp"].values.max() == draws.log_probability[best]
+    assert ss.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
+
+
+def test_blocks_keep_correlation():
+    fit = lab.basalt()
+    assert fit.correlated
+    blocks = ss.bootstrap(fit, 64)
+    single = ss.bootstrap(fit, 64, kind="residual")
+    assert blocks.details["block"] == pytest.approx(19, abs=3)
+    for name in ("friction.a", "friction.d_c", "slider.stiffness"):
+        assert blocks.error(name) > 1.7 * single.error(name)
+        assert blocks.error(name) == pytest.approx(fit.errors[name], rel=0.5)
+
+
+def test_a_jump_at_an_unknown_time_makes_errors_that_are_not_gaussian():
+    """After a small step the first response is lost between samples; the fit says so, and the profile knows it."""
+    rig = lab.rig(alpha=0.45)
+    protocol = ss.Protocol(
+        pieces=(ss.VelocityStep(at=60.13, to=3e-6), ss.NormalStressStep(at=140.37, by=-0.02 * lab.STRESS)), until=260.0
+    )
+    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(rig, protocol, 3, count=800))
+    assert "errors of what the jump tells" in " ".join(str(fit).split())
+    assert "the load point is measured" not in str(fit)
+    outline = ss.profile(fit, "alpha", reach=8, count=65)
+    low, high = outline.interval(0.999)
+    assert low < 0.45 < high
+    assert not outline.gaussian
+    assert "not Gaussian" in str(outline)
+
+
+# -- what the data cannot tell
+
+
+def test_alpha_is_not_given_an_absurd_error_from_a_velocity_step():
+    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), lab.record(lab.rig(), lab.STEP))
+    (lost_one,) = fit.unidentified
+    assert set(lost_one.weights) == {"friction.normal_memory.alpha"}
+    assert not fit["alpha"].determined
+    assert fit["a"].determined
+    assert "friction.normal_memory.alpha is not determined by these data" in str(fit)
+    assert fit.to_dict()["parameters"]["friction.normal_memory.alpha"]["error"] is None
+
+
+def test_a_normal_stress_history_leaves_one_direction_open():
+    """At constant load-point velocity (a, b, d_c, alpha) have one direction without effect, to first order."""
+    protocol = ss.Protocol(
+        pieces=(ss.NormalStressHarmonic(amplitude=1e-4 * lab.STRESS, period=15.0, at=20.0),), until=200.0
+    )
+    small = ss.precision(lab.rig(alpha=0.4), protocol, fixed=["slider.stiffness"], noise=2e-6)
+    (open_one,) = small.unidentified
+    names = {"friction.a", "friction.b", "friction.d_c", "friction.normal_memory.alpha"}
+    assert set(open_one.weights) <= names
+    assert len(open_one.weights) >= 3
+    for name in names:
+        assert not np.isfinite(small.errors[name])
+    large = replace(protocol, pieces=(ss.NormalStressHarmonic(amplitude=0.05 * lab.STRESS, period=15.0, at=20.0),))
+    assert not ss.precision(lab.rig(alpha=0.4), large, fixed=["slider.stiffness"], noise=1e-4).unidentified
+    both = protocol + ss.VelocityStep(at=100.0, to=3e-6)
+    assert not ss.precision(lab.rig(alpha=0.4), both, fixed=["slider.stiffness"], noise=2e-7).unidentified
+
+
+def test_stiffness_and_slip_distance_of_a_short_record():
+    """Before the state has evolved, only slopes are seen."""
+    protocol = ss.Protocol(pieces=(ss.VelocityStep(at=30.13, to=1.2e-6),), until=33.0)
+    fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), protocol))
+    lost_names = {name for one in fit.unidentified for name in one.weights}
+    assert "friction.d_c" in lost_names
+    with pytest.raises(ss.NotAvailable, match="does not determine"):
+        ss.normal_draws(fit)

@@ -58,14 +58,15 @@ class Shells:
             self.flat = np.all(others < -FLAT * np.abs(runs.rest.leading.imag)[:, None], axis=1)
         self.known = np.zeros(count, dtype=bool)
         self.inner = np.zeros(count)  # radius of the ball,
-        self.band = np.tile([np.inf, -np.inf], (count, 1))  # and of both rims of the band,
-        self.beyond = np.full(count, OPEN)  # and what comes of that
+        self.band = np.tile([np.inf, -np.inf], (count, 1))  # and of both rims of the band
+        self.told = np.zeros(count, dtype=bool)  # whether it is known
+        self.beyond = np.full(count, OPEN)  # what comes of that
 
     def outcomes(self, which: Array, states: Array) -> Array:
         """What shells tell of runs `which` (k,) at `states` (k, n): an outcome, or OPEN."""
         group = self.runs.group[which]
         self._ask(np.unique(group))
-        useful = (self.inner[group] > 0) | (self.beyond[group] != OPEN)
+        useful = (self.inner[group] > 0) | (self.band[group, 0] < self.band[group, 1])
         away = self.runs.near.distance(which, states)
         flat = self.flat[group]
         away[flat & ~useful] = np.inf
@@ -73,6 +74,9 @@ class Shells:
             away[flat & useful] = self._on_ray(which[flat & useful], states[flat & useful])
         found = np.where(away < self.inner[group], RETURNS, OPEN)
         inside = (away > self.band[group, 0]) & (away < self.band[group, 1])
+        for one in np.unique(group[inside & ~self.told[group]]):  # many motions are run for it: not before one is there
+            fate = self._fate(one, self.band[one, 1])
+            self.told[one], self.beyond[one] = True, fate if fate in CERTAIN else OPEN
         return np.where(inside, self.beyond[group], found)
 
     def _ask(self, group: Array) -> None:
@@ -112,9 +116,7 @@ class Shells:
             begin = np.where(to == fine[:, -1], nearer, begin)
         self.inner[group] = inner
         if self.flat[group[0]]:
-            for one, low, high in zip(group, begin, end, strict=True):
-                if low < high and (fate := self._fate(one, high)) in CERTAIN:
-                    self.band[one], self.beyond[one] = (low, high), fate
+            self.band[group] = np.column_stack([begin, end])
 
     def _drift(self, group: Array, radii: Array) -> tuple[Array, Array]:
         """Whether distances fall, and whether they rise, over a turn from radii (k, r)."""

@@ -230,7 +230,7 @@ def test_links_and_files_keep_every_digit(page_of_own, a, k, psi):
     assert script("rig.fromHash(link)", link=link) == values
     again = ss.rig_from_text(text)
     assert again == own
-    assert ss.critical_stiffness(again) == ss.critical_stiffness(own)
+    np.testing.assert_array_equal(ss.critical_stiffness(again), ss.critical_stiffness(own))  # NaN where there is none
 
 
 # -- motion

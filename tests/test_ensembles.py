@@ -1,5 +1,7 @@
 """Many runs in lanes: equal to single runs, independent of each other, of threads and order; honest about failures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -117,6 +119,20 @@ def test_a_block_without_mass_is_seen_at_the_velocity_it_has(start):
     )
     assert ensemble.samples["v"][0] == pytest.approx(run["v"][[0, 100, -2, -1]], rel=1e-5)
     assert ensemble.final["v"] == pytest.approx(ensemble.samples["v"][:, -1], rel=1e-9)
+
+
+def test_a_motion_that_stands_at_a_fold_is_stuck():
+    """Steps at the rounding of time are accepted for ever there; alone and among others they lead nowhere."""
+    law = ss.LuGre(
+        mu_coulomb=0.3, mu_static=0.65, v_stribeck=4e-3, viscous=0.03, bristle_stiffness=9e3, bristle_damping=23.0
+    )
+    a_rig = replace(THREE_VELOCITIES, friction=law, stiffness=1e12, drive=ss.Steady(1.2e-4))
+    run = ss.simulate(a_rig, until=0.1, initial={"v": 0.012}, times=[0.0, 0.1])
+    ensemble = ss.simulate_many(a_rig, vary={"stiffness": [1e12] * 3}, until=0.1, initial={"v": 0.012})
+    assert run.status == "stuck"
+    assert list(ensemble.status) == ["stuck"] * 3
+    assert run.steps + run.rejected < 5000
+    assert ensemble.end == pytest.approx(run.end, rel=1e-6)
 
 
 @pytest.mark.parametrize("events", [True, False])

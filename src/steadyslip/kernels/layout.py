@@ -58,7 +58,7 @@ class Row(IntEnum):
 
 INPUTS = 3
 MOST_FAILURES = 400.0
-"""Steps in a row that may be refused. A block with mass that is stopped falls by hundreds of decades in a moment: so
+"""Steps in a row that may be in vain. A block with mass that is stopped falls by hundreds of decades in a moment: so
 much shorter may the step have to be than the one before."""
 SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
 # slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)

@@ -12,6 +12,8 @@ from steadyslip.kernels.record import Evaluator, Values, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
+INSTANT = 1e-13  # share of the time so far below which a step is none, if no state changes
+NOTHING = 1e-9  # by more than this share of the error allowed
 PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
 # hardly any rejections, and an end error near rtol after tens of cycles
 
@@ -135,7 +137,7 @@ class Step(Evaluator):
         accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
         store(Row.ACCEPTED, accepted)
         store(Row.REJECTED, rejected)
-        failures = select(good, 0.0, load(Row.FAILURES) + 1.0)
+        failures = select(self._gets_on(moved), 0.0, load(Row.FAILURES) + 1.0)
         store(Row.FAILURES, failures)
         reasons = [
             moved >= self.end,
@@ -151,6 +153,19 @@ class Step(Evaluator):
             happened = self._events()
             flag = flag + select(happened > 0.0, 1.0, 0.0)
         store(Row.FLAG, flag * load(Row.ACTIVE))
+
+    def _gets_on(self, moved: Value) -> Node:
+        """Whether the step was accepted and changed anything.
+
+        At a fold of the balance steps shrink to the rounding of time, change no state and are accepted for ever; only
+        where the balance has to be solved there are folds.
+        """
+        if self.kernel.reduction.unknown is None:
+            return as_node(self.good, "bool")
+        changed = moved - self.tau > INSTANT * moved
+        for new, old, error in zip(self.new, self.old, self.atol, strict=True):
+            changed = changed | (abs(new - old) > NOTHING * error)
+        return as_node(changed, "bool") & self.good
 
     def _events(self) -> Node:
         """Which functions of events changed sign; returns how many, where that is watched."""

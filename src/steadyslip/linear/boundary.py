@@ -106,12 +106,15 @@ def margins(rig: Slider, *, branch: int = 0) -> tuple[Margin, ...]:
 
 
 def _urgency(margin: Margin) -> float:
-    """Sorting key: relative distance; angles count by radians, zeros come last among those with an edge."""
+    """Sorting key: relative distance; angles count by radians, zeros come last among those with an edge.
+
+    Distances that differ by rounding only are equal: parameters then stay in the order of the rig.
+    """
     if margin.edge is None:
         return np.inf
-    if margin.unit == "rad":
-        return abs(margin.absolute)
-    return abs(margin.relative) if margin.value else 1e300
+    if not margin.value and margin.unit != "rad":
+        return 1e300
+    return float(f"{abs(margin.absolute if margin.unit == 'rad' else margin.relative):.9g}")
 
 
 def present_zeros(rig: Slider) -> tuple[str, ...]:

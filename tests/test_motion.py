@@ -496,3 +496,16 @@ def test_a_method_that_would_compile_for_minutes_is_refused():
             run(slow, until=1.0, method="dop853")
     for method in ("auto", "explicit", "rosenbrock", "rodas5p"):
         assert prepare(slow, None, 1.0, {}, {}, Options(method=method)).reduction.unknown is not None
+
+
+def test_the_range_of_velocity_is_that_of_the_run_not_of_its_samples():
+    """A drop at a step lies between samples; the lowest and highest of the solver's own steps are met."""
+    plan = [ss.VelocityStep(at=10.0, to=1e-8), ss.VelocityStep(at=20.0, to=3e-6)]
+    a_rig = rig(stiffness=2e10)
+    whole = ss.simulate(a_rig, plan, until=30.0)
+    few = ss.simulate(a_rig, plan, until=30.0, times=[0.0, 30.0])
+    assert few["v"].min() > 1.5 * whole["v"].min()
+    assert few.velocities == pytest.approx(whole.velocities, rel=1e-9)
+    assert whole.velocities[0] <= whole["v"].min()
+    assert whole.velocities[1] >= whole["v"].max()
+    assert str(few).splitlines()[1].split(", at")[0] == str(whole).splitlines()[1].split(", at")[0]

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.errors import NotAvailable
+
+if TYPE_CHECKING:
+    import numpy as np  # commands start without it
 
 FIGURES = (".png", ".svg", ".pdf")
 
@@ -126,6 +127,8 @@ def write_columns(path: str | PathLike[str], columns: Mapping[str, np.ndarray], 
     NotAvailable
         If the file cannot be written.
     """
+    import numpy as np
+
     with whole_file(path) as temporary:
         table = np.column_stack(list(columns.values()))
         np.savetxt(temporary, table, form, ",", header=",".join(columns), comments="", encoding="utf-8")

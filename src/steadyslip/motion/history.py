@@ -38,6 +38,8 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
         Integration method used.
     rtol : float
     steps, rejected : int
+    velocities : tuple of float
+        Lowest and highest velocity of the run, m/s, which lie between samples as a rule.
     """
 
     rig: Slider
@@ -51,6 +53,7 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     rtol: float
     steps: int
     rejected: int
+    velocities: tuple[float, float]
 
     def __getitem__(self, name: str) -> np.ndarray:
         try:

@@ -44,13 +44,12 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         v, area = self.data["v"], self.rig.area
         lines = [f"{self.message}"]
         if len(v):
-            reached = [*v, *(event.velocity for event in self.events)]  # extremes lie between samples
+            lowest, highest = self.velocities
             lines.append(
-                f"velocity        {shown(min(reached), 'm/s')} to {shown(max(reached), 'm/s')}, "
-                f"at the end {shown(v[-1], 'm/s')}"
+                f"velocity        {shown(lowest, 'm/s')} to {shown(highest, 'm/s')}, at the end {shown(v[-1], 'm/s')}"
             )
-            stress = self.data["normal_stress"]
-            low, high = (shown(float(x), "Pa", area=area) for x in (stress.min(), stress.max()))
+            stress = [*self.data["normal_stress"], *(event.normal_stress for event in self.events)]
+            low, high = (shown(float(x), "Pa", area=area) for x in (min(stress), max(stress)))
             lines.append(f"{stress_name('normal stress', area):<16}{low} to {high}")
         slips = self.slip_events
         if slips:

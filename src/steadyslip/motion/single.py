@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -12,7 +13,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import NUMBERS, checked, finite, whole
 from steadyslip.kernels.layout import Final, Recorded, Sampled
-from steadyslip.kernels.runner import Runner
+from steadyslip.kernels.runner import TALLY, Runner
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
@@ -172,7 +173,17 @@ def _history(
         rtol=jobs.options.rtol,
         steps=int(steps[0]),
         rejected=int(steps[1]),
+        velocities=_velocities(outcome, found["v"], events),
     )
+
+
+def _velocities(outcome: Outcome, samples: np.ndarray, events: tuple[Event, ...]) -> tuple[float, float]:
+    """Lowest and highest velocity of a run: at samples and events, and of what is kept of it where it was watched."""
+    known = [float(outcome.tally[0, TALLY.index(name)]) for name in ("lowest_velocity", "peak_velocity")]
+    known += [float(samples.min()), float(samples.max())] if len(samples) else []
+    known += [event.velocity for event in events]
+    finite = [v for v in known if math.isfinite(v)]
+    return (min(finite), max(finite)) if finite else (math.nan, math.nan)
 
 
 def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome) -> Event:

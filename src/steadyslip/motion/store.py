@@ -20,13 +20,14 @@ from steadyslip.motion.history import HistoryData
 from steadyslip.motion.observe import observable_units
 from steadyslip.motion.status import WORDS
 
-RUN = FileKind("run", 2, 2**29, "simulate again and save the run anew")
+RUN = FileKind("run", 3, 2**29, "simulate again and save the run anew")
 MOST_EVENTS = 10**6
 _EVENT_UNITS = {
     "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
 }  # fmt: skip
 _ATTRIBUTES = {
     "rig": str, "status": str, "end": float, "method": str, "rtol": float, "steps": int, "rejected": int,
+    "lowest_velocity": float, "peak_velocity": float,
     "steadyslip": str,
 }  # fmt: skip
 
@@ -55,6 +56,8 @@ def to_dataset(history: HistoryData) -> Any:
         "rtol": history.rtol,
         "steps": history.steps,
         "rejected": history.rejected,
+        "lowest_velocity": history.velocities[0],
+        "peak_velocity": history.velocities[1],
         "steadyslip": __version__,
     }
     return xr.Dataset(variables, coords={"time": ("time", history.data["t"], {"units": "s"})}, attrs=attributes)
@@ -115,6 +118,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
         "units": units,
         "events": tuple(Event(kind, *row) for kind, row in zip(kinds, moments, strict=True)),
         **{name: attributes[name] for name in ("status", "end", "method", "rtol", "steps", "rejected")},
+        "velocities": (attributes["lowest_velocity"], attributes["peak_velocity"]),
     }
 
 

@@ -155,3 +155,10 @@ def test_history_tells_what_it_has():
     assert data["v"].attrs["units"] == "m/s"
     assert data.attrs["status"] == "done"
     assert "rate-state" in data.attrs["rig"]
+
+
+def test_pieces_after_the_end_are_said_to_be_left_out():
+    plan = [ss.VelocityStep(at=1.0, to=2e-6), ss.Hold(at=20.0, duration=5.0)]
+    a_rig = rig(stiffness=2e10)
+    assert "left out        hold at 20 s: the run is to end at 10 s" in str(ss.simulate(a_rig, plan, until=10.0))
+    assert "left out" not in str(ss.simulate(a_rig, plan, until=30.0))

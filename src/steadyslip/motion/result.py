@@ -61,6 +61,10 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             )
             if np.isfinite(last.recurrence):
                 lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
+        until = self.protocol.until or np.inf
+        begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
+        if late := [f"{name} at {shown(at, 's')}" for name, at in begins if at >= until]:
+            lines.append(f"left out        {', '.join(late)}: the run is to end at {shown(until, 's')}")
         arrests = sum(event.kind == "arrest" for event in self.events)
         if arrests:
             lines.append(f"arrests         {arrests}")

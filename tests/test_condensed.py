@@ -58,3 +58,15 @@ def test_nothing_is_condensed_where_all_samples_matter(rig):
         whole = plan.comparison()
         z = np.clip(np.zeros((1, len(whole.space))), whole.space.low, whole.space.high)
         assert condensed(plan, whole, z) is whole
+
+
+def test_what_was_just_run_is_not_run_again():
+    comparison = make_plan(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300)).comparison()
+    z = lab.stepped().coordinates
+    seen, slopes = comparison.model(np.stack([z, z + 0.01]))
+    kept = [array.copy() for array in (seen[1], slopes[1])]
+    seen[:], slopes[:] = 0.0, 0.0  # whoever asked may write into what came
+    again = comparison.model((z + 0.01)[None])
+    again[0][:] = 1.0
+    for fresh, old in zip(comparison.model((z + 0.01)[None]), kept, strict=True):
+        np.testing.assert_array_equal(fresh[0], old)

@@ -65,6 +65,32 @@ def test_what_is_simpler_is_told_by_the_records():
     assert held(ss.lab_rig(), trend=2, offset=True) == [{"offset"}, {"trend.2"}]
 
 
+def test_times_of_later_steps_are_no_simpler_model():
+    record = made(lab.PRESSED)
+    plan = make_plan(ss.lab_rig(), record)
+    assert "step.2.at" in [one.name for one in plan.space().unknowns]
+    assert simpler(plan.space(), plan.rig.parameters()) == ()
+
+
+def test_a_sample_before_a_step_of_the_stress_shows_none_of_it():
+    """Friction jumps with the stress: where a step may begin ends short of the last sample that is before it."""
+    record = made(lab.PRESSED)
+    fit = ss.fit(ss.lab_rig(normal_memory="linker-dieterich"), record)
+    place = fit.names.index("step.2.at")
+    low, high = (ends[place] for ends in fit.bounds)
+    points = np.tile(fit.coordinates, (3, 1))
+    points[:, place] = low, low + 1e-3 * (high - low), high
+    misfits = fit.comparison.misfit(points)
+    assert misfits[0] == pytest.approx(misfits[1], rel=0.02)
+    assert misfits[2] < 3 * misfits[1]
+
+
+def test_a_time_at_the_end_of_its_window_stops_no_fit():
+    """Without α the step of the stress is drawn there, and most starts used to end beside the minimum."""
+    found = ss.fit(ss.lab_rig(), made(lab.PRESSED, rig=lab.rig(alpha=0.4)))
+    assert found.search.arrived > 0.4 * found.search.starts
+
+
 @pytest.mark.slow
 def test_the_valley_that_catches_most_starts():
     """Half a minute of basalt, two states: nearly all starts end in a degenerate valley at 1.8755e-3."""

@@ -120,11 +120,10 @@ def fit(
     )  # fmt: skip
     check_friction(plan.records)
     if plan.loss != "linear" and plan.width is None:
-        first, _, _ = searched(replace(plan, loss="linear"), starts, threads, progress)
-        comparison = replace(plan, loss="linear").comparison(threads)
-        plan = check_width(plan, comparison.residuals(first.coordinates[:1])[0][0])
-    found, search, bounds = searched(plan, starts, threads, progress)
-    return finished(plan, plan.comparison(threads), found.coordinates[0], search, errors, bounds)
+        first = searched(replace(plan, loss="linear"), starts, threads, progress)
+        plan = check_width(plan, first.comparison.residuals(first.coordinates[None])[0][0])
+    found = searched(plan, starts, threads, progress)
+    return finished(plan, found.comparison, found.coordinates, found.story, errors, found.bounds)
 
 
 def started_from(result: Fit, others: Sequence[Fit]) -> Fit:

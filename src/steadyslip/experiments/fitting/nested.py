@@ -54,7 +54,7 @@ def simpler(space: Space, addresses: Mapping[str, Address]) -> tuple[Idle, ...]:
         member = owner.rpartition(".")[2]
         if name in (f"trend.{max(orders, default=0)}", "offset"):
             together.setdefault(name, []).append(i)
-        elif member.isdigit() and int(member) > 1:
+        elif role is not None and member.isdigit() and int(member) > 1:
             together.setdefault(owner, []).append(i)
         elif role is not None and role.idle is not None and not member.isdigit():
             together.setdefault(name, []).append(i)

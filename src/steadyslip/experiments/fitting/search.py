@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,16 +28,36 @@ LAST = 12  # on all samples after that
 ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 NEAREST = 3  # of the ends on few numbers that go on with all samples
+SURPASSED = 1e-8  # of the sum of squares: by so much less on few numbers, an end is worth a look on all samples
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
 
 Told = Callable[[str, int, float], None]
 """What a search tells: what it is doing, starts that it has tried, root mean square of the residuals reached."""
 
 
-def searched(
-    plan: Plan, starts: int, threads: int | None, progress: Told | None
-) -> tuple[Minima, SearchStory, tuple[Array, Array]]:
-    """The best minimum, how it was found, and the bounds of the search.
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search found.
+
+    Attributes
+    ----------
+    coordinates : ndarray (p,)
+        Of the best minimum.
+    comparison : Comparison
+        In which it is one.
+    story : SearchStory
+    bounds : (ndarray, ndarray)
+        Of the search.
+    """
+
+    coordinates: Array
+    comparison: Comparison
+    story: SearchStory
+    bounds: tuple[Array, Array]
+
+
+def searched(plan: Plan, starts: int, threads: int | None, progress: Told | None) -> Found:
+    """The best minimum, and how it was found.
 
     A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
     then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
@@ -70,9 +90,8 @@ def searched(
     found = search.nested(found)
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
-    story = search.story(found)
-    found.coordinates = ordered(found.coordinates, search.whole.space)
-    return found, story, (search.low, search.high)
+    best = ordered(found.coordinates[:1], search.whole.space)[0]
+    return Found(best, search.whole, search.story(found), (search.low, search.high))
 
 
 class _Search:
@@ -160,11 +179,12 @@ class _Search:
     def _refined(self, begin: Array) -> Minima:
         """Where starts end on all samples: on what stands for them to begin with."""
         if self.few is not self.whole:
+            known = float(np.min(self.best.ssq))
             ends = minimise(
                 lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=1,
-                known=float(np.min(self.best.ssq)), told=self.told("refining", self.whole),
+                known=known, told=self.told("refining", self.whole),
             )  # fmt: skip
-            begin = ends.distinct(NEAREST)[0]
+            begin = ends.distinct(NEAREST)[0] if np.any(ends.ssq < known * (1 - SURPASSED)) else begin[:0]
         return self._on_all(begin)
 
     def _on_all(self, begin: Array) -> Minima:

@@ -17,6 +17,7 @@ SUDDEN = 0.7  # share of the difference of two levels that lies between a few sa
 NEAR = 3  # of them
 BINS = 40  # of a span between changes, whose means
 UNEVEN = 3.0  # times the variance that noise would give them say that it is not constant
+JUST = 1e-6  # of the time between two samples: as soon as possible after one
 OSCILLATION = 8  # alternating changes that are one oscillation
 
 
@@ -129,8 +130,8 @@ def _change(time: Array, normal: Array, last: int, first: int, levels: list[floa
     """A step between two samples, or a straight ramp through those in between."""
     before, after = levels
     early, late = float(time[last]), float(time[first])
-    if first == last + 1:
-        return Change(0.5 * (early + late), 0.0, before, after, early, late, 0.0, 0.0)
+    if first == last + 1:  # later than the sample that shows none of it: friction jumps with the stress
+        return Change(0.5 * (early + late), 0.0, before, after, early + JUST * (late - early), late, 0.0, 0.0)
     t, s = time[last + 1 : first], normal[last + 1 : first]
     if len(t) == 1:
         share = float(np.clip((s[0] - before) / (after - before), 0.05, 0.95))

@@ -13,6 +13,8 @@ from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
 from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, Status, call
 
+INSTANT = 1e-14  # share of the time so far: shorter steps lead nowhere
+
 
 def enter_row(S: Array, layout: Layout, group: int, k: int, segments: Array, input_rates: Array, places: Array) -> None:
     """Start row k of the table: new inputs, jump of the load point."""
@@ -47,13 +49,14 @@ def move_nodes(S: Array, layout: Layout, group: int, k: int, node_rates: Array) 
 
 
 def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
-    """Take every living lane to the end of the row."""
+    """Take every living lane to the end of the row; a motion that runs away in no time at all ends there."""
     W = layout.lanes
     while True:
         waiting = 0
         for lane in range(W):
             if S[Row.TAU * W + lane] < S[Row.END * W + lane]:
-                if S[Row.ACTIVE * W + lane] == 0.0 or exhausted(S, W, lane) != Status.RUNNING:
+                brief = S[Row.H * W + lane] < INSTANT * S[Row.END * W + lane]
+                if S[Row.ACTIVE * W + lane] == 0.0 or brief or exhausted(S, W, lane) != Status.RUNNING:
                     S[Row.ACTIVE * W + lane] = 0.0
                     S[Row.TAU * W + lane] = S[Row.END * W + lane]
                 else:

@@ -17,13 +17,15 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.roles import positive
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import linear_part
-from steadyslip.explorer.motion import driver, motion_part
+from steadyslip.explorer.motion import OPTIONS, driver, motion_part
+from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
 from steadyslip.model.point import operating_point
 from steadyslip.model.reduction import reduce_model
 from steadyslip.model.scales import natural_scales, posed
+from steadyslip.motion.jobs import prepare
 
 FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
 BEFORE = [dict(family.registry) for family in FAMILIES]
@@ -324,13 +326,17 @@ def test_scales_of_a_page_are_those_of_python(name):
     kept = [one for one in present_zeros(own) if one not in facts["missing"]]
     point = operating_point(own, None, kept)
     reduction = reduce_model(point.model, facts["eliminated"])
-    scales, unknown = natural_scales(point, reduction)
+    scales, _ = natural_scales(point, reduction)
     values = [float(value) for value in point.arguments]
-    found = script("motion.set(values, sigma).scales", values=values, sigma=float(point.sigma))
-    assert np.allclose(found["sizes"], [np.ravel(scales[n])[0] for n in reduction.names], rtol=1e-14, atol=0)
-    assert found["unknown"] == pytest.approx(np.ravel(unknown)[0], rel=1e-14)
-    assert found["x"] == pytest.approx(np.ravel(scales["x"])[0], rel=1e-14)
-    assert found["posed"] == bool(posed(point)[0])
+    motion, settings = script(
+        "[motion.set(values, sigma).scales, motion.settings]", values=values, sigma=float(point.sigma)
+    )
+    jobs = prepare(own, (), 1.0, {}, {}, OPTIONS)
+    expected = jobs.tables(jobs.runner(1, True), 0, 1, True, True)[2][0]
+    expected[Setting.GUESS] = 0.0
+    np.testing.assert_allclose(settings, expected, rtol=1e-14)
+    assert motion["x"] == pytest.approx(np.ravel(scales["x"])[0], rel=1e-14)
+    assert motion["posed"] == bool(posed(point)[0])
 
 
 def test_a_page_that_stops_a_motion_keeps_what_there_is():

@@ -1,6 +1,7 @@
 """Motion that rests, turns round or ends, and what comes back of it."""
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,9 @@ import pytest
 import steadyslip as ss
 from dimensionless import unit_rig
 from rigs_of_theory import rate_state, rig
+from steadyslip.kernels.layout import Setting
+from steadyslip.motion.engine import run_single
+from steadyslip.motion.jobs import Options, prepare
 
 # -- rest and reversal
 
@@ -162,3 +166,32 @@ def test_pieces_after_the_end_are_said_to_be_left_out():
     a_rig = rig(stiffness=2e10)
     assert "left out        hold at 20 s: the run is to end at 10 s" in str(ss.simulate(a_rig, plan, until=10.0))
     assert "left out" not in str(ss.simulate(a_rig, plan, until=30.0))
+
+
+# -- accelerations that have to be solved for
+
+NAGATA = rate_state(evolution=ss.Nagata(c_nagata=0.7), normal_memory=ss.LinkerDieterich(alpha=0.4))
+NONLINEAR = rig(friction=NAGATA, contact=ss.LeadScrew(lead_angle=0.2, axial_load=5e6), stiffness=9e9)
+
+
+@pytest.mark.parametrize("mass", [1e6, 1e4, 1.0, 1e-4])
+def test_light_blocks_move_as_those_without_mass(mass):
+    """The lighter a block, the more its acceleration is rounding; what is not are forces."""
+    protocol, when = ss.VelocityStep(at=1.0, to=2e-6), np.linspace(1.5, 20.0, 40)
+    light, none = (
+        ss.simulate(NONLINEAR.with_values({"mass": m}), protocol, until=20.0, times=when) for m in (mass, 0.0)
+    )
+    assert light.status == "done"
+    assert np.max(np.abs(light["v"] / none["v"] - 1)) < 1e-6 + 1e-9 * mass
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-5])
+def test_no_step_is_kept_after_which_the_acceleration_is_not_found(size):
+    """Asked for more digits than rounding leaves, the run goes on in smaller steps, or ends; never from NaN."""
+    jobs = prepare(NONLINEAR.with_values({"mass": 1e6}), ss.VelocityStep(at=1.0, to=2e-6), 20.0, {}, {}, Options())
+    machine = jobs.runner(1, True)
+    tables = jobs.tables(machine, 0, 1, False, True)
+    tables[2][0, Setting.Z_SCALE] *= size
+    outcome = run_single(SimpleNamespace(tables=lambda *_: tables), machine, np.empty(0), False, True)
+    assert np.all(np.isfinite(outcome.recorded))
+    assert np.all(np.isfinite(outcome.final))

@@ -6,25 +6,29 @@ Each program reads the record R, the parameters in the Model's order and behind 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.records import conditions, twin
-from steadyslip.kernels.nodes import Program
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.source import Formulas
+from steadyslip.linear import cubic
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.response import has_closed_form
+from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.linear.stiffness import interval_ingredients
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
 from steadyslip.model.sliding import observed_in_steady_sliding
-from steadyslip.model.steady import steady_equation
+from steadyslip.model.steady import GRID, SOLVED, steady_equation
+
+Then = Callable[[list[Node]], Sequence[Value]]
 
 
 def model_of(rig: Slider) -> Model:
@@ -32,8 +36,12 @@ def model_of(rig: Slider) -> Model:
     return build_model(rig, present_zeros(rig))
 
 
-def program(model: Model, name: str, expressions: Sequence[Any], number: sp.Symbol | None = None) -> Program:
+def program(
+    model: Model, name: str, expressions: Sequence[Any], number: sp.Symbol | None = None, then: Then | None = None
+) -> Program:
     """Expressions in the Model's parameters, σss and perhaps one number more as a program.
+
+    What `then` makes of their values is stored instead of them, if it is given.
 
     Raises
     ------
@@ -47,7 +55,8 @@ def program(model: Model, name: str, expressions: Sequence[Any], number: sp.Symb
     formulas = Formulas(expressions, names)
     values = {n: made.load(i) for i, n in enumerate(names.values()) if n in formulas.symbols and n != "number"}
     values["number"] = made.number
-    for place, value in enumerate(formulas(values)):
+    found = list(map(as_node, formulas(values)))
+    for place, value in enumerate(found if then is None else then(found)):
         made.store(place, value, "y")
     return made
 
@@ -61,8 +70,10 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
         An object of functions.
     facts : dict
         ``parameters`` (dotted names in the order of R), ``affine`` (whether `steady` gives σss; else `residual` is to
-        be solved), ``degree`` of the characteristic polynomial, ``closed`` (whether `ingredients` of the closed form
-        exist), ``observed`` (names and units of what `observables` gives).
+        be solved), ``degree`` of the characteristic polynomial, ``closed`` (whether the `interval` of the closed form
+        exists), ``edge`` (what rounding alone can make), ``grid`` (how many stresses steady sliding is searched on, and
+        the powers of ten that it runs from and to), ``solved`` (misfit of a root as a share of the stress),
+        ``observed`` (names and units of what `observables` gives).
     """
     model = model_of(rig)
     equation = steady_equation(model)
@@ -79,12 +90,15 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
         program(model, "stiffness", [model.axial_share or 1, model.gain]),
     ]
     if closed:
-        programs.append(program(model, "ingredients", interval_ingredients(model)))
+        programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
     facts = {
         "parameters": list(model.parameters),
         "affine": equation.affine,
         "degree": len(coefficients) - 1,
         "closed": closed,
+        "edge": ON_THE_EDGE,
+        "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
+        "solved": SOLVED,
         "observed": [[name, model.observables[name][1]] for name in names],
     }
     text = "".join(javascript.text(one) for one in programs)
@@ -98,6 +112,13 @@ def _steady(model: Model) -> Program:
     exists = sp.And(slope < 1, sp.StrictGreaterThan(sigma, 0, evaluate=False))
     load = sigma if equation.given else sigma * (1 - slope)
     return program(model, "steady", [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, load])
+
+
+def _interval(ingredients: list[Node]) -> Sequence[Value]:
+    """Ends of the stable interval in closed form, NaN where there is none."""
+    numerator, denominator, mu_b2, mu_b3, a2, a3, gain = ingredients
+    low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3, select)
+    return cubic.without_gain(low, high, gain, select)
 
 
 def _mismatch(model: Model) -> sp.Expr:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from steadyslip.kernels.events import COUNTED, EVENTS
@@ -44,7 +45,8 @@ class Step(Evaluator):
         if method.lower_error:
             lower = self._squared(self._estimate(method.lower_error)) * (1 / self.kernel.counted)
             error = error * error / larger(error + 0.01 * lower, 1e-300)
-        self.good = error <= 1.0
+        after = abs(as_node(total(self.rates))) < math.inf  # the next step begins with them
+        self.good = as_node(error <= 1.0, "bool") & after
         self.size = log(smaller(larger(error, 1e-10), 1e30))
         self.earlier = self.program.load(Row.ERROR)
         kept = -0.5 * PROPORTIONAL / method.order * self.size + 0.5 * INTEGRAL / method.order * self.earlier

@@ -4,15 +4,20 @@
     a3 = m + f1 B0                 a2 = m r + f + f1 B1 + r μ B0
     a1 = k + f1 K + r S + r μ B1   a0 = r (k + μ K),   K = k B2 + B3
 
-Plain arithmetic: every function takes numbers, arrays or SymPy expressions. Arguments are those of
+Plain arithmetic: every function takes numbers, arrays, SymPy expressions or nodes of a program. Arguments are those of
 `steadyslip.linear.response.Response`; dampings c and η are part of f and S.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from steadyslip.core.expressions import Num
+
+Choose = Callable[[Any, Any, Any], Any]
 
 
 def coefficients(
@@ -73,43 +78,63 @@ def squared_frequency(
     return a0 / a2
 
 
-def stable_interval(numerator: Num, denominator: Num, mu_b2: Num, mu_b3: Num, a2: Num, a3: Num) -> tuple[Num, Num]:
+def stable_interval(
+    numerator: Num, denominator: Num, mu_b2: Num, mu_b3: Num, a2: Num, a3: Num, choose: Choose = np.where
+) -> tuple[Num, Num]:
     """The one interval of k > 0 in which all Hurwitz conditions hold.
 
     Conditions: a3 >= 0, a2 > 0 (no k in them), D k > N, and a0 > 0, that is (1 + μB2) k > −μB3. Without
     inertia (a3 = 0) they are the same, D k > N being a1 > 0.
+
+    Parameters
+    ----------
+    choose : callable
+        ``choose(condition, value, other)``; that of a program, where arguments are its nodes.
 
     Returns
     -------
     low, high : float or ndarray
         NaN where no k is stable; high may be inf.
     """
-    valid = positive(a2) & (a3 >= 0)
-    low, high, valid = _half_line(0.0, np.inf, denominator, numerator, valid)
-    low, high, valid = _half_line(low, high, 1 + mu_b2, -mu_b3, valid)
-    if np.ndim(high) or high != np.inf:
+    valid = positive(a2, choose) & (a3 >= 0)
+    low, high, valid = _half_line(0.0, np.inf, denominator, numerator, valid, choose)
+    low, high, valid = _half_line(low, high, 1 + mu_b2, -mu_b3, valid, choose)
+    if choose is not np.where or np.ndim(high) or high != np.inf:
         valid = valid & (low < high)
-    return unless(valid, low), unless(valid, high)
+    return unless(valid, low, choose), unless(valid, high, choose)
 
 
-def positive(value: Num) -> Num:
-    """Where `value` > 0; plain True if everywhere, found in one pass, so that masks cost only where needed."""
+def without_gain(low: Num, high: Num, gain: Num, choose: Choose = np.where) -> tuple[Num, Num]:
+    """The interval of the spring's own stiffness, from that of the total with a controller's gain."""
+    if choose is np.where and not np.ndim(gain) and gain == 0:
+        return low, high
+    left, most = low - gain, high - gain
+    some = most > 0
+    return choose(some, choose(left > 0, left, 0.0), np.nan), choose(some, most, np.nan)
+
+
+def positive(value: Num, choose: Choose = np.where) -> Num:
+    """Where `value` > 0; of arrays plain True if everywhere, found in one pass: masks cost only where needed."""
+    if choose is not np.where:
+        return value > 0
     if np.ndim(value) == 0:
         return bool(value > 0)
     return True if np.min(value) > 0 else value > 0
 
 
-def unless(valid: Num, value: Num) -> Num:
+def unless(valid: Num, value: Num, choose: Choose = np.where) -> Num:
     """`value` where `valid`, NaN elsewhere."""
-    return value if valid is True or np.all(valid) else np.where(valid, value, np.nan)
+    if choose is np.where and (valid is True or np.all(valid)):
+        return value
+    return choose(valid, value, np.nan)
 
 
-def _half_line(low: Num, high: Num, slope: Num, right: Num, valid: Num) -> tuple[Num, Num, Num]:
+def _half_line(low: Num, high: Num, slope: Num, right: Num, valid: Num, choose: Choose) -> tuple[Num, Num, Num]:
     """Intersect (low, high) with slope·k > right; the common case of one sign throughout first."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        if positive(slope) is True:
+        if positive(slope, choose) is True:
             return (low if np.ndim(right) == 0 and right == 0 else np.maximum(low, right / slope)), high, valid
-        edge = np.divide(right, slope)
-    low = np.where(slope > 0, np.maximum(low, edge), low)
-    high = np.where(slope < 0, np.minimum(high, edge), high)
-    return low, high, valid & ((slope != 0) | (np.asarray(right) < 0))
+        edge = right / slope if choose is not np.where else np.divide(right, slope)
+    low = choose((slope > 0) & (edge > low), edge, low)
+    high = choose((slope < 0) & (edge < high), edge, high)
+    return low, high, valid & ((slope > 0) | (slope < 0) | (right < 0))

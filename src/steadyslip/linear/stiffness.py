@@ -196,10 +196,7 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
     """Ends of the one stable interval of a rig with one memory variable (cubic in closed form)."""
     exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
-    if np.ndim(gain) or gain != 0:
-        high = high - gain
-        low = np.where(high > 0, np.maximum(low - gain, 0.0), np.nan)
-        high = np.where(high > 0, high, np.nan)
+    low, high = cubic.without_gain(low, high, gain)
     return cubic.unless(exists, low), cubic.unless(exists, high)
 
 

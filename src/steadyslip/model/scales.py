@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,13 @@ from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction, reduce_model
 
+Choose = Callable[[Any, Any, Any], Any]
 LEAST_WEIGHT = 1e-5  # db/da below which a memory variable is not eliminated: rounding is amplified by its inverse
 
 
 @dataclass(frozen=True)
 class Weights(ReadOnly):
-    """Derivatives in steady sliding.
+    """Derivatives in steady sliding, as arrays or as nodes of a program.
 
     Attributes
     ----------
@@ -39,12 +40,20 @@ class Weights(ReadOnly):
         Of the balance in its unknown.
     """
 
-    direct: np.ndarray
-    by_slip: np.ndarray
-    by_memory: tuple[np.ndarray, ...]
-    decay: tuple[np.ndarray, ...]
-    memory: tuple[np.ndarray, ...]
-    by_unknown: np.ndarray
+    direct: Any
+    by_slip: Any
+    by_memory: tuple[Any, ...]
+    decay: tuple[Any, ...]
+    memory: tuple[Any, ...]
+    by_unknown: Any
+
+    @classmethod
+    def of(cls, values: Sequence[Any]) -> Weights:
+        """From the values of what `weighed` lists."""
+        direct, by_slip, by_unknown, *rest = values
+        count = len(rest) // 3
+        by_memory, decay, memory = (tuple(rest[i : i + count]) for i in (0, count, 2 * count))
+        return cls(direct, by_slip, by_memory, decay, memory, by_unknown)
 
 
 def weighed(model: Model) -> list[sp.Expr]:
@@ -71,10 +80,7 @@ def _weights_function(model: Model) -> Callable[..., list[Any]]:
 def weights(point: OperatingPoint) -> Weights:
     """Derivatives in steady sliding of all rigs of a point."""
     found = _weights_function(point.model)(*map(np.asarray, point.arguments), point.stresses)
-    direct, by_slip, by_unknown, *rest = (np.asarray(x, dtype=float) for x in found)
-    count = len(point.model.memory)
-    by_memory, decay, memory = (tuple(rest[i : i + count]) for i in (0, count, 2 * count))
-    return Weights(direct, by_slip, by_memory, decay, memory, by_unknown)
+    return Weights.of([np.asarray(x, dtype=float) for x in found])
 
 
 @question
@@ -110,22 +116,34 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
 
     By name; and the size of the unknown that is left to solve for, which has no name among them.
     """
-    found = weights(point)
-    drive = np.asarray(point.drive, dtype=float)
     with np.errstate(all="ignore"):
-        direct = np.abs(found.direct)
-        distances = [drive / np.abs(n) for n in found.decay]
-        distances.append(direct / np.abs(found.by_slip))
-        finite = [np.where(np.isfinite(d) & (d > 0), d, np.inf) for d in distances]
-        x = np.minimum.reduce(np.broadcast_arrays(*finite))
-        x = np.where(np.isfinite(x), x, np.abs(drive))
+        return sizes(weights(point), np.asarray(point.drive, dtype=float), reduction, np.where)
+
+
+def sizes(found: Weights, drive: Any, reduction: Reduction, choose: Choose) -> tuple[dict[str, Any], Any]:
+    """`natural_scales` in plain arithmetic, of arrays or of the nodes of a program.
+
+    An acceleration matters where its force is worth an e-fold of velocity: of a light block smaller ones are lost in
+    the rounding of the forces.
+
+    Parameters
+    ----------
+    choose : callable
+        ``choose(condition, value, other)``: `numpy.where` for arrays.
+    """
+    direct, by_slip = abs(found.direct), abs(found.by_slip)
+    x: Any = np.inf
+    for distance in (*(drive / abs(n) for n in found.decay), direct / by_slip):
+        x = choose((distance > 0) & (distance < x), distance, x)
+    x = choose(x < np.inf, x, abs(drive))
     scales: dict[str, Any] = {"x": x, "w": drive if reduction.velocity == "linear" else 1.0}
-    for item, weight, value in zip(point.model.memory, found.by_memory, found.memory, strict=True):
-        with np.errstate(all="ignore"):
-            scale = direct / np.abs(weight)
-        own = np.abs(value)
-        scale = np.where(np.isfinite(scale) & (scale > 0), scale, np.where(own > 0, own, 1.0))
-        scales[item.name] = np.minimum(scale, np.where(own > 0, np.maximum(own, scale * 1e-3), scale))
-    with np.errstate(all="ignore"):
-        scales |= {item.name: x * x / drive for item in point.model.integrals}
-        return scales, drive**2 / x if point.model.inertial else scales["w"]
+    for item, weight, value in zip(reduction.model.memory, found.by_memory, found.memory, strict=True):
+        own, scale = abs(value), direct / abs(weight)
+        scale = choose((scale > 0) & (scale < np.inf), scale, choose(own > 0, own, 1.0))
+        most = choose(own > 1e-3 * scale, own, 1e-3 * scale)
+        scales[item.name] = choose((own > 0) & (most < scale), most, scale)
+    scales |= {item.name: x * x / drive for item in reduction.model.integrals}
+    if not reduction.model.inertial:
+        return scales, scales["w"]
+    force = choose(direct > by_slip * x, direct, by_slip * x) / found.by_unknown
+    return scales, choose(force > drive * drive / x, force, drive * drive / x)

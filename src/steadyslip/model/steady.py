@@ -21,7 +21,8 @@ from steadyslip.model.equations import Model
 
 Arguments = tuple[Any, ...]
 Array = np.ndarray
-_GRID = np.geomspace(1e-12, 1e18, 6001)  # stresses between whose neighbours a root is looked for, Pa
+GRID = np.geomspace(1e-12, 1e18, 6001)  # stresses between whose neighbours a root is looked for, Pa
+SOLVED = 1e-6  # misfit of a root as a share of its stress: a pole changes sign too
 _TOGETHER = 64  # rigs that are searched at once, so that arrays stay in the processor's cache
 _HALVINGS = 48  # of a cell of the grid, a hundredth of its stress wide, to rounding
 
@@ -120,11 +121,11 @@ def _search(residual: Callable[..., Any], arguments: list[Array]) -> list[list[f
     All brackets are halved at once, until no number is between their ends.
     """
     with np.errstate(all="ignore"):
-        shape = (len(arguments[0]), len(_GRID))
-        value = np.broadcast_to(residual(*(one[:, None] for one in arguments), _GRID)[0], shape)
+        shape = (len(arguments[0]), len(GRID))
+        value = np.broadcast_to(residual(*(one[:, None] for one in arguments), GRID)[0], shape)
         good = np.isfinite(value)
         rows, cells = np.nonzero(good[:, :-1] & good[:, 1:] & (np.sign(value[:, :-1]) * np.sign(value[:, 1:]) < 0))
-        low, high, rises = _GRID[cells], _GRID[cells + 1], value[rows, cells] < 0
+        low, high, rises = GRID[cells], GRID[cells + 1], value[rows, cells] < 0
         own = [one[rows] for one in arguments]
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
@@ -134,7 +135,7 @@ def _search(residual: Callable[..., Any], arguments: list[Array]) -> list[list[f
         apart = np.abs(np.stack([np.broadcast_to(residual(*own, end)[0], low.shape) for end in ends]))
         nearer = (apart[1] < apart[0]).astype(int)
         roots, apart = (np.take_along_axis(one, nearer[None], axis=0)[0] for one in (ends, apart))
-    found: list[list[float]] = [[float(one) for one in _GRID[good[i] & (value[i] == 0)]] for i in range(shape[0])]
-    for i in np.flatnonzero(apart <= 1e-6 * roots):  # a pole changes sign too
+    found: list[list[float]] = [[float(one) for one in GRID[good[i] & (value[i] == 0)]] for i in range(shape[0])]
+    for i in np.flatnonzero(apart <= SOLVED * roots):
         found[rows[i]].append(float(roots[i]))
     return [sorted(one) for one in found]

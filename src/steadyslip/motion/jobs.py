@@ -129,25 +129,25 @@ def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, opti
     """Rows of settings, but for what depends on the start and on what is wanted."""
     scales, unknown = natural_scales(point, reduction)
     sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))
-    return machine.settings(
-        {
-            "rtol": options.rtol,
-            "most_steps": options.most_steps,
-            "v_high": point.drive * BLOW_UP,
-            "v_low": point.drive * options.arrest,
-            "sigma_low": CONTACT_SHARE * point.stresses,
-            "watch": 0.0,
-            "record": 0.0,
-            "guess": 0.0,
-            "z_scale": unknown,
-            "first_step": scales["x"] / point.drive,
-            "v_drive": point.drive,
-        },
-        options.rtol * sizes,
-    )
+    own = numbers(point.drive, point.stresses, scales["x"], unknown, options)
+    return machine.settings(own | {"watch": 0.0, "record": 0.0, "guess": 0.0}, options.rtol * sizes)
 
 
 _kept_settings = question(_settings)
+
+
+def numbers(drive: Any, stress: Any, x: Any, unknown: Any, options: Options) -> dict[str, Any]:
+    """Settings by name, from drive, steady normal stress and natural scales: arrays, or nodes of a program."""
+    return {
+        "rtol": options.rtol,
+        "most_steps": options.most_steps,
+        "v_high": drive * float(BLOW_UP),
+        "v_low": drive * options.arrest,
+        "sigma_low": CONTACT_SHARE * stress,
+        "z_scale": unknown,
+        "first_step": x / drive,
+        "v_drive": drive,
+    }
 
 
 def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:

@@ -1,14 +1,14 @@
 // What a rig's linear equations say at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
 // The equations themselves are generated (steadyslip/explorer/equations.py).
-import { dampingOfPairs, halfLines, isHurwitz, isIllPosed, roots, stableSet } from "./polynomials.js";
+import { dampingOfPairs, isHurwitz, isIllPosed, roots, stableSet } from "./polynomials.js";
 
 /** @typedef {import("./polynomials.js").Complex} Complex */
 /** @typedef {import("./polynomials.js").Interval} Interval */
 /** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
-/** @typedef {{parameters: string[], affine: boolean, degree: number, closed: boolean, observed: [string, string][]}} Facts */
+/** @typedef {{parameters: string[], affine: boolean, degree: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
+ *   observed: [string, string][]}} Facts */
 
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
-const ON_THE_EDGE = 1e-9, SEARCHED = 6001;
 
 export class Linear {
   /**
@@ -43,20 +43,20 @@ export class Linear {
     return { found: sigma > 0 ? [sigma] : [], lost: !Number.isFinite(slope) || !Number.isFinite(load), slope, load };
   }
 
-  /** Roots of the balance over thirty decades of stress, each bracketed by a change of sign. */
+  /** Roots of the balance over the grid of stresses, each bracketed by a change of sign. */
   searched() {
-    const found = [], at = (sigma) => {
+    const { grid: [many, first, last], solved } = this.facts, found = [], at = (sigma) => {
       this.R[this.count] = sigma;
       this.programs.residual(this.R, 0, this.y);
       return this.y[0];
     };
-    let low = 1e-12, below = at(low);
-    for (let i = 1; i < SEARCHED; i++) {
-      const high = 10 ** (-12 + (30 * i) / (SEARCHED - 1)), above = at(high);
+    let low = 10 ** first, below = at(low);
+    for (let i = 1; i < many; i++) {
+      const high = 10 ** (first + ((last - first) * i) / (many - 1)), above = at(high);
       if (above === 0) found.push(high);
       else if (below * above < 0) {
         const root = bracketed(at, low, high, below);
-        if (Math.abs(at(root)) <= 1e-6 * root) found.push(root); // a pole changes sign too
+        if (Math.abs(at(root)) <= solved * root) found.push(root); // a pole changes sign too
       }
       [low, below] = [high, above];
     }
@@ -103,7 +103,7 @@ export class Linear {
       illPosed: isIllPosed(c),
       side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
       frequency: critical === null ? null : edgewise,
-      onEdge: Math.abs(0.5 * dampingOfPairs(eigenvalues)) <= ON_THE_EDGE || statics <= ON_THE_EDGE,
+      onEdge: Math.abs(0.5 * dampingOfPairs(eigenvalues)) <= this.facts.edge || statics <= this.facts.edge,
       observed: Object.fromEntries(this.facts.observed.map(([name], i) => [name, observed[i]])),
     };
   }
@@ -114,9 +114,7 @@ export class Linear {
       const { intervals, edges } = stableSet(p, q);
       return { intervals, ends: edges.map((edge) => edge.k) };
     }
-    const [numerator, denominator, muB2, muB3, a2, a3, gain] = this.ask("ingredients", 7);
-    const whole = a2 > 0 && a3 >= 0 ? halfLines([[denominator, numerator], [1 + muB2, -muB3]]) : null;
-    const intervals = whole && whole.high > gain ? [{ low: Math.max(whole.low - gain, 0), high: whole.high - gain }] : [];
+    const [low, high] = this.ask("interval", 2), intervals = low < high ? [{ low, high }] : [];
     const ends = intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k));
     return { intervals, ends };
   }

@@ -1,34 +1,8 @@
 // What a rig does after a disturbance: the generated kernel under the transpiled driver, in slices, so that it can be
-// stopped. Settings are those of steadyslip/motion/jobs.py, scales those of steadyslip/model/scales.py.
+// stopped. What it starts from, scales, settings and segments, is generated too (steadyslip/explorer/motion.py).
 import { zeros } from "../../kernels/printers/runtime.js";
 
-const SLICE = 2000, MOST_STEPS = 100000, HEAR = 20; // ms between looks at what the page says
-
-/** A channel's new value behind the moment of the disturbance, or how long it lasts; a blow changes the start. */
-const SEGMENTS = {
-  velocity: (at, size, until, drive) => [[at, until, 0, drive * size, 0, 0]],
-  hold: (at, size, until, drive) => (at + size < until ? [[at, at + size, 0, 0, 0, 0], [at + size, until, 0, drive, 0, 0]] : [[at, until, 0, 0, 0, 0]]),
-  push: (at, size, until, drive) => [[at, until, size, drive, 0, 0]],
-  normal: (at, size, until, drive) => [[at, until, 0, drive, 0, size]],
-  pull: (at, size, until, drive) => [[at, until, 0, drive, size, 0]],
-  blow: () => [],
-};
-
-/** The sizes that matter in steady sliding: of slip, velocity variable and memory, and of the unknown. */
-function scales(facts, found, drive) {
-  const many = facts.memory.length, [direct, bySlip, byUnknown] = found, size = Math.abs(direct);
-  const byMemory = found.slice(3, 3 + many), decay = found.slice(3 + many, 3 + 2 * many), memory = found.slice(3 + 2 * many);
-  const distances = [...decay.map((rate) => drive / Math.abs(rate)), size / Math.abs(bySlip)].filter((d) => Number.isFinite(d) && d > 0);
-  const x = distances.length ? Math.min(...distances) : Math.abs(drive), w = facts.linear ? drive : 1;
-  const of = new Map([["x", x], ["w", w], ...facts.memory.map((name, i) => {
-    const weight = size / Math.abs(byMemory[i]), own = Math.abs(memory[i]);
-    const scale = Number.isFinite(weight) && weight > 0 ? weight : own > 0 ? own : 1;
-    return [name, own > 0 ? Math.min(scale, Math.max(own, scale * 1e-3)) : scale];
-  })]);
-  const sizes = facts.names.map((name, i) => (facts.kinds[i] === "integral" ? (x * x) / drive : of.get(name)));
-  const share = facts.eliminated === null ? 1 : Math.abs(byMemory[facts.eliminated] / direct);
-  return { x, sizes, unknown: facts.inertial ? (drive * drive) / x : w, posed: byUnknown > 0, share };
-}
+const SLICE = 2000, HEAR = 20; // ms between looks at what the page says
 
 export class Motion {
   /** @param {any} machine @param {any} facts @param {any} driver */
@@ -41,7 +15,7 @@ export class Motion {
     this.recorded = [];
     this.points = [];
     this.grow();
-    this.y = new Float64Array(Math.max(facts.constants, 3 + 3 * facts.memory.length, facts.kept + 1) + 1);
+    this.y = new Float64Array(Math.max(facts.constants, 3 + facts.settings, facts.kept + 1, facts.segments * facts.segment) + 1);
   }
 
   ask(name, many, number = 0) {
@@ -54,7 +28,9 @@ export class Motion {
     this.R.set(values);
     this.R[this.R.length - 1] = sigma;
     this.drive = this.R[this.facts.parameters.indexOf("drive.velocity")];
-    this.scales = scales(this.facts, this.ask("weights", 3 + 3 * this.facts.memory.length), this.drive);
+    const [x, posed, share, ...settings] = this.ask("scales", 3 + this.facts.settings);
+    this.scales = { x, posed: posed > 0, share };
+    this.settings = settings;
     return this;
   }
 
@@ -69,21 +45,24 @@ export class Motion {
 
   /** The arrays that the driver takes: constants, start, settings, segments. */
   tables(disturbance, size, at, until) {
-    const { facts, scales: own } = this, sigma = this.R[this.R.length - 1], constants = zeros(1, facts.all);
+    const { facts } = this, constants = zeros(1, facts.all), start = zeros(1, facts.kept), settings = zeros(1, facts.settings);
     constants[0].set(this.ask("constants", facts.constants));
-    const found = this.ask("start", facts.kept + 1, disturbance === "blow" ? size : 1), start = zeros(1, facts.kept), many = facts.settings.ATOL;
+    const found = this.ask("start", facts.kept + 1, disturbance === "blow" ? size : 1);
     start[0].set(found.slice(0, facts.kept));
-    const settings = zeros(1, many + facts.names.length), given = {
-      RTOL: facts.rtol, MOST_STEPS, V_HIGH: this.drive * facts.blowUp, V_LOW: this.drive * facts.arrest,
-      SIGMA_LOW: facts.contactShare * sigma, WATCH: 1, RECORD: 1, GUESS: facts.inertial ? 0 : found[facts.kept],
-      Z_SCALE: own.unknown, FIRST_STEP: own.x / this.drive, V_DRIVE: this.drive,
-    };
-    for (const [name, value] of Object.entries(given)) settings[0][facts.settings[name]] = value;
-    own.sizes.forEach((scale, i) => (settings[0][many + i] = facts.rtol * scale));
-    const rows = disturbance === "blow" ? [[0, until, 0, this.drive, 0, 0]] : [[0, at, 0, this.drive, 0, 0], ...SEGMENTS[disturbance](at, size, until, this.drive)];
-    const segments = zeros(1, rows.length, 9);
+    settings[0].set(this.settings);
+    if (!facts.inertial) settings[0][facts.guess] = found[facts.kept];
+    const rows = this.rows(disturbance, size, at, until), segments = zeros(1, rows.length, facts.segment);
     rows.forEach((row, i) => segments[0][i].set(row));
     return [constants, start, settings, segments];
+  }
+
+  /** Segments of a disturbance: begin and end are first in each; what lies behind the run is cut off. */
+  rows(disturbance, size, at, until) {
+    const { facts: { segment }, y } = this, rows = [];
+    y.fill(-1);
+    this.machine.segments[disturbance](Float64Array.of(at, size, until, this.drive), 0, y);
+    for (let k = 0; y[k] >= 0 && y[k] < until; k += segment) rows.push([y[k], Math.min(y[k + 1], until), ...y.subarray(k + 2, k + segment)]);
+    return rows;
   }
 
   /**
@@ -95,7 +74,7 @@ export class Motion {
    */
   async run({ disturbance, size, at, until }, stopped, pause, told = () => {}) {
     const { facts, machine, driver } = this, { layout, routines } = machine, c = facts.cursor;
-    const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows), point = 1 + facts.names.length;
+    const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows), point = 1 + facts.size;
     cursor[c.LAST_JOB] = cursor[c.BUSY] = 1;
     cursor[c.PAUSED] = -1;
     const out = [zeros(1), zeros(1, facts.final + point), zeros(1, facts.tally), zeros(1, 0, point)];
@@ -116,9 +95,9 @@ export class Motion {
 
   /** More room for what is written down. */
   grow() {
-    const { logged, recorded, names } = this.facts;
+    const { logged, recorded, size } = this.facts;
     for (const row of zeros(Math.max(128, this.log.length), logged)) this.log.push(row);
-    for (const row of zeros(Math.max(2048, this.recorded.length), recorded + 1 + names.length)) {
+    for (const row of zeros(Math.max(2048, this.recorded.length), recorded + 1 + size)) {
       this.recorded.push(row);
       this.points.push(row.subarray(recorded));
     }
@@ -132,7 +111,7 @@ export class Motion {
       times[i] = recorded[i][0];
       segment[i] = recorded[i][1];
     }
-    /** @type {any} */ (points).shape = [many, 1 + facts.names.length];
+    /** @type {any} */ (points).shape = [many, 1 + facts.size];
     const [constants, , settings, segments] = tables;
     this.driver.observe(machine.layout, machine.routines, constants, settings, segments, points, own, segment, times, values);
     const events = [], { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind;

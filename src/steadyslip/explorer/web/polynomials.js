@@ -248,21 +248,6 @@ export function stableSet(p, q) {
 }
 
 /**
- * The one interval of k > 0 where slope·k > right for every pair, and each of `positive` is > 0.
- * @param {[number, number][]} lines
- * @returns {Interval | null}
- */
-export function halfLines(lines) {
-  let low = 0, high = Infinity;
-  for (const [slope, right] of lines) {
-    if (slope > 0) low = Math.max(low, right / slope);
-    else if (slope < 0) high = Math.min(high, right / slope);
-    else if (!(right < 0)) return null;
-  }
-  return low < high ? { low, high } : null;
-}
-
-/**
  * Damping ratios' kin: scale-free distances of the least damped pair and of the least damped real root from the axis.
  * @param {Complex[]} found
  * @returns {number} of the pair, NaN if there is none

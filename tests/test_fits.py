@@ -261,7 +261,7 @@ def test_basalt():
     said = " ".join(str(fit).split())
     assert "driven by commanded loading found in the record, 1 change of rate" in said
     assert "the measured displacement would make a -24%, b -22%, k -54%" in said
-    assert "k/σ 0.00663 ± 0.00064 /um" in said
+    assert "k/σ 0.006627 ± 0.00064 /um" in said
     assert "a ramp of up to" in said
 
 
@@ -301,7 +301,7 @@ def test_sepiolite_strengthens():
     fit = ss.fit(ss.lab_rig("aging"), ss.read_record(lab.SEPIOLITE), trend=2)
     assert fit.search.converged
     assert fit["b"].high < 0
-    assert fit.ssq == pytest.approx(1.5842e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
+    assert fit.ssq == pytest.approx(1.5903e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
     assert 0.7 < fit.noise[0].lag1 < 0.9
 
 

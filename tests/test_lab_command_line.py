@@ -29,7 +29,7 @@ def fitted(tmp_path_factory):
 def test_from_a_record_to_estimates(fitted):
     folder, text = fitted
     assert "velocity step at 11676.4 s: 3.001 um/s to 10 um/s" in text
-    assert "friction.d_c      9.465 ± 0.43 um" in text
+    assert "friction.d_c      9.464 ± 0.43 um" in text
     assert "steps back 1773 times" in text
     assert f"wrote {folder / 'fit.html'}" in text
     data = json.loads((folder / "fit.json").read_text())

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import lab_records as lab
+import steadyslip as ss
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.loading.kinks import load_course, smooth_load
 from steadyslip.experiments.loading.loading import Loading, shifted
@@ -213,3 +215,21 @@ def test_a_glitch_at_a_step_does_not_hide_its_time(seed, height, later, width):
     course = load_course(time, load)
     assert len(course.changes) == 1
     assert course.changes[0].earliest < 30.263 < course.changes[0].latest
+
+
+@pytest.mark.parametrize(
+    ("ramp", "noise", "words"),
+    [(0.0, 2e-6, "friction does not tell either: with"), (0.0, 6e-6, "friction tells: ramps of"),
+     (1.5, 2e-6, "friction is better fitted so")],
+)  # fmt: skip
+def test_friction_is_asked_whether_a_step_is_a_ramp(ramp, noise, words):
+    """Where the displacement does not tell, friction may; a fit says which, and what ramps make of its parameters."""
+    change = ss.VelocityRamp(at=60.0, to=5e-6, duration=ramp) if ramp else ss.VelocityStep(at=60.0, to=5e-6)
+    found = lab.columns(lab.rig(), ss.Protocol(pieces=(change,), until=150.0))
+    rng = np.random.default_rng(4)
+    found["friction"] = found["friction"] + 1e-5 * rng.standard_normal(len(found["time"]))
+    found["displacement"] = found["displacement"] + noise * rng.standard_normal(len(found["time"]))
+    fit = ss.fit(ss.lab_rig(), ss.record_from_arrays(**found))
+    assert words in " ".join(str(fit).split())
+    best = min(fit.as_ramps, key=lambda one: one.ssq)
+    assert best.values["step.1.duration"] == pytest.approx(ramp, abs=0.5)

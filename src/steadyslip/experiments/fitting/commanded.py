@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from steadyslip.core.errors import InternalError
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.loading import Change, Course, Loading, resting_rate
 
@@ -102,13 +103,15 @@ class CommandedInputs:
             before = low - times[:, -1:] - np.array([[SLID * (high - low), 0.0]])
         nodes = np.hstack([np.clip(events, low, high), before, np.tile(self.nodes, (jobs, 1))])
         order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
+        moving = nodes[:, : nodes.shape[1] - len(self.nodes)]
+        curves = {channel: self._along(channel, moving, order) for channel in self._curves}
         nodes = np.take_along_axis(nodes, order, axis=1)
         count = events.shape[1] + before.shape[1]
         place = np.concatenate([np.full(count, -1), self.sample])
         samples = place[order]
         rows = np.zeros((jobs, nodes.shape[1] - 1, 9))
         rows[:, :, 0], rows[:, :, 1] = nodes[:, :-1] - low, nodes[:, 1:] - low
-        self._fill(rows, nodes, begins, lengths)
+        self._fill(rows, nodes, begins, lengths, curves)
         table = InputTable(rows, np.ascontiguousarray(samples), len(self.time))
         if not directions or not self.free:
             return table
@@ -130,7 +133,21 @@ class CommandedInputs:
         changing = self._input_rates(nodes, begins, lengths, first, directions)
         return InputTable(rows, table.samples, table.count, rates, changing)
 
-    def _fill(self, rows: Array, nodes: Array, begins: Array, lengths: Array) -> None:
+    @cached_property
+    def _curves(self) -> dict[str, Array]:
+        """The smooth curves at all nodes whose time is fixed."""
+        return {name: course.curve(self.nodes) for name, course in self.courses.items() if course.curve is not None}
+
+    def _along(self, channel: str, moving: Array, order: Array) -> Array:
+        """A smooth curve at all nodes in order, those whose times move first to begin with."""
+        curve = self.courses[channel].curve
+        if curve is None:
+            raise InternalError(f"the {channel} has no curve")
+        fixed = np.tile(self._curves[channel], (len(moving), 1))
+        own = curve(moving.ravel()).reshape(moving.shape)
+        return np.take_along_axis(np.hstack([own, fixed]), order, axis=1)
+
+    def _fill(self, rows: Array, nodes: Array, begins: Array, lengths: Array, curves: dict[str, Array]) -> None:
         """Values and slopes of the inputs on every row."""
         middle = 0.5 * (nodes[:, 1:] + nodes[:, :-1])
         for channel, course in self.courses.items():
@@ -151,9 +168,8 @@ class CommandedInputs:
                     after += gone
             if channel == "load" and self.resting is not None:
                 before[:, 0] = after[:, 0] = self.resting
-            if course.curve is not None:
-                curve = course.curve(nodes.ravel()).reshape(nodes.shape)
-                before, after = before + curve[:, :-1], after + curve[:, 1:]
+            if channel in curves:
+                before, after = before + curves[channel][:, :-1], after + curves[channel][:, 1:]
             spacing = nodes[:, 1:] - nodes[:, :-1]
             column = _COLUMN[channel]
             rows[:, :, 3 + column] = before

@@ -18,7 +18,7 @@ from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.refit import driven_as_measured
+from steadyslip.experiments.fitting.refit import Ramped, driven_as_measured, with_ramps
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.machine.slider import Slider
@@ -209,8 +209,17 @@ class FitNumbers(ReadOnly):
 
         None where the model does not follow commanded loading, or the columns have no noise to speak of.
         """
-        bounds = dict(zip(self.names, zip(*self.bounds, strict=True), strict=True))
-        return driven_as_measured(self.plan, self.values, bounds)
+        return driven_as_measured(self.plan, self.values, self._ends)
+
+    @cached_property
+    def as_ramps(self) -> tuple[Ramped, ...]:
+        """What would come of it if steps of the rate that the displacement cannot tell from ramps were ramps."""
+        return with_ramps(self.plan, self.values, self._ends)
+
+    @property
+    def _ends(self) -> dict[str, tuple[float, float]]:
+        """Where the coordinates were searched, by name."""
+        return dict(zip(self.names, zip(*self.bounds, strict=True), strict=True))
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:

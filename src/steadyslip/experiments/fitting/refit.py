@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steadyslip.experiments.fitting.plan import Plan, with_loading
-from steadyslip.experiments.loading.loading import resting_rate
+from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import minimise
+
+SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # of the longest that a ramp may be: durations that are tried
+
+
+@dataclass(frozen=True)
+class Ramped:
+    """Where the search ends if steps that may be ramps are ramps of a given share of their longest durations.
+
+    Attributes
+    ----------
+    share : float
+    ssq : float
+        Sum of squares.
+    values : dict of str to float
+        Of all unknowns, by name; durations are ``step.1.duration``.
+    """
+
+    share: float
+    ssq: float
+    values: dict[str, float]
 
 
 def driven_as_measured(
@@ -39,3 +59,54 @@ def driven_as_measured(
     if not np.isfinite(found.ssq[0]):
         return None
     return dict(zip((u.name for u in space.unknowns), map(float, space.values(found.coordinates[0])), strict=True))
+
+
+def may_be_ramp(channel: str, change: Change) -> bool:
+    """Whether a change is taken as a step although a ramp would fit the displacement as well."""
+    return channel == "load" and change.free and change.duration == 0 and change.longest > 0
+
+
+def with_ramps(
+    plan: Plan, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[Ramped, ...]:
+    """Where the search ends if steps that may be ramps are, the shortest first; empty where there are none.
+
+    Parameters are as for `driven_as_measured`. A number of durations are tried, as shares of the longest that each may
+    have; the middle of a ramp stays where the step may be.
+    """
+    if not plan.follows or not any(may_be_ramp(c, change) for one in plan.loading for c, _, change in one.changes):
+        return ()
+    plan = replace(plan, loading=tuple(_with_ramps(loading) for loading in plan.loading))
+    space = plan.space()
+    low, high = ([bounds.get(u.name, u.bounds)[side] for u in space.unknowns] for side in (0, 1))
+    lows, highs = (np.tile(ends, (len(SHARES), 1)) for ends in (low, high))
+    begin = np.array([[values.get(u.name, share * u.high) for u in space.unknowns] for share in SHARES])
+    lengths = [k for k, u in enumerate(space.unknowns) if u.name not in values]
+    for k in lengths:  # the unknown before a duration is when its ramp begins
+        earlier = 0.5 * begin[:, k : k + 1]
+        begin[:, k - 1 : k] -= earlier
+        for ends in (lows, highs):
+            ends[:, k - 1 : k] -= earlier / space.unknowns[k - 1].size
+    held = np.zeros(begin.shape, dtype=bool)
+    held[:, lengths] = True
+    z = space.coordinates(begin)
+    lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
+    comparison = plan.comparison()
+    found = minimise(lambda x, _: comparison.residuals(x), z, lows, highs, most=40, held=held, tolerance=1e-8)
+    names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
+    return tuple(
+        Ramped(share, float(ssq), dict(zip(names, map(float, row), strict=True)))
+        for share, ssq, row in zip(SHARES, found.ssq, own, strict=True)
+        if np.isfinite(ssq)
+    )
+
+
+def _with_ramps(loading: Loading) -> Loading:
+    if loading.load is None:
+        return loading
+    changes = tuple(
+        replace(one, time=one.time - 0.25 * one.longest, duration=0.5 * one.longest, shortest=0.0)
+        if may_be_ramp("load", one) else one
+        for one in loading.load.changes
+    )  # fmt: skip
+    return replace(loading, load=replace(loading.load, changes=changes))

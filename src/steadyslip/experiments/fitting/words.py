@@ -9,12 +9,14 @@ import numpy as np
 
 from steadyslip.core.quantities import shown, total
 from steadyslip.experiments.fitting.numbers import FitNumbers
+from steadyslip.experiments.fitting.refit import Ramped, may_be_ramp
 from steadyslip.experiments.numerics.splitting import displacement_noise
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 WIDTH = 100
+SURE = 9.0  # fall of the sum of squares, in variances of an independent sample, that tells a ramp from a step
 VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
 
 
@@ -119,16 +121,55 @@ def _between_samples(fit: FitNumbers, one: Any) -> bool:
 
 
 def _untold_ramps(fit: FitNumbers) -> list[str]:
-    """Changes of the rate that may be steps or ramps: the record does not tell, and the direct effect depends on it."""
+    """Changes of the rate that may be steps or ramps: what the displacement leaves open, and what friction says."""
     found = []
     for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
-        for channel, _, change in loading.changes:
-            if channel == "load" and change.duration == 0 and change.longest > 0 and change.free:
-                found.append(
-                    f"{record.source}: the change of rate at {change.time:.7g} s is taken as a step; a ramp of up to "
-                    f"{shown(change.longest, 's')} would fit the displacement as well, and make a larger"
-                )
+        untold = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
+        if untold:
+            times = _listed([f"{change.time:.7g}" for change in untold])
+            longest = shown(max(change.longest for change in untold), "s")
+            what, taken, ramps = ("changes", "are taken as steps", "ramps") if len(untold) > 1 else (
+                "change", "is taken as a step", "a ramp")  # fmt: skip
+            found.append(
+                f"{record.source}: the {what} of rate at {times} s {taken}; {ramps} of up to {longest} would fit the "
+                "displacement as well"
+            )
+    if found and fit.as_ramps:
+        found[-1] += f"; {_of_ramps(fit, fit.as_ramps)}"
     return found
+
+
+def _of_ramps(fit: FitNumbers, tried: tuple[Ramped, ...]) -> str:
+    """Whether friction tells ramps from steps, and what ramps make of the parameters."""
+    worth = fit.samples / float(np.mean([max(noise.inflation, 1.0) for noise in fit.noise]))
+    best = min(tried, key=lambda one: one.ssq)
+    alike = [one for one in tried if one.ssq < best.ssq * (1 + SURE / worth)]
+    lengths = {one.share: _lengths(fit, one) for one in tried}
+    if alike == [tried[0]]:
+        return f"friction tells: ramps of {lengths[tried[1].share]} make the sum of squares {_more(fit, tried[1])}"
+    longest = alike[-1] if tried[0] in alike else best
+    changes = ", ".join(f"{_letter(n)} {longest.values[n] / fit.values[n] - 1:+.1%}" for n in _steep_names(fit.rig(0))
+                        if n in longest.values and fit.values.get(n))  # fmt: skip
+    verdict = "friction does not tell either" if tried[0] in alike else "friction is better fitted so"
+    return f"{verdict}: with {lengths[longest.share]} the sum of squares is {_more(fit, longest)}; {changes}"
+
+
+def _lengths(fit: FitNumbers, ramped: Ramped) -> str:
+    own = [shown(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values]
+    return _listed(own)
+
+
+def _more(fit: FitNumbers, ramped: Ramped) -> str:
+    share = ramped.ssq / fit.ssq - 1
+    return f"{abs(share):.2%} {'larger' if share > 0 else 'less'}"
+
+
+def _letter(name: str) -> str:
+    return "k" if name == "slider.stiffness" else name.rpartition(".")[2]
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def drive_line(fit: FitNumbers) -> str:
@@ -154,7 +195,7 @@ def drive_line(fit: FitNumbers) -> str:
     if other is None:
         return text
     shares = [
-        f"{'k' if name == 'slider.stiffness' else name.rpartition('.')[2]} {other[name] / fit.values[name] - 1:+.0%}"
+        f"{_letter(name)} {other[name] / fit.values[name] - 1:+.0%}"
         for name in _steep_names(fit.rig(0))
         if name in other and fit.values.get(name)
     ]

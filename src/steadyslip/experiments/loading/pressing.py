@@ -18,6 +18,8 @@ NEAR = 3  # of them
 BINS = 40  # of a span between changes, whose means
 UNEVEN = 3.0  # times the variance that noise would give them say that it is not constant
 JUST = 1e-6  # of the time between two samples: as soon as possible after one
+SLOW = 400  # knots of a curve between two changes: what is briefer is noise
+PER_PERIOD = 60  # knots of an oscillation
 OSCILLATION = 8  # alternating changes that are one oscillation
 
 
@@ -34,8 +36,9 @@ class StressWave:
 def stress_course(time: Array, normal: Array) -> Course:
     """The normal stress that was commanded."""
     noise = level_noise(normal)
-    if oscillation(time, normal) is not None:
-        return Course(float(np.mean(normal)), curve=_Spans([_span(time, normal, float(np.mean(normal)), noise)]))
+    if (wave := oscillation(time, normal)) is not None:
+        level, knots = float(np.mean(normal)), int(PER_PERIOD * (time[-1] - time[0]) / wave.period)
+        return Course(level, curve=_Spans([_span(time, normal, level, noise, knots)]))
     if len(time) < 2 * FEWEST:
         return Course(float(np.mean(normal)), strays=noise)
     places = _transitions(time, normal, split(time, normal, noise, linear=False))
@@ -50,7 +53,7 @@ def stress_course(time: Array, normal: Array) -> Course:
     curves = []
     for span, level in zip(spans, levels, strict=True):
         if _uneven(normal[span], noise):
-            curves.append(_span(time[span], normal[span], level, noise))
+            curves.append(_span(time[span], normal[span], level, noise, SLOW))
     errors = np.array([noise / np.sqrt(span.stop - span.start) for span in spans])
     errors[noise <= 2e-7 * abs(levels[0])] = 0.0
     return Course(levels[0], changes, errors, _Spans(curves) if curves else None, noise)
@@ -158,8 +161,8 @@ def _uneven(values: Array, noise: float) -> bool:
     return bool(np.var(means) > UNEVEN * noise**2 / size)
 
 
-def _span(time: Array, normal: Array, level: float, noise: float) -> tuple[float, float, LoadCurve]:
-    curve = smoothing_curve(time, normal - level, noise)
+def _span(time: Array, normal: Array, level: float, noise: float, knots: int) -> tuple[float, float, LoadCurve]:
+    curve = smoothing_curve(time, normal - level, noise, knots)
     return float(time[0]), float(time[-1]), curve
 
 

@@ -97,7 +97,7 @@ def minimise(
     ----------
     residuals : callable
     start : ndarray (m, p)
-    low, high : ndarray (p,)
+    low, high : ndarray (p,) or (m, p)
         Bounds.
     most : int
         Iterations.
@@ -116,6 +116,7 @@ def minimise(
     count, size = start.shape
     if not count:
         return Minima.at(start)
+    low, high = np.broadcast_to(low, start.shape), np.broadcast_to(high, start.shape)
     z = np.clip(start, low, high)
     held = np.zeros((count, size), dtype=bool) if held is None else held
     everyone = np.arange(count)
@@ -137,7 +138,7 @@ def minimise(
         z = found.coordinates[active]
         diagonal = np.einsum("mii->mi", normal)
         scale[active] = np.maximum(scale[active] * 0.5, diagonal)
-        free = ~held[active] & ~(((z <= low) & (gradient < 0)) | ((z >= high) & (gradient > 0)))
+        free = ~held[active] & ~(((z <= low[active]) & (gradient < 0)) | ((z >= high[active]) & (gradient > 0)))
         promise = _promise(normal, gradient, free)
         over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | stuck[active]
         best = min(known, float(np.min(found.ssq[found.converged], initial=np.inf)))
@@ -159,7 +160,7 @@ def minimise(
         stretch = _stretch(step, last[active], scale[active]) * plain[active]
         step *= np.maximum(stretch, 1.0)[:, None]
         step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
-        trial = np.clip(z + step, low, high)
+        trial = np.clip(z + step, low[active], high[active])
         hoped, expected = _expected(normal, gradient, step), _expected(normal, gradient, trial - z)
         r, jacobian = residuals(trial, active)
         new_normal, new_gradient = _normal(r, jacobian)

@@ -10,20 +10,24 @@ from scipy.interpolate import make_interp_spline, make_smoothing_spline
 
 Array = np.ndarray
 MOST_KNOTS = 4000
+CLEAN = 1e-3  # of its range: noise of a column that is followed sample by sample
 
 
-def smoothing_curve(time: Array, values: Array, noise: float) -> Smooth:
+def smoothing_curve(time: Array, values: Array, noise: float, knots: int = MOST_KNOTS) -> Smooth:
     """A smoothing cubic spline through samples, as smooth as cross-validation says; of means where samples are many.
+
+    Noise that remembers itself makes cross-validation follow it; means of what is shorter than anything wanted do not.
 
     Cross-validation takes a second; whoever reads a record again gets the same curve at once.
     """
-    return _curve(np.asarray(time, dtype=float).tobytes(), np.asarray(values, dtype=float).tobytes(), noise)
+    columns = (np.asarray(column, dtype=float).tobytes() for column in (time, values))
+    return _curve(*columns, noise, min(knots, MOST_KNOTS))
 
 
 @lru_cache(maxsize=16)
-def _curve(times: bytes, samples: bytes, noise: float) -> Smooth:
+def _curve(times: bytes, samples: bytes, noise: float, knots: int) -> Smooth:
     time, values = np.frombuffer(times), np.frombuffer(samples)
-    step = -(-len(time) // MOST_KNOTS)
+    step = -(-len(time) // (knots if noise > CLEAN * float(np.ptp(values)) else MOST_KNOTS))
     if step > 1:
         ends = np.arange(0, len(time), step)
         count = np.diff(np.append(ends, len(time)))

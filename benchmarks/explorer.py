@@ -1,4 +1,4 @@
-"""JavaScript beside Python on every law x contact x mass x drive: verdicts, edges, eigenvalues; motion, slip events.
+"""JavaScript beside Python on every law x contact x mass x drive, users' laws too: verdicts, motion, slip events.
 
     python benchmarks/explorer.py verdicts [--first N]
     python benchmarks/explorer.py motion [--first N]
@@ -28,6 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 import steadyslip as ss
+import users_laws
 from explored import Explored, compared
 from fuzz_rigs import DRIVES, FRICTION
 from moved import moved, slip_events
@@ -37,16 +38,17 @@ CHANGES = ({}, {"stiffness": 0.01}, {"stiffness": 100.0}, {"drive.velocity": 30.
 BAR = 1e-12
 
 
+LAWS = [*FRICTION, ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3), users_laws.FRICTION]
+PRESSED = [*CONTACTS, ss.Prescribed(preload=5e6, amplitude=1e5, period=3.0), users_laws.CONTACT]
+
+
 def kinds(seed: int = 16) -> Iterator[tuple[str, ss.Slider]]:
-    """All combinations, in one order drawn at random, with a name for each."""
-    every = list(itertools.product(range(len(FRICTION)), range(len(CONTACTS)), (0.0, 1e6), range(len(DRIVES))))
+    """All combinations of registered laws and two users' laws, in one order drawn at random, with a name for each."""
+    every = list(itertools.product(range(len(LAWS)), range(len(PRESSED)), (0.0, 1e6), range(len(DRIVES))))
     random.Random(seed).shuffle(every)
     for law, contact, mass, drive in every:
-        rig = ss.Slider(
-            friction=FRICTION[law], contact=CONTACTS[contact], stiffness=9e9, mass=mass, drive=DRIVES[drive]
-        )
-        words = f"{FRICTION[law].name} {law} x {CONTACTS[contact].name}, mass {mass:g}, {DRIVES[drive].name}"
-        yield words, rig
+        rig = ss.Slider(friction=LAWS[law], contact=PRESSED[contact], stiffness=9e9, mass=mass, drive=DRIVES[drive])
+        yield f"{LAWS[law].name} {law} x {PRESSED[contact].name}, mass {mass:g}, {DRIVES[drive].name}", rig
 
 
 def verdicts(first: int) -> None:

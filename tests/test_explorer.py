@@ -6,7 +6,6 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-import sympy as sp
 from hypothesis import assume, given, settings, strategies as st
 
 import steadyslip as ss
@@ -14,7 +13,6 @@ from explored import Explored, compared, library
 from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
-from steadyslip.core.roles import positive
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
@@ -26,59 +24,8 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.reduction import reduce_model
 from steadyslip.model.scales import natural_scales, posed
 from steadyslip.motion.jobs import prepare
+from users_laws import USERS, Turning
 
-FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
-BEFORE = [dict(family.registry) for family in FAMILIES]
-
-
-class Viscous(ss.FrictionLaw, name="viscous-of-tests"):
-    """A user's law: the slip law with viscous friction that saturates."""
-
-    a: float = ss.parameter("1", positive, "direct effect")
-    b: float = ss.parameter("1", positive, "evolution effect")
-    d_c: float = ss.parameter("m", positive, "slip distance")
-    level: float = ss.parameter("1", positive, "friction at 1 µm/s")
-    film: float = ss.parameter("Pa", positive, "viscous stress of a fast block")
-
-    def memory(self):
-        return ("age",)
-
-    def strength(self, v, sigma, memory, tau):
-        dry = sigma * (self.level + self.a * sp.log(v / V0) + self.b * memory[0])
-        return dry + self.film * sp.tanh(v / (1000 * V0))
-
-    def rates(self, v, sigma, memory, tau):
-        return (-v / self.d_c * (sp.log(v / V0) + memory[0]),)
-
-    def steady_memory(self, v, sigma):
-        return (-sp.log(v / V0),)
-
-
-class Asperities(ss.PreloadedContact, name="asperities-of-tests"):
-    """A user's contact, not linear in the stresses: σ = σ0 + c √(T p)."""
-
-    share: float = ss.parameter("1", positive, "share c")
-    pressure: float = ss.parameter("Pa", positive, "pressure p")
-
-    def coupling(self, motion):
-        return self.share * sp.sqrt(motion.spring * self.pressure)
-
-
-class Turning(ss.PreloadedContact, name="turning-of-tests"):
-    """A user's contact with a function that no kernel has."""
-
-    def coupling(self, motion):
-        return 1e5 * sp.atan(motion.friction / 1e6)
-
-
-for family, registry in zip(FAMILIES, BEFORE, strict=True):
-    family.registry = registry
-
-VISCOUS = Viscous(a=0.0145, b=0.016, d_c=1e-6, level=0.7, film=1e5)
-USERS = {
-    "friction law": rig(friction=VISCOUS, contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5)),
-    "contact law": rig(contact=Asperities(preload=SIGMA, share=0.3, pressure=2e6)),
-}
 BAR = 1e-12
 
 
@@ -244,7 +191,7 @@ MOVING = {
     "controller": rig(stiffness=None, drive=ss.PID(V0, kp=9e9, ki=1e8), mass=1e3),
     "regularised": rig(friction=ONE_MEMORY[2], contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=1.2e10),
     "solved": rig(friction=ONE_MEMORY[3], stiffness=2e10),
-    "users' law": rig(friction=VISCOUS, contact=Asperities(preload=SIGMA, share=0.3, pressure=2e6), stiffness=2e10),
+    "users' laws": USERS["both"].with_values({"stiffness": 2e10}),
 }
 DISTURBED = {
     "velocity": (2.0, ss.VelocityStep(at=1.0, to=2 * V0)),

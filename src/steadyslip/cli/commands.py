@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from steadyslip.cli.answers import give, say, say_json
 from steadyslip.cli.ending import end, failed
-from steadyslip.cli.options import AsJson, Branch, Changes, RigFile, outputs
+from steadyslip.cli.options import AsJson, Branch, Changes, Fitted, RigFile, outputs, refuse_branch
 
 
 class _Commands(TyperGroup):
@@ -60,10 +60,7 @@ def analyze(
             "--kick", help="also find the smallest kick not survived: velocity, displacement, ...; repeatable"
         ),
     ] = None,
-    fitted: Annotated[
-        Path | None,
-        typer.Option("--fit", metavar="FIT", help="a fit (.nc): judge with its friction, and how sure that is"),
-    ] = None,
+    fitted: Fitted = None,
 ) -> None:
     """Is steady sliding of this rig stable, what would make it, and how far is the edge?"""
     from steadyslip.files.specifications import read_rig
@@ -123,14 +120,11 @@ def _predicted(
     branch: int,
 ) -> None:
     """The verdict with the friction of a fit: that of the best values, and its probability."""
-    from steadyslip.core.errors import ParameterError, Problem
     from steadyslip.experiments import load_fit, predict
     from steadyslip.files.specifications import read_rig
     from steadyslip.verdict import analyze as run
 
-    if branch:
-        message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
-        raise ParameterError([Problem("--branch", message)])
+    refuse_branch(fitted, branch)
     found = predict(read_rig(rig, changes), load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
@@ -233,22 +227,16 @@ def report(
         Path | None, typer.Option("-o", "--output", help="write the document (.html) instead of opening it")
     ] = None,
     branch: Branch = 0,
-    fitted: Annotated[
-        Path | None,
-        typer.Option("--fit", metavar="FIT", help="a fit (.nc): judge with its friction, and say how sure that is"),
-    ] = None,
+    fitted: Fitted = None,
 ) -> None:
     """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
-    from steadyslip.core.errors import ParameterError, Problem
     from steadyslip.files.output import check_output
     from steadyslip.files.specifications import read_rig
     from steadyslip.reports import report as run
 
     if output is not None:
         check_output([output], [".html"])
-    if fitted is not None and branch:
-        message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
-        raise ParameterError([Problem("--branch", message)])
+    refuse_branch(fitted, branch)
     options: dict[str, Any] = {"branch": branch}
     if fitted is not None:
         from steadyslip.experiments import load_fit

@@ -14,8 +14,26 @@ Changes = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, in SI units")]
 Branch = Annotated[int, typer.Option(help="which steady sliding, where there are several")]
+Fitted = Annotated[
+    Path | None,
+    typer.Option("--fit", metavar="FIT", help="a fit (.nc): judge with its friction, and say how sure that is"),
+]
 
 
 def outputs(what: str) -> Any:
     """The option that names files to write."""
     return typer.Option("-o", "--output", help=f"{what}; repeatable")
+
+
+def refuse_branch(fitted: Path | None, branch: int) -> None:
+    """Refuse to judge another steady sliding with the friction of a fit.
+
+    Raises
+    ------
+    ParameterError
+    """
+    from steadyslip.core.errors import ParameterError, Problem
+
+    if fitted is not None and branch:
+        message = "cannot be combined with --fit, which judges the steady sliding of lowest normal stress"
+        raise ParameterError([Problem("--branch", message)])

@@ -6,7 +6,6 @@ Results lie below the reports and know none of them; this table is what they sha
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
@@ -34,17 +33,6 @@ def brief(result: Any) -> str:
 def whole(result: Any, **options: Any) -> str:
     """A result as a document of its own."""
     return _made("whole")(result, **options)
-
-
-def write_page(result: Any, path: Path, **options: Any) -> None:
-    """Write the document of a result.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
-    path.write_text(whole(result, **options), encoding="utf-8")
 
 
 def _made(kind: str) -> Maker:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.pages import write_page
 from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.files.output import FIGURES, write_by_ending
+from steadyslip.files.standalone import write_page
 
 ENDINGS = (".nc", ".html", ".json", *FIGURES)
 

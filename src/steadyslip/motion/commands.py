@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.pages import write_page
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.files.output import FIGURES, write_by_ending
 from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
+from steadyslip.files.standalone import write_page
 from steadyslip.motion.result import History
 from steadyslip.motion.single import simulate
 from steadyslip.protocol import Protocol

@@ -10,11 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from steadyslip.core.pages import write_page
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
+from steadyslip.files.standalone import write_page
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold

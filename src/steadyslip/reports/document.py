@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import html
 import platform
-import tempfile
-import webbrowser
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from os import PathLike
 from pathlib import Path
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.explorer.assembly import document, fragment, style
-from steadyslip.files.output import whole_file
+from steadyslip.files.standalone import Standalone
 from steadyslip.machine.slider import Slider
 from steadyslip.reports.elements import STYLE, heading, listing, paragraph, table, typed
 
@@ -34,42 +30,8 @@ body { background: #fff; }
 """
 
 
-@dataclass(frozen=True)
-class Report:
-    """A printable document in one file.
-
-    Attributes
-    ----------
-    html : str
-        The whole file; it asks for nothing from outside.
-    title : str
-    """
-
-    html: str = field(repr=False)
-    title: str
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the file.
-
-        Raises
-        ------
-        NotAvailable
-            If it cannot be written.
-        """
-        with whole_file(path) as name:
-            Path(name).write_text(self.html, encoding="utf-8")
-
-    def open(self) -> Path:
-        """Show it in the browser; the file it is in."""
-        options = {"suffix": ".html", "prefix": "steadyslip-", "delete": False, "encoding": "utf-8"}
-        with tempfile.NamedTemporaryFile("w", **options) as to:  # type: ignore[call-overload]
-            to.write(self.html)
-        webbrowser.open(Path(to.name).as_uri())
-        return Path(to.name)
-
-    def _repr_html_(self) -> str:
-        frame = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;border:0"'
-        return f'<iframe title="{html.escape(self.title)}" {frame} srcdoc="{html.escape(self.html)}"></iframe>'
+class Report(Standalone):
+    """A printable document in one file."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,66 @@
+"""A document of its own: HTML in one file, which can be written, opened and shown in a notebook."""
+
+from __future__ import annotations
+
+import html
+import tempfile
+import webbrowser
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from steadyslip.core.pages import whole
+from steadyslip.files.output import whole_file
+
+FRAME = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;border:0"'
+
+
+@dataclass(frozen=True)
+class Standalone:
+    """A document in one file, which asks for nothing from outside.
+
+    Attributes
+    ----------
+    html : str
+        The whole file.
+    title : str
+    """
+
+    html: str = field(repr=False)
+    title: str
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the file.
+
+        Raises
+        ------
+        NotAvailable
+            If it cannot be written.
+        """
+        with whole_file(path) as name:
+            Path(name).write_text(self.html, encoding="utf-8")
+
+    def open(self) -> Path:
+        """Show it in the browser; the file it is in."""
+        with tempfile.NamedTemporaryFile(
+            "w", suffix=".html", prefix="steadyslip-", delete=False, encoding="utf-8"
+        ) as to:
+            to.write(self.html)
+        webbrowser.open(Path(to.name).as_uri())
+        return Path(to.name)
+
+    def _repr_html_(self) -> str:
+        """In a frame of its own, for notebooks."""
+        return f'<iframe title="{html.escape(self.title)}" {FRAME} srcdoc="{html.escape(self.html)}"></iframe>'
+
+
+def write_page(result: Any, path: Path, title: str, **options: Any) -> None:
+    """Write the document of a result.
+
+    Raises
+    ------
+    NotAvailable
+        If it cannot be written.
+    """
+    Standalone(whole(result, title=title, **options), title).save(path)

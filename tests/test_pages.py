@@ -15,7 +15,8 @@ from command import run
 from fuzz_rigs import DRIVES, FRICTION
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
-from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, rows_of, unit_of
+from steadyslip.nonlinear.commands import Thresholds
+from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
 from steadyslip.reports.elements import math, table, typed
 
 VOID = {"br", "img", "meta", "hr", "input", "link"}
@@ -176,9 +177,93 @@ def test_runs_have_documents(results):
     assert found.html.count("<figure>") == 3
 
 
-def test_what_has_no_document_is_refused():
-    with pytest.raises(ss.ParameterError, match="got int; allowed: a rig, a verdict, a run"):
+def test_what_is_no_result_has_no_document():
+    with pytest.raises(ss.ParameterError, match="got int; allowed: a rig or a result"):
         ss.report(3)
+    with pytest.raises(ss.ParameterError, match="got Onset, fit; allowed"):
+        ss.report(ss.hopf(OWN_RIG), fit=3)
+
+
+@pytest.mark.parametrize("name", ["steady", "margin", "onset", "response", "event", "ensemble"])
+def test_results_without_a_document_of_their_own_show_what_notebooks_show(results, name):
+    document = ss.report(results[name], explorer=False).html
+    assert inside(results[name]) in document
+    assert words(document)
+    assert " um" not in words(document)
+
+
+@pytest.fixture(scope="module")
+def kicked():
+    own = OWN_RIG.with_values({"stiffness": 1.2e10, "radiation_damping": 0.0})
+    found = [ss.threshold(own, kick, precision=1e-3) for kick in ("velocity", "displacement")]
+    return own, found
+
+
+def test_thresholds_have_documents(kicked):
+    own, found = kicked
+    text = words(ss.report(Thresholds(own, tuple(found)), explorer=False).html)
+    for one in found:
+        assert re.sub("um", "µm", str(one).partition(": ")[2].partition(" (size")[0]) in text
+    single = words(ss.report(found[0], explorer=False).html)
+    assert "a velocity kick up to" in single
+    assert "displacement kick" not in single
+
+
+def test_a_threshold_says_in_its_headline_that_all_or_nothing_is_survived(kicked):
+    own, found = kicked
+    none = ss.threshold(own.with_values({"stiffness": 1e9}), "velocity")
+    assert "No kick is survived" in words(ss.report(none, explorer=False).html)
+    every = dataclasses.replace(found[0], size=np.inf, bracket=(25.0, np.inf), amount=np.inf)
+    assert "Every kick that was tried is survived" in words(ss.report(every, explorer=False).html)
+
+
+def test_basins_have_documents(kicked):
+    found = ss.basin(kicked[0], x=np.linspace(-1e-6, 1e-6, 5), v=np.geomspace(3e-7, 3e-6, 5), along="stiffness")
+    document = ss.report(found, explorer=False).html
+    assert f"{100 * found.share:.3g} % of the starting points return" in words(document)
+    assert document.count("<figure>") == 2
+
+
+def test_sensitivities_have_documents():
+    ranges = {"friction.a": (0.005, 0.009), "slider.stiffness": (1e9, 1e11)}
+    found = ss.sensitivity(OWN_RIG, ranges, "critical_stiffness", points=256)
+    text = words(ss.report(found, explorer=False).html)
+    assert "friction.a decides most about the critical stiffness" in text
+    assert "1 to 100 GPa/m" in text
+    assert f"{found.total['critical_stiffness'][0]:.3f}" in text
+
+
+@pytest.fixture(scope="module")
+def lab_results():
+    records = [lab.record(lab.rig(b=b), lab.STEP, seed=i) for i, b in enumerate((0.0145, 0.0150, 0.0140))]
+    fits = [ss.fit(lab.rig(), one, free=["a", "b", "d_c"]) for one in records]
+    draws = ss.bootstrap(fits[0], 16)
+    return {
+        "draws": draws, "prediction": ss.predict(lab.rig(), draws),
+        "population": ss.population(dict(zip("ABC", fits, strict=True)), count=200),
+        "comparison": ss.compare_laws(lab.rig(), records[0], ("slip", "aging")), "fit": fits[0],
+    }  # fmt: skip
+
+
+LAB = {
+    "draws": ("16 draws, bootstrap", "error of the draws", "friction.d_c"),
+    "prediction": ("How sure is that?", "probability"),
+    "population": ("Population of 3 experiments", "another experiment, 95 %", "with the others"),
+    "comparison": ("2 laws compared", "aging"),
+    "fit": ("Fit to synthetic", "How sure is that?", "16 draws, bootstrap"),
+}
+
+
+@pytest.mark.parametrize("name", LAB)
+def test_answers_of_records_have_documents(lab_results, name):
+    options = {"draws": lab_results["draws"]} if name == "fit" else {}
+    document = ss.report(lab_results[name], explorer=False, **options).html
+    text = words(document)
+    for part in LAB[name]:
+        assert part in text, part
+    shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
+    assert not re.search(r"\d um\b", shown)
+    assert len(document.encode()) <= 500_000
 
 
 @pytest.mark.slow

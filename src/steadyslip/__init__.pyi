@@ -202,7 +202,9 @@ from .reports import (
 from .schemas import json_schema as json_schema
 from .verdict import (
     Analysis as Analysis,
+    Tolerated as Tolerated,
     analyze as analyze,
+    tolerate as tolerate,
 )
 
 __version__: str

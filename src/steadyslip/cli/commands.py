@@ -180,6 +180,9 @@ def fit(
         try:
             draws = resample(found, bootstrap)
             stopped = draws.interrupted
+            for path in output or ():
+                if path.suffix.lower() == ".html":
+                    write_fit(found, comparison, path, draws)
         except KeyboardInterrupt:
             stopped = True
     if as_json:
@@ -228,16 +231,22 @@ def report(
     ] = None,
     branch: Branch = 0,
     fitted: Fitted = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--tolerance", metavar="NAME=VALUE", help="how far a value may be off, such as stiffness='5 %'; repeatable"
+        ),
+    ] = None,
 ) -> None:
     """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications import read_rig
+    from steadyslip.files.specifications import named_value, read_rig
     from steadyslip.reports import report as run
 
     if output is not None:
         check_output([output], [".html"])
     refuse_branch(fitted, branch)
-    options: dict[str, Any] = {"branch": branch}
+    options: dict[str, Any] = {"branch": branch, "tolerances": dict(map(named_value, tolerance or ()))}
     if fitted is not None:
         from steadyslip.experiments import load_fit
 
@@ -321,18 +330,21 @@ def threshold(
     reference: Annotated[
         str, typer.Option(help="whether the rig's drive is the velocity 'before' or 'after' a velocity step")
     ] = "before",
-    output: Annotated[list[Path] | None, outputs("draw the basin in the phase plane: .png, .svg or .pdf")] = None,
+    output: Annotated[
+        list[Path] | None, outputs("write .html, or draw the basin in the phase plane: .png, .svg or .pdf")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """How large a kick does steady sliding survive? Ctrl-C keeps what there is."""
-    from steadyslip.files.output import FIGURES, check_output
-    from steadyslip.nonlinear.commands import thresholds_of_file, write_basin
+    from steadyslip.files.output import check_output
+    from steadyslip.nonlinear.commands import KICKED, thresholds_of_file, write_thresholds
 
-    check_output(output or (), FIGURES)
+    check_output(output or (), KICKED)
     found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
-    if found.interrupted and output:
+    wanted = [path for path in output or () if not found.interrupted or path.suffix == ".html"]
+    if len(wanted) < len(output or ()):
         typer.secho("stopped: the basin is not drawn", err=True)
-    give(found, () if found.interrupted else output or (), as_json, write_basin)
+    give(found, wanted, as_json, write_thresholds)
 
 
 @app.command("map")
@@ -390,16 +402,16 @@ def sensitivity(
         typer.Option(help="result, such as critical_stiffness or margin; repeatable; those of [map] unless given"),
     ] = None,
     points: Annotated[int, typer.Option(help="sets of points, a power of 2")] = 4096,
-    output: Annotated[list[Path] | None, outputs("draw: .png, .svg or .pdf")] = None,
+    output: Annotated[list[Path] | None, outputs("write .html, or draw: .png, .svg or .pdf")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Which parameters decide? Sobol indices over the ranges of the file's [map]."""
-    from steadyslip.files.output import FIGURES, check_output, write_by_ending
-    from steadyslip.maps.commands import sensitivity_file
+    from steadyslip.files.output import check_output
+    from steadyslip.maps.commands import SHARES, sensitivity_file, write_sensitivity
 
-    check_output(output or (), FIGURES)
+    check_output(output or (), SHARES)
     found = sensitivity_file(rig, changes or (), of or (), points)
-    give(found, output or (), as_json, lambda result, path: write_by_ending(path, {}, result.plot))
+    give(found, output or (), as_json, write_sensitivity)
 
 
 @app.command()

@@ -9,6 +9,7 @@ from typing import Any
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.answers.laws import LawComparison
+from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.files.output import FIGURES, write_by_ending
 from steadyslip.files.standalone import write_page
@@ -33,8 +34,8 @@ def split_files(files: Sequence[Path]) -> tuple[list[Path], Path | None]:
     return records, specs[0] if specs else None
 
 
-def write_fit(fit: Fit, comparison: LawComparison | None, path: Path) -> None:
-    """Write a fit by the ending of the name.
+def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Draws | None = None) -> None:
+    """Write a fit by the ending of the name; a document has the draws in it, too.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path) -> None:
         target.write_text(json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
     def as_page(target: Path) -> None:
-        write_page(fit, target, title=f"Fit of {path.stem}", comparison=comparison)
+        write_page(fit, target, title=f"Fit of {path.stem}", comparison=comparison, draws=draws)
 
     write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
 

@@ -24,10 +24,11 @@ from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
+from steadyslip.figures.tolerances import tolerances
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
 from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
-from steadyslip.verdict import Analysis
+from steadyslip.verdict import Analysis, Tolerated
 
 __all__ = [
     "ANGLES",
@@ -53,6 +54,7 @@ __all__ = [
     "stability_chart",
     "steps",
     "threshold_map",
+    "tolerances",
 ]
 
 
@@ -76,3 +78,4 @@ register_figures(Prediction, prediction=prediction, kicks=kicks)
 register_figures(MapResult, map=map_figure)
 register_figures(Refined, refined=refined)
 register_figures(Sensitivity, sensitivity=sensitivity)
+register_figures(Tolerated, tolerances=tolerances)

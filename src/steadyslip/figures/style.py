@@ -26,13 +26,13 @@ LINES = ("-", "--", "-.", ":")
 GREY = "#BBBBBB"
 
 
-def axes_or_new(ax: Axes | None) -> Axes:
-    """The Axes given, or those of a new pyplot figure."""
+def axes_or_new(ax: Axes | None, height: float = 4.8) -> Axes:
+    """The Axes given, or those of a new pyplot figure, so many inches high."""
     if ax is not None:
         return ax
     from matplotlib import pyplot as plt
 
-    return plt.subplots(figsize=(6.4, 4.8), layout="constrained")[1]
+    return plt.subplots(figsize=(6.4, height), layout="constrained")[1]
 
 
 def unmanaged_axes(width: float = 6.4, height: float = 4.8) -> Axes:

@@ -22,6 +22,7 @@ from steadyslip.maps.work.run import run_map
 
 STORE = ".zarr"
 ENDINGS = (STORE, ".nc", ".parquet", ".html", *FIGURES)
+SHARES = (".html", *FIGURES)
 REFINED = (".csv", *ENDINGS)
 
 
@@ -102,6 +103,18 @@ def sensitivity_file(
     elif plan.sampling is not None:
         raise NotAvailable("the draws of a fit depend on each other, and Sobol indices are for independent parameters")
     return sensitivity(plan.rig, ranges, of or _suited(plan), points=points, protocol=plan.protocol)
+
+
+def write_sensitivity(found: Sensitivity, path: Path) -> None:
+    """Write a document or draw the shares, by the ending of the name.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is none of these, or the file cannot be written.
+    """
+    writers = {".html": lambda p: write_page(found, p, title=f"Sensitivity of {path.stem}")}
+    write_by_ending(path, writers, found.plot)
 
 
 def _range_of(axis: Axis) -> tuple[float, float, str]:

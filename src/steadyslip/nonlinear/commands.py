@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
@@ -23,6 +24,7 @@ from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
 ENDINGS = (".nc", ".csv", ".html", *FIGURES)
+KICKED = (".html", *FIGURES)
 
 
 def cycles_of_file(
@@ -55,7 +57,7 @@ def write_branch(branch: CycleBranch, path: Path) -> None:
 
 
 @dataclass(frozen=True)
-class Thresholds:
+class Thresholds(Displayed):
     """Several kinds of kick of one rig."""
 
     rig: Slider
@@ -105,13 +107,14 @@ def thresholds_shown(rig: Slider, kicks: Sequence[str], **options: Any) -> Thres
     return Thresholds(rig, tuple(found), found[-1].interrupted)
 
 
-def write_basin(thresholds: Thresholds, path: Path) -> bool:
-    """Draw the basin of the same rig; whether Ctrl-C cut it short.
+def write_thresholds(thresholds: Thresholds, path: Path) -> bool:
+    """Write a document, or draw the basin of the same rig, by the ending; whether Ctrl-C cut the basin short.
 
     Raises
     ------
     NotAvailable
-        If the ending is not that of a figure, or the file cannot be written.
+        If the ending is none of these, or the file cannot be written.
     """
-    write_by_ending(path, {}, thresholds.basin.plot)
-    return thresholds.basin.interrupted
+    writers = {".html": lambda p: write_page(thresholds, p, title=f"Kicks of {path.stem}")}
+    write_by_ending(path, writers, lambda: thresholds.basin.plot())
+    return path.suffix.lower() != ".html" and thresholds.basin.interrupted

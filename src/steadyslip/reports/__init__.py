@@ -11,6 +11,7 @@ from typing import Any
 
 from steadyslip.core.options import NAME, checked
 from steadyslip.core.pages import register_pages
+from steadyslip.reports import lab  # noqa: F401 -- registers what documents say of fits
 from steadyslip.reports.brief import brief
 from steadyslip.reports.document import Report, put_together
 from steadyslip.reports.results import parts_of
@@ -31,7 +32,8 @@ def report(
 
     Parameters
     ----------
-    result : Slider, Analysis, History, CycleBranch, MapResult or Fit
+    result : object
+        A rig, or what any function of this package found.
     title : str, optional
         Stands above the headline.
     explorer : bool, optional
@@ -39,8 +41,9 @@ def report(
     source : path, optional
         The file it was made of, whose hash is given.
     **options
-        Of a rig: ``branch``, which steady sliding where there are several, and ``fit``, a Fit whose friction to take,
-        so that it says how sure the verdict is. Of a fit: ``comparison``, a LawComparison.
+        Of a rig: ``branch``, which steady sliding where there are several; ``fit``, a Fit whose friction to take, and
+        ``tolerances``, as for `steadyslip.tolerate`, so that it says how sure the verdict is. Of a fit:
+        ``comparison``, a LawComparison, and ``draws``, its Draws.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def report(
     Raises
     ------
     ParameterError
-        If there is no document of such a result.
+        If it is no result.
     NotAvailable
         If the numbers of the rig leave the range of floating point.
     """

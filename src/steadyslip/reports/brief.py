@@ -67,13 +67,14 @@ def brief(result: Any) -> str:
     str
         An element that refers to nothing outside itself.
     """
+    return f'<div class="steadyslip-told"><style>{STYLE}</style>{inside(result)}</div>'
+
+
+def inside(result: Any) -> str:
+    """The same without its style, for a document that has it."""
     if isinstance(result, Model):
-        inside = "".join(_model(result))
-    elif isinstance(result, FrozenRecord):
-        inside = "".join(_record(result))
-    else:
-        inside = "".join(_result(result))
-    return f'<div class="steadyslip-told"><style>{STYLE}</style>{inside}</div>'
+        return "".join(_model(result))
+    return "".join(_record(result) if isinstance(result, FrozenRecord) else _result(result))
 
 
 def rows_of(text: str) -> str:

@@ -47,7 +47,7 @@ class Parts:
     rig : Slider or None
         Of the explorer.
     text : str
-        The rig as a file, or whatever else says what this is about.
+        The rig as a file; empty where there is none.
     branch : int
         Which steady sliding.
     """
@@ -94,5 +94,6 @@ def _provenance(text: str, source: Path | None) -> str:
     rows = [("steadyslip", __version__), ("with", versions), ("made on", f"{datetime.now(UTC):%Y-%m-%d}")]
     if source is not None and source.is_file():
         rows.append((f"SHA-256 of {source.name}", hashlib.sha256(source.read_bytes()).hexdigest()))
-    rows.append(("SHA-256 of the file below", hashlib.sha256(text.encode()).hexdigest()))
-    return heading("Where it came from") + table(rows) + listing(text)
+    if text:
+        rows.append(("SHA-256 of the file below", hashlib.sha256(text.encode()).hexdigest()))
+    return heading("Where it came from") + table(rows) + (listing(text) if text else "")

@@ -39,12 +39,17 @@ STYLE = """
 """Of everything inside an element of class ``steadyslip-told``."""
 
 
-def typed(text: Any) -> str:
-    """Words as they are set in print: µm, ², →, a true minus; safe in HTML."""
+def spoken(text: Any) -> str:
+    """Words as they are set in print: µm, ², →, a true minus."""
     words = str(text)
     for pattern, better in _SPOKEN:
         words = re.sub(pattern, better, words)
-    return html.escape(words, quote=True)
+    return words
+
+
+def typed(text: Any) -> str:
+    """The same, safe in HTML."""
+    return html.escape(spoken(text), quote=True)
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -99,5 +104,10 @@ def figure(drawing: str, caption: str = "") -> str:
 
 
 def listing(text: str) -> str:
-    """Text whose lines stay as they are."""
+    """Text whose letters stay as they are, such as a file's."""
     return f"<pre>{html.escape(text)}</pre>"
+
+
+def lines(result: Any) -> str:
+    """Words of a result, whose lines stay as they are."""
+    return listing(spoken(result))

@@ -1,53 +1,151 @@
-"""What documents say of runs, cycles, maps and fits."""
+"""What documents say of runs, cycles, thresholds, maps and sensitivities."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from functools import singledispatch
-from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from steadyslip import figures
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.quantities import shown
-from steadyslip.experiments import Fit, LawComparison
-from steadyslip.experiments.fitting.words import warnings
+from steadyslip.core.pages import Displayed
+from steadyslip.core.quantities import shown, shown_range
+from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
 from steadyslip.machine.slider import Slider
-from steadyslip.maps import MapResult
+from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
-from steadyslip.nonlinear import CycleBranch
+from steadyslip.nonlinear import Basin, CycleBranch, Threshold
+from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports import rig as of_rig
-from steadyslip.reports.brief import rows_of
+from steadyslip.reports.brief import inside, rows_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, listing, paragraph, table
-from steadyslip.verdict import Analysis, analyze
+from steadyslip.verdict import Analysis, Tolerated, analyze, tolerate
 
 LISTED = 24
 
 
 @singledispatch
 def parts_of(result: Any, **options: Any) -> Parts:
-    """What the document of a result says.
+    """What the document of a result says; of one that has no document of its own, what notebooks show of it.
 
     Raises
     ------
     ParameterError
-        If there is no document of it.
+        If it is no result.
     """
-    allowed = "a rig, a verdict, a run, a branch of cycles, a map or a fit"
-    raise ParameterError([Problem("result", f"got {type(result).__name__}; allowed: {allowed}")])
+    if not isinstance(result, Displayed) or options:
+        got = ", ".join([type(result).__name__, *options])
+        raise ParameterError([Problem("result", f"got {got}; allowed: a rig or a result, such as that of analyze")])
+    rig = getattr(result, "rig", None)
+    first = str(result).partition("\n")[0]
+    kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
+    if first.startswith(f"{type(result).__name__}("):  # a repr
+        first = kind
+    body = [*about_rig(rig), heading("What was found"), inside(result)]
+    return Parts(
+        sentence(first).rstrip("."), "", f"What does the {kind} say?", body, rig, of_rig.as_file(rig) if rig else ""
+    )
+
+
+def about_rig(rig: Slider | None) -> list[str]:
+    """Sketch and inputs; nothing where there is no rig."""
+    return [] if rig is None else [heading("The rig"), figure(sketch(rig)), of_rig.inputs(rig)]
 
 
 @parts_of.register
-def _rig(result: Slider, branch: int = 0, fit: Fit | None = None) -> Parts:
-    if fit is None:
-        return of_rig.about(analyze(result, branch=branch))
-    from steadyslip.experiments import predict
+def _threshold(result: Threshold) -> Parts:
+    return _thresholds(Thresholds(result.rig, (result,)))
 
-    found = predict(result, fit)
-    return of_rig.about(analyze(found.rig), found)
+
+@parts_of.register
+def _thresholds(result: Thresholds) -> Parts:
+    area = result.rig.area
+    rows = [str(one).split(": ", 1) for one in result.found]
+    limits = [
+        f"a {one.kick} kick up to {shown(one.survived, one.unit, 4, area)}"
+        for one in result.found
+        if one.bracket[0] > 0 and not np.isinf(one.size)
+    ]
+    unstable = any(one.size == 0 for one in result.found)
+    none = "No kick is survived: steady sliding is unstable" if unstable else "Every kick that was tried is survived"
+    head = f"Survives {' and '.join(limits)}" if limits else none
+    basins = [found] if (found := result.__dict__.get("basin")) is not None else []
+    body = [
+        *about_rig(result.rig),
+        heading("What was found"), table(rows),
+        paragraph("Sizes have no unit: logarithms of ratios of velocities, natural lengths of displacement, shares of "
+                  "the normal stress, and for blows velocities of the drive.", "small"),
+        *(figure(drawn(one.plot, "basin", 6.0), "What comes of every starting point.") for one in basins),
+    ]  # fmt: skip
+    question = "How large a kick does the steady sliding of this rig survive, and what happens beyond?"
+    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+
+
+@parts_of.register
+def _basin(result: Basin) -> Parts:
+    names, counts = np.unique(result.outcome, return_counts=True)
+    rows = [(name, f"{100 * count / result.outcome.size:.3g} %") for name, count in zip(names, counts, strict=True)]
+    reasons, numbers = np.unique(result.doubt[result.doubt != ""], return_counts=True)
+    body = [
+        *about_rig(result.rig),
+        heading("What was found"), table(rows, ("comes to", "share of the points")),
+        figure(drawn(result.plot, "basin", 6.5), "What comes of every starting point."),
+        *(paragraph(f"{n} undecided: {why}.", "small") for why, n in zip(reasons, numbers, strict=True)),
+    ]  # fmt: skip
+    question = "From which starting points does this rig return to steady sliding?"
+    head = f"{100 * result.share:.3g} % of the starting points return"
+    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+
+
+@parts_of.register
+def _sensitivity(result: Sensitivity) -> Parts:
+    known = result.rig.parameters()
+    ranges = [
+        (name, shown_range(low, high, known[name].role.unit, result.rig.area), spacing, known[name].role.doc)
+        for name, (low, high, spacing) in result.ranges.items()
+    ]
+    body = [*about_rig(result.rig), heading("What varied"), table(ranges, ("parameter", "range", "spacing", "meaning"))]
+    for name in result.first:
+        rows = []
+        for parameter in result.ranked(name):
+            i = result.parameters.index(parameter)
+            (least, most), (low, high) = result.first_interval[name][:, i], result.total_interval[name][:, i]
+            rows.append((parameter, f"{result.first[name][i]:.3f}", f"{least:.3f} to {most:.3f}",
+                         f"{result.total[name][i]:.3f}", f"{low:.3f} to {high:.3f}"))  # fmt: skip
+        columns = ("parameter", "alone", "95 %", "with others", "95 %")
+        body += [heading(name.replace("_", " ").capitalize()), table(rows, columns)]
+        if result.missing[name]:
+            missing = f"It does not exist at {100 * result.missing[name]:.3g} % of the points, which are left out."
+            body.append(paragraph(missing, "warning"))
+    body.append(figure(drawn(result.plot, "shares of variance", 6.5), "Shares of the variance (Sobol indices)."))
+    if result.interrupted:
+        body.append(paragraph("It was stopped before all points were done.", "warning"))
+    (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
+    head = f"{result.ranked(first)[0]} decides most about the {first.replace('_', ' ')}"
+    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+
+
+@parts_of.register
+def _rig(
+    result: Slider, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None
+) -> Parts:  # fmt: skip
+    found = None
+    if fit is not None:
+        found = predict(result, fit)
+        result = found.rig
+    within = tolerate(result, tolerances) if tolerances else None
+    return of_rig.about(analyze(result, branch=branch), found, within)
+
+
+@parts_of.register
+def _tolerated(result: Tolerated) -> Parts:
+    return of_rig.about(analyze(result.rig), None, result)
 
 
 @parts_of.register
@@ -59,7 +157,7 @@ def _analysis(result: Analysis) -> Parts:
 def _history(result: History) -> Parts:
     text = of_rig.as_file(result.rig, result.protocol)
     body = [
-        heading("The rig"), figure(sketch(result.rig)), of_rig.inputs(result.rig),
+        *about_rig(result.rig),
         heading("What was done to it"), listing(text.partition("[protocol]")[2].strip()),
         heading("What it did"), *_words(result.summary()),
         figure(drawn(lambda: figures.history(result), "history", 7.0), "Velocity, friction, normal stress."),
@@ -69,7 +167,7 @@ def _history(result: History) -> Parts:
     slips = len(result.slip_events)
     head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {shown(result.end, 's')}"
     question = f"What does this rig do in {shown(result.protocol.until or result.end, 's')} under the protocol below?"
-    return Parts(head, _sentence(result.message), question, body, result.rig, text)
+    return Parts(head, sentence(result.message), question, body, result.rig, text)
 
 
 def _slips(result: History) -> Iterator[str]:
@@ -102,7 +200,7 @@ def _branch(result: CycleBranch) -> Parts:
         (one.kind, shown(one.cycle.value, unit, area=area), shown(one.cycle.period, "s")) for one in result.special
     ]
     body = [
-        heading("The rig"), figure(sketch(result.rig)), of_rig.inputs(result.rig),
+        *about_rig(result.rig),
         heading("The cycles"), *_words(rest),
         figure(drawn(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
         table(special, ("special", along, "period")),
@@ -111,7 +209,7 @@ def _branch(result: CycleBranch) -> Parts:
     question = f"Which stick-slip cycles does this rig have as {along} varies?"
     return Parts(
         f"{len(result.cycles)} cycles along {along}",
-        _sentence(first),
+        sentence(first),
         question,
         body,
         result.rig,
@@ -123,39 +221,15 @@ def _branch(result: CycleBranch) -> Parts:
 def _map(result: MapResult) -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     body = [
-        heading("The rig"), figure(sketch(rig)), of_rig.inputs(rig),
+        *about_rig(rig),
         heading("The map"), *_words(rest),
         figure(drawn(lambda: result.plot(), "map", 6.5)),
     ]  # fmt: skip
     question = "How does the answer depend on the numbers that vary here?"
-    return Parts(_sentence(first).rstrip("."), "", question, body, rig, of_rig.as_file(rig))
+    return Parts(sentence(first).rstrip("."), "", question, body, rig, of_rig.as_file(rig))
 
 
-@parts_of.register
-def _fit(result: Fit, comparison: LawComparison | None = None) -> Parts:
-    names = [Path(record.source).name for record in result.plan.records]
-    sources = ", ".join(names)
-    rows = [(one.name, one.shown(), one.range() if one.determined else "not determined") for one in result.estimates]
-    body = [
-        heading("What was found"), table(rows, ("parameter", "value", "95 %")),
-        *(paragraph(text, "warning") for text in warnings(result)),
-    ]  # fmt: skip
-    if comparison is not None:
-        body += [heading("Laws compared"), listing(str(comparison))]
-    for i in range(len(names)):
-        fitted = drawn(lambda i=i: figures.fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
-        steps = drawn(lambda i=i: figures.steps(result, record=i), "steps of the record", 7.0)  # type: ignore[misc]
-        body += [figure(fitted, f"{names[i]}: record and fit."), figure(steps, "Its steps.")]
-    corner = drawn(lambda: figures.corner(result), "uncertainty", 6.5)
-    body += [figure(corner, "What the records leave open."), heading("Details"), listing(str(result))]
-    for name, record in zip(names, result.plan.records, strict=True):
-        body += [heading(f"Record {name}", 3), listing(str(record))]
-    question = f"Which friction do these records show, and how sure is that: {sources}?"
-    rig = result.rig()
-    return Parts(f"Fit to {sources}", f"{len(rows)} parameters.", question, body, rig, of_rig.as_file(rig))
-
-
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
     """A line with a capital and a full stop."""
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 

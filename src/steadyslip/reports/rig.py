@@ -17,7 +17,7 @@ from steadyslip.reports.brief import rows_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import Markup, figure, heading, letter, math, paragraph, table
-from steadyslip.verdict import Analysis
+from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.words import edge_rows, facts, headline, meaning
 
 SMALL = (
@@ -26,14 +26,14 @@ SMALL = (
 )
 
 
-def about(analysis: Analysis, prediction: Prediction | None = None) -> Parts:
-    """The document of a verdict; with the friction of a fit, how sure that is."""
+def about(analysis: Analysis, prediction: Prediction | None = None, tolerated: Tolerated | None = None) -> Parts:
+    """The document of a verdict; with the friction of a fit, or tolerances, how sure that is."""
     rig = analysis.rig
     speed = shown(rig.drive.velocity, "m/s")
     body = [
         heading("The rig"), figure(sketch(rig)), inputs(rig),
         heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
-        *_confidence(prediction),
+        *_confidence(prediction), *_tolerances(tolerated),
         heading("How far is the edge?"), *_edges(analysis), *_charts(analysis),
         heading("The formulas"), *formulas(analysis),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings), paragraph(SMALL),
@@ -116,3 +116,12 @@ def _confidence(prediction: Prediction | None) -> Iterator[str]:
     yield heading("How sure is that?")
     yield rows_of(str(prediction))
     yield figure(drawn(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig.")
+
+
+def _tolerances(found: Tolerated | None) -> Iterator[str]:
+    if found is None:
+        return
+    yield heading("How sure is that, within the tolerances?")
+    yield rows_of(str(found))
+    words = "Each parameter alone within its tolerance, and all of them; left of 1 the stiffness is less than critical."
+    yield figure(drawn(lambda: found.plot(), "tolerances", 7.0), words)

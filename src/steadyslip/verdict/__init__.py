@@ -1,5 +1,6 @@
 """The verdict on one rig: gathers steady sliding, linear stability and edges, and says it in words."""
 
 from steadyslip.verdict.analyze import Analysis, analyze
+from steadyslip.verdict.tolerances import Tolerated, tolerate
 
-__all__ = ["Analysis", "analyze"]
+__all__ = ["Analysis", "Tolerated", "analyze", "tolerate"]

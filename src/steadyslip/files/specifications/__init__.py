@@ -5,11 +5,13 @@ records, and a layer above hands in the tables that it declares (`read.read_spec
 executes code; laws are found by registered name or installed entry point.
 """
 
+from steadyslip.files.specifications.changes import named_value
 from steadyslip.files.specifications.protocols import piece_from_text, protocol_from_text, read_protocol
 from steadyslip.files.specifications.read import read_rig, rig_from_text
 from steadyslip.files.specifications.write import rig_to_text, write_rig
 
 __all__ = [
+    "named_value",
     "piece_from_text",
     "protocol_from_text",
     "read_protocol",

@@ -47,6 +47,20 @@ def split(text: str) -> tuple[str, str, str]:
     return name, equals, raw
 
 
+def named_value(text: str) -> tuple[str, Any]:
+    """Name and value of ``name=value``.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    name, equals, raw = split(text)
+    if not equals or not name or not raw:
+        raise ParameterError([Problem(came(text), "is none; write NAME=VALUE, such as contact.angle='10 deg'")])
+    return name, value_of(raw, name)
+
+
 def value_of(raw: str, name: str) -> Any:
     """A value of `name` written without the quotes that TOML wants around text.
 

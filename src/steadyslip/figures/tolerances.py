@@ -1,0 +1,44 @@
+"""What tolerances do to a verdict, parameter by parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from steadyslip.core.quantities import shown_range
+from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, axes_or_new
+from steadyslip.linear.stiffness import safety_factor
+from steadyslip.verdict.tolerances import Tolerated
+
+COLOURS = {True: BLUE, False: ORANGE, None: GREY}
+WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable in a part"}
+
+
+def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
+    """Draw how far the stiffness over the critical one moves: each parameter alone, and all together.
+
+    Parameters
+    ----------
+    found : Tolerated
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    shown = [one for one in found.alone if np.isfinite(one.safety[0])][::-1]
+    ax = axes_or_new(ax, 1.6 + 0.55 * len(shown))
+    for place, one in enumerate(shown, start=1):
+        low, high = one.safety
+        label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: place - 1]] else None
+        ax.barh(place, high - low, 0.55, left=low, color=COLOURS[one.stable], label=label)
+    known = found.safety[np.isfinite(found.safety)]
+    if len(known):
+        ax.barh(0, known.max() - known.min(), 0.55, left=known.min(), color=SKY, label="all together")
+    ranges = [f"{one.parameter}\n{shown_range(one.low, one.high, one.unit, one.area)}" for one in shown]
+    ax.set_yticks(range(len(shown) + 1), ["all together", *(text.replace(" um", " µm") for text in ranges)])
+    ax.axvline(1.0, color=BLACK, linewidth=1)
+    ax.axvline(float(safety_factor(found.rig)), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")
+    ax.set_xlabel("stiffness over critical stiffness (1)")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small")
+    return ax

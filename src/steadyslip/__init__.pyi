@@ -4,6 +4,7 @@ from . import figures as figures, testing as testing, units as units
 from .core.errors import (
     NoSteadySliding as NoSteadySliding,
     NotAvailable as NotAvailable,
+    OutOfRangeWarning as OutOfRangeWarning,
     ParameterError as ParameterError,
     QuantityError as QuantityError,
     RigFileError as RigFileError,
@@ -106,6 +107,7 @@ from .linear import (
     paper as paper,
     safety_factor as safety_factor,
     small_signal as small_signal,
+    stability as stability,
     stable_stiffness as stable_stiffness,
     state_space as state_space,
     to_control as to_control,

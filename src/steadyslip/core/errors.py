@@ -125,11 +125,12 @@ class NoSteadySliding(SteadyslipError, ValueError):
         super().__init__(message)
 
 
-OUT_OF_RANGE = "the numbers of this rig leave the range of floating point; check the sizes of its parameters"
-
-
 class NotAvailable(SteadyslipError, ValueError):
     """The question has no answer for this rig; the message says why and what to ask instead."""
+
+
+class OutOfRangeWarning(UserWarning):
+    """Some rigs of an array have no answer: their numbers leave the range of floating point."""
 
 
 class InternalError(SteadyslipError, RuntimeError):

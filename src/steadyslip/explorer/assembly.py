@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.quantities import outside
 from steadyslip.core.records import Address, twin
 from steadyslip.explorer.equations import linear_part
@@ -22,9 +22,10 @@ from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.search import Search
-from steadyslip.linear.status import STABLE, UNKNOWN, UNSTABLE, status
+from steadyslip.linear.status import STABLE, UNSTABLE, status
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
+from steadyslip.model.range import require_range
 from steadyslip.verdict.analyze import linear_numbers
 
 MODULES = (
@@ -223,8 +224,7 @@ def _answer(rig: Slider, names: list[str], branch: int) -> dict[str, Any]:
         "critical": None,
         "eigenvalues": [],
     }
-    if answer["status"] == UNKNOWN:
-        raise NotAvailable(OUT_OF_RANGE)
+    require_range(point)
     if answer["status"] in (STABLE, UNSTABLE):
         with np.errstate(all="ignore"):
             numbers = linear_numbers(rig, point)

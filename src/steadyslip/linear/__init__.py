@@ -8,6 +8,7 @@ from steadyslip.linear.formula import formula
 from steadyslip.linear.response import Response, small_signal
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.state_space import state_space, to_control
+from steadyslip.linear.status import stability
 from steadyslip.linear.stiffness import (
     critical_stiffness,
     eigenvalues,
@@ -29,6 +30,7 @@ __all__ = [
     "paper",
     "safety_factor",
     "small_signal",
+    "stability",
     "stable_stiffness",
     "state_space",
     "to_control",

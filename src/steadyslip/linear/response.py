@@ -25,6 +25,7 @@ from steadyslip.linear.polynomials import quietly
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
+from steadyslip.model.range import in_range, require_range, warn_of_range
 
 
 @dataclass(frozen=True)
@@ -181,12 +182,19 @@ def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     Raises
     ------
     NotAvailable
-        If the rig has no memory variable, several, or integral control.
+        If the rig has no memory variable, several, or integral control; or if the numbers of a single rig leave the
+        range of floating point (of several, `OutOfRangeWarning` is issued).
     """
     point = operating_point(rig, vary)
+    numbers = response_numbers(point).as_dict()
+    if not point.shape:
+        require_range(point)
+    known = in_range(point)
+    if not np.all(known):
+        warn_of_range(int(np.count_nonzero(~known)), point.size)
     wrapped = {}
-    for name, x in response_numbers(point).as_dict().items():
-        wrapped[name] = point.wrap(np.broadcast_to(x, point.shape)[()], name, _UNITS[name])
+    for name, x in numbers.items():
+        wrapped[name] = point.wrap(np.where(known, x, np.nan)[()], name, _UNITS[name])
     return Response(**wrapped)
 
 

@@ -20,10 +20,11 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, unit
 from steadyslip.linear.polynomials import Array, damping_measures, roots
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
-from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
+from steadyslip.linear.stiffness import ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import characteristic
 from steadyslip.model.sliding import explain_absence
 
 _PER_DECADE = 40

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, UnknownNameError
+from steadyslip.core.errors import NotAvailable, UnknownNameError
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear.polynomials import Array
@@ -16,6 +16,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import operating_point
+from steadyslip.model.range import beyond_range, require_range
 from steadyslip.model.sliding import explain_absence
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Array, Array, A
     for name in outputs:
         if name not in model.observables:
             raise UnknownNameError("output", name, model.observables)
+    require_range(point)
     stresses = point.all_stresses()
     if not stresses:
         raise explain_absence(rig, point)
@@ -59,7 +61,7 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Array, Array, A
         blocks = _matrix_function(model, names)(*point.arguments, stresses[0])
         found = _solved(blocks, len(model.variables), len(names))
     if not all(np.all(np.isfinite(block)) for block in found):
-        raise NotAvailable(OUT_OF_RANGE)
+        raise beyond_range(point)
     return found
 
 

@@ -2,27 +2,69 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.options import checked
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
 from steadyslip.linear.response import has_closed_form, response_numbers
-from steadyslip.linear.stiffness import characteristic, stiffness_polynomials
-from steadyslip.model.point import OperatingPoint
+from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
+from steadyslip.machine.slider import Slider
+from steadyslip.model.point import OperatingPoint, Vary, operating_point
+from steadyslip.model.range import characteristic, in_range
 
 ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms, that rounding alone can make
 ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
+WORDS = ("no steady sliding", "stable", "unstable", "out of range")
+"""What they are called; out of the range of floating point."""
+EVERY, NONE = "stable at every stiffness", "stable at no stiffness"
+
+
+@checked()
+def stability(rig: Slider, vary: Vary | None = None) -> Any:
+    """Whether steady sliding is stable, in words, for one rig or many.
+
+    Parameters
+    ----------
+    rig : Slider
+    vary : mapping of str to array_like or xarray.DataArray, optional
+        Parameters to vary, by dotted name, in SI units; they broadcast.
+
+    Returns
+    -------
+    str, ndarray of str or xarray.DataArray
+        ``stable``, ``unstable`` (ill-posed included), ``no steady sliding`` (lock-up or lift-off), or ``out of range``
+        where numbers leave the range of floating point, so that nothing can be said.
+
+    Raises
+    ------
+    ParameterError
+        If a name or value is not allowed.
+    """
+    point = operating_point(rig, vary)
+    words = np.array(WORDS)[status(point)]
+    return point.wrap(words, "stability", "1") if point.shape else str(words)
+
+
+def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
+    """Why rigs have no critical stiffness, in words; the empty text where they have one."""
+    found = status(point)
+    with np.errstate(all="ignore"):
+        low, high = interval_ends(point)
+    some = np.any(low >= 0, axis=-1)
+    edge = np.any((low > 0) | np.isfinite(high), axis=-1)
+    known = np.where(edge, "", np.where(some, EVERY, NONE))
+    return np.where(np.isin(found, (STABLE, UNSTABLE)), known, np.array(WORDS)[found])
 
 
 def status(point: OperatingPoint) -> NDArray[np.int64]:
     """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed too) or UNKNOWN (out of floating point, or no rig)."""
     with np.errstate(all="ignore"):
-        exists = np.isfinite(point.sigma)
-        c = characteristic(point)
-        verdict = np.where(is_hurwitz(c), STABLE, UNSTABLE)
-        known = np.where(np.all(np.isfinite(c), axis=-1), verdict, UNKNOWN)
-        found = np.where(exists, known, np.where(point.out_of_range(), UNKNOWN, ABSENT))
-        return np.where(point.valid, found, UNKNOWN)
+        verdict = np.where(is_hurwitz(characteristic(point)), STABLE, UNSTABLE)
+        found = np.where(np.isfinite(point.sigma), verdict, ABSENT)
+        return np.where(in_range(point) & point.valid, found, UNKNOWN)
 
 
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:

@@ -18,12 +18,13 @@ from steadyslip.core.expressions import array_function
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
-from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, quietly, roots, stable_set
+from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, most_intervals, quietly, roots, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
+from steadyslip.model.range import characteristic, in_range, require_range, stacked, surely_in_range, warn_of_range
 from steadyslip.model.steady import steady_equation
 
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
@@ -42,13 +43,15 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     Returns
     -------
     float, ndarray or xarray.DataArray
-        Pa/m along the sliding direction; NaN where stability has no edge at a positive stiffness, or
-        where steady sliding does not exist.
+        Pa/m along the sliding direction; NaN where stability has no edge at a positive stiffness, where steady
+        sliding does not exist, and where numbers leave the range of floating point; `stability` tells which.
 
     Raises
     ------
     ParameterError
         If a name or value is not allowed.
+    NotAvailable
+        If the numbers of a single rig leave the range of floating point; of several, `OutOfRangeWarning` is issued.
 
     Notes
     -----
@@ -99,8 +102,17 @@ def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
         Rigs with fewer than m intervals are padded with NaN; all NaN means that no stiffness is stable.
     """
     point = operating_point(rig, vary)
-    low, high = _in_chunks_of_intervals(point)
-    intervals = np.stack([low, high], axis=-1)
+    most = 1 if has_closed_form(point.model) else most_intervals(len(characteristic_coefficients(point.model)) - 1)
+
+    def kernel(part: OperatingPoint) -> Array:
+        low, high = interval_ends(part)
+        found = np.full((*part.shape, most, 2), np.nan)
+        found[..., : low.shape[-1], 0], found[..., : low.shape[-1], 1] = low, high
+        return found
+
+    intervals = in_chunks(point, kernel)
+    used = np.flatnonzero(np.any(np.isfinite(intervals[..., 0]), axis=tuple(range(intervals.ndim - 2))))
+    intervals = intervals[..., : max(used[-1] + 1 if used.size else 1, 1), :]
     return point.wrap(intervals, "stable_stiffness", "Pa/m", ("interval", "end"))
 
 
@@ -116,8 +128,8 @@ def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
     Returns
     -------
     ndarray or xarray.DataArray, shape (..., n), complex
-        1/s, sorted by falling real part; NaN where steady sliding does not exist, and for the root that a
-        rig lacks when its mass is zero.
+        1/s, sorted by falling real part; NaN where steady sliding does not exist or numbers leave the range of
+        floating point (see `stability`), and for the root that a rig lacks when its mass is zero.
     """
     point = operating_point(rig, vary)
 
@@ -131,7 +143,8 @@ def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
 def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
     """Largest real part of the eigenvalues (1/s): positive grows, negative decays.
 
-    inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding.
+    inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding and where
+    numbers leave the range of floating point (see `stability`).
     """
     point = operating_point(rig, vary)
 
@@ -147,16 +160,11 @@ def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
 # --- coefficients as arrays -------------------------------------------------------------------------
 
 
-def characteristic(point: OperatingPoint) -> Array:
-    """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
-    return _stacked(point.evaluate(_coefficient_function(point.model)), point)
-
-
 def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
     """p and q of p(s) + k q(s), each (..., n+1), lowest first; k is the spring's own stiffness."""
     both = point.evaluate(_split_function(point.model))
     half = len(both) // 2
-    return _stacked(both[:half], point), _stacked(both[half:], point)
+    return stacked(both[:half], point), stacked(both[half:], point)
 
 
 def general_set(point: OperatingPoint) -> StableSet:
@@ -167,20 +175,6 @@ def general_set(point: OperatingPoint) -> StableSet:
 def ill_posed(c: Array) -> NDArray[np.bool_]:
     """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3)."""
     return np.asarray((c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0)))
-
-
-def _stacked(parts: list[Array], point: OperatingPoint) -> Array:
-    out = np.empty((*point.shape, len(parts)))
-    for i, part in enumerate(parts):
-        out[..., i] = part
-    if np.any(absent := np.isnan(point.sigma)):
-        out[np.broadcast_to(absent, point.shape)] = np.nan
-    return out
-
-
-@question
-def _coefficient_function(model: Model) -> Callable[..., list[Array]]:
-    return model.function(characteristic_coefficients(model))
 
 
 @question
@@ -280,7 +274,7 @@ def set_of_one(point: OperatingPoint) -> StableSet:
 # --- intervals to answers, chunk by chunk -----------------------------------------------------------
 
 
-def _interval_ends(point: OperatingPoint) -> tuple[Array, Array]:
+def interval_ends(point: OperatingPoint) -> tuple[Array, Array]:
     """Lower and upper ends of the stable intervals, (..., m)."""
     if has_closed_form(point.model):
         low, high = closed_form_interval(point)
@@ -292,7 +286,7 @@ def _interval_ends(point: OperatingPoint) -> tuple[Array, Array]:
 def _nearest_edge(point: OperatingPoint) -> Array:
     """The finite positive end of a stable interval nearest to the rig's own stiffness."""
     own = point.named()["slider.stiffness"]
-    low, high = _interval_ends(point)
+    low, high = interval_ends(point)
     if low.shape[-1] == 1:
         low, high = low[..., 0], high[..., 0]
         if not np.any(high < np.inf):  # the common case, worth its own line for arrays of rigs
@@ -308,35 +302,30 @@ def _nearest_edge(point: OperatingPoint) -> Array:
 
 @quietly
 def in_chunks(point: OperatingPoint, kernel: Callable[[OperatingPoint], NDArray[Any]]) -> NDArray[Any]:
-    """Apply a kernel to the varied rigs some thousand at a time."""
+    """Apply a kernel to the varied rigs some thousand at a time; NaN for those that leave the range of floating point.
+
+    Raises
+    ------
+    NotAvailable
+        If a single rig leaves it.
+    """
+    if not point.shape:
+        require_range(point)
     whole: NDArray[Any] | None = None
-    done = 0
+    done = beyond = 0
     for part in point.pieces(_CHUNK):
         result = np.asarray(kernel(part))
         extra = result.shape[len(part.shape) :]
+        if not surely_in_range(part, complete=bool(np.all(np.isfinite(result)))):
+            outside = ~in_range(part)
+            beyond += int(np.count_nonzero(outside))
+            result = np.where(outside.reshape(outside.shape + (1,) * len(extra)), np.nan, result)
         if whole is None:
             whole = np.empty((point.size, *extra), dtype=result.dtype)
         whole[done : done + part.size] = np.broadcast_to(result, (*part.shape, *extra)).reshape(-1, *extra)
         done += part.size
     if whole is None:
         raise InternalError("at least one piece")
+    if beyond:
+        warn_of_range(beyond, point.size)
     return whole.reshape(point.shape + whole.shape[1:])
-
-
-@quietly
-def _in_chunks_of_intervals(point: OperatingPoint) -> tuple[Array, Array]:
-    """Interval ends of all rigs; chunks may differ in the number of intervals."""
-    pieces = [
-        (np.broadcast_to(low, (*part.shape, low.shape[-1])), np.broadcast_to(high, (*part.shape, low.shape[-1])))
-        for part in point.pieces(_CHUNK)
-        for low, high in [_interval_ends(part)]
-    ]
-    most = max(low.shape[-1] for low, _ in pieces)
-    ends = []
-    for side in (0, 1):
-        padded = [
-            np.concatenate([piece[side], np.full((*piece[side].shape[:-1], most - piece[side].shape[-1]), np.nan)], -1)
-            for piece in pieces
-        ]
-        ends.append(padded[0] if len(padded) == 1 else np.concatenate(padded).reshape(*point.shape, most))
-    return ends[0], ends[1]

@@ -21,7 +21,7 @@ from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
-from steadyslip.model.steady import beyond_floats, steady_roots, steady_stress
+from steadyslip.model.steady import steady_roots, steady_stress
 
 Vary = Mapping[str, Any]
 
@@ -98,10 +98,6 @@ class OperatingPoint(Keeper):
     def all_stresses(self) -> list[float]:
         """All positive σss of a single rig, rising."""
         return steady_roots(self.model, self.arguments)
-
-    def out_of_range(self) -> Any:
-        """Where the equation for σss leaves the range of floating point, so that nothing can be said."""
-        return beyond_floats(self.model, self.arguments, self.shape)
 
     @cached_property
     def single(self) -> bool:

@@ -17,7 +17,8 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction, reduce_model
 
 Choose = Callable[[Any, Any, Any], Any]
-LEAST_WEIGHT = 1e-5  # db/da below which a memory variable is not eliminated: rounding is amplified by its inverse
+LEAST_WEIGHT = 1e-5  # in that of ln v, below which a memory variable is not eliminated: its inverse amplifies rounding
+MOST_NOISE = 1e-2  # in ln v, from which on rounding decides how a block moves
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,47 @@ def posed(point: OperatingPoint) -> np.ndarray:
 
 
 @question
+def _force_function(model: Model) -> Callable[..., list[Any]]:
+    """Forces that keep each other in balance in steady sliding.
+
+    The force of a dashpot per change of ln v; what pull and friction do to the normal stress; then what adds up to
+    nothing: pull and friction, and the shares of normal stress and memory in it.
+    """
+    contact = model.contact
+    inner = [contact.normal, *(item.symbol for item in model.memory)]
+    shares = [model.at_steady(symbol * derivative(contact.balance, symbol)) for symbol in inner]
+    dashpot = model.at_steady(contact.velocity * derivative(model.definitions[contact.spring], contact.velocity))
+    pressing = [
+        model.at_steady(symbol * derivative(model.definitions[contact.normal], symbol))
+        for symbol in (contact.spring, contact.friction)
+    ]
+    return model.function([dashpot, *pressing, model.steady[contact.spring], model.steady[contact.friction], *shares])
+
+
+@question
+def resolved(point: OperatingPoint) -> np.ndarray:
+    """Whether rounding of the forces leaves the velocity of steady sliding its digits.
+
+    What rounding adds to the balance changes ln v by that over the slope of the balance in ln v; with inertia over the
+    direct effect and over what it takes to change velocity while the block slips a natural length. The rounding of
+    velocity changes the force of a dashpot, and that of forces the normal stress, by little beside what there is. Where
+    motion is ill-posed, that is the matter instead.
+    """
+    found = weights(point)
+    dashpot, pull, friction, *forces = point.evaluate(_force_function(point.model))
+    with np.errstate(all="ignore"):
+        held = np.abs(np.asarray(point.drive, dtype=float) * found.by_unknown)
+        if point.model.inertial:
+            rates = [found.by_slip * point.drive / found.direct, *found.decay]
+            held = np.abs(found.direct) + held * np.maximum.reduce(np.broadcast_arrays(*map(np.abs, rates)))
+        largest = np.maximum.reduce(np.broadcast_arrays(*map(np.abs, forces)))
+        least = MOST_NOISE / np.finfo(float).eps
+        hidden = (largest > least * held) | (np.abs(dashpot) > least * largest)
+        hidden |= np.maximum(np.abs(pull), np.abs(friction)) > least * point.stresses
+        return np.asarray(~hidden | ~posed(point))
+
+
+@question
 def eliminable(point: OperatingPoint) -> int | None:
     """The memory variable to leave out: of those that allow it, the one with most weight in friction.
 
@@ -103,7 +145,8 @@ def eliminable(point: OperatingPoint) -> int | None:
         return None
     found = weights(point)
     with np.errstate(all="ignore"):
-        shares = [float(np.nanmin(np.abs(one / found.direct), initial=np.inf)) for one in found.by_memory]
+        steepest = np.maximum(np.abs(found.direct), np.abs(point.drive * found.by_unknown))  # with dashpots
+        shares = [float(np.nanmin(np.abs(one) / steepest, initial=np.inf)) for one in found.by_memory]
     for i in np.argsort(shares)[::-1]:
         if shares[i] >= LEAST_WEIGHT and reduce_model(model, int(i)).form == "eliminated":
             return int(i)

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable
+from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, stress_name
@@ -18,6 +17,7 @@ from steadyslip.core.questions import question
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import require_range
 from steadyslip.model.steady import steady_equation
 
 
@@ -69,6 +69,8 @@ def steady_state(rig: Slider) -> SteadySliding:
     ------
     NoSteadySliding
         Saying which condition fails (lock-up, lift-off) and by how much.
+    NotAvailable
+        If numbers leave the range of floating point.
     """
     return steady_states(rig)[0]
 
@@ -81,8 +83,11 @@ def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
     ------
     NoSteadySliding
         If there is none.
+    NotAvailable
+        If numbers leave the range of floating point.
     """
     point = operating_point(rig)
+    require_range(point)
     stresses = point.all_stresses()
     if not stresses:
         raise explain_absence(rig, point)
@@ -122,8 +127,7 @@ def explain_absence(rig: Slider, point: OperatingPoint) -> NoSteadySliding:
     NotAvailable
         If the numbers leave the range of floating point.
     """
-    if np.any(point.out_of_range()):
-        raise NotAvailable(OUT_OF_RANGE)
+    require_range(point)
     equation = steady_equation(point.model)
     if equation.parts is None:
         return NoSteadySliding(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.questions import question
 from steadyslip.core.records import twin
 from steadyslip.kernels.formulation import Choice
@@ -17,8 +17,9 @@ from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.runner import Runner, runner
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import in_range, require_range
 from steadyslip.model.reduction import Reduction, reduce_model
-from steadyslip.model.scales import eliminable, natural_scales, posed
+from steadyslip.model.scales import eliminable, natural_scales, posed, resolved
 from steadyslip.model.start import guess, initial_values
 from steadyslip.protocol import Protocol, Segments, pack
 
@@ -26,6 +27,10 @@ METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: nam
 TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
 MOST_SOLVED = 8  # stages of a method, where the balance has to be solved in each
 BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
+APART = (
+    "the forces on the block are so much larger than what its velocity makes of them that rounding decides how it "
+    "moves; look for a parameter that is too small or too large by orders of magnitude (a, a damping, a friction level)"
+)
 CONTACT_SHARE = 1e-9  # of the steady normal stress: below, contact is lost
 
 
@@ -101,6 +106,11 @@ class Jobs:
     def posed(self) -> np.ndarray:
         """Whether the equations determine the motion near steady sliding; see `steadyslip.model.scales.posed`."""
         return posed(self.point)
+
+    @property
+    def in_range(self) -> np.ndarray:
+        """Whether floating point holds the numbers of the rigs, and rounding does not decide how they move."""
+        return np.asarray(np.atleast_1d(in_range(self.point)) & resolved(self.point))
 
     def choice(self, lanes: int, dense: bool) -> Choice:
         """The kernel that these jobs need."""
@@ -186,12 +196,16 @@ def prepare(
     ParameterError
         Listing everything that is wrong.
     NotAvailable
-        If the rig cannot move as asked.
+        If the rig cannot move as asked, or the numbers of a single rig leave the range of floating point.
     """
     own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
     plan = Protocol.of(protocol).varied({name: value for name, value in vary.items() if name not in own})
     point = operating_point(rig, own, branch=branch)
     _refuse_singular(rig, point, bool(own))
+    if not own:
+        require_range(point)
+        if not np.all(resolved(point)):
+            raise NotAvailable(APART)
     final = plan.until if until is None else until
     if final is None:
         raise ParameterError([Problem("until", "missing; give the end of the run in s, such as until=200")])
@@ -204,20 +218,9 @@ def prepare(
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate)
     _refuse_endless(reduction, options.method)
-    if not own and not _within_range(point, reduction):
-        raise NotAvailable(OUT_OF_RANGE)
     start, velocity = initial_values(reduction, point, initial)
     size = max(len(point.stresses), len(segments.start), len(start), point.size, 1)
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
-
-
-@question
-def _within_range(point: OperatingPoint, reduction: Reduction) -> bool:
-    """Whether the sizes of all variables are numbers, where there is steady sliding."""
-    if not np.isfinite(point.sigma):
-        return True
-    scales, unknown = natural_scales(point, reduction)
-    return all(bool(np.all(np.isfinite(one))) for one in (*scales.values(), unknown))
 
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:

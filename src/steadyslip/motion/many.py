@@ -272,7 +272,9 @@ class _Store:
         sigma = jobs.point.part(slice(first, first + len(outcome.status))).sigma
         absent = np.broadcast_to(~(sigma > 0), outcome.status.shape)
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
-        self.code[where] = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
+        known = jobs.in_range[first : first + len(outcome.status)] if len(jobs.in_range) > 1 else jobs.in_range
+        ended = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
+        self.code[where] = np.where(known, ended, OUT_OF_RANGE)
         self.end[where] = np.where(absent, np.nan, outcome.final[:, Final.TIME])
         counts = np.nan_to_num(outcome.steps)  # NaN where a run was never finished
         self.steps[where], self.rejected[where] = counts.T

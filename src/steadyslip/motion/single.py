@@ -156,9 +156,11 @@ def _history(
     events = events_of(outcome.log)
     if status == "blow-up":
         events += (_last_event("blow-up", jobs, machine, outcome),)
-    if status == "done" and np.any(bad := out_of_range(found)):
+    if status in ("done", "blow-up") and np.any(bad := out_of_range(found)):
         first = int(np.argmax(bad))
-        status, end, time = "out of range", float(time[first]), time[:first]
+        if status == "done":
+            status, end = "out of range", float(time[first])
+        time = time[:first]
         found = {name: values[:first] for name, values in found.items()}
         events = tuple(event for event in events if event.time <= end)
     return History(

@@ -13,17 +13,20 @@ REMEDIES = {
     "radiation_damping to follow the motion further",
     "too many steps": "the limit of steps is used up; shorten until, loosen rtol, report at given times (times, "
     "--samples), for which more steps are allowed, or raise most_steps",
-    "stuck": "no step is small enough: the equations have no solution beyond this point (with mass zero, friction "
-    "that falls at once when the block speeds up; or a normal stress that answers too strongly to acceleration); "
-    "give the slider mass or damping, or check the contact law",
-    "no velocity": "no velocity balances the forces after a jump of the inputs (or at the start); make the jump "
-    "smaller, or give the slider a mass",
+    "stuck": "no step is small enough: the equations have no solution beyond this point (without mass, friction that "
+    "falls at once when the block speeds up; or a normal stress that answers too strongly to acceleration), or change "
+    "faster than floating point can follow (a mass near zero, say); give the slider mass or damping, or check the "
+    "contact law",
+    "no velocity": "no velocity that floating point can hold balances the forces after a jump of the inputs (or at the "
+    "start); make the jump smaller, give the slider a mass, or look for a parameter that is too small or too large by "
+    "orders of magnitude",
     "interrupted": "stopped by the user; run it again for the rest",
     "no steady sliding": "there is no steady sliding to start from (lock-up or lift-off); see steadyslip.steady_state",
     "ill-posed": "without mass, friction falls at once when the block speeds up (or the normal stress answers too "
     "strongly to acceleration): the smallest lag left out decides the motion; give the slider mass or damping",
-    "out of range": "an observable leaves the range of floating point (1e308); look for a parameter that is too small "
-    "or too large by orders of magnitude (b, d_c, a normal stress near zero)",
+    "out of range": "numbers of the rig or of its motion leave the range of floating point (1e308), or are so far "
+    "apart that rounding decides how the block moves; look for a parameter that is too small or too large by orders "
+    "of magnitude (b, d_c, a normal stress near zero)",
     "running": "",
 }
 

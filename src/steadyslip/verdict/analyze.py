@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.errors import OUT_OF_RANGE, NoSteadySliding, NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name
@@ -19,9 +19,10 @@ from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.status import on_edge
-from steadyslip.linear.stiffness import characteristic, ill_posed, set_of_one
+from steadyslip.linear.stiffness import ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import characteristic, require_range
 from steadyslip.model.sliding import SteadySliding, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
 from steadyslip.verdict.export import as_dict
@@ -143,15 +144,12 @@ def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold,
 
 def linear_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
     """Everything that follows from the characteristic polynomial."""
+    require_range(values)
     c = characteristic(values)
-    if not np.all(np.isfinite(c)):
-        raise NotAvailable(OUT_OF_RANGE)
     bad = bool(ill_posed(c))
     while len(c) > 2 and c[-1] == 0:
         c = c[:-1]
     eigenvalues = roots(c)
-    if not np.all(np.isfinite(eigenvalues)):
-        raise NotAvailable(OUT_OF_RANGE)
     numbers: dict[str, Any] = {
         "stable": bool(is_hurwitz(c)) and not bad,
         "eigenvalues": tuple(complex(s) for s in eigenvalues),

@@ -22,7 +22,7 @@ from steadyslip.core.roles import Domain, positive
 from steadyslip.linear import critical_stiffness, growth_rate, safety_factor, stable_stiffness
 from steadyslip.linear.polynomials import most_intervals
 from steadyslip.linear.response import has_closed_form
-from steadyslip.linear.status import status
+from steadyslip.linear.status import WORDS as STATUS, status
 from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
@@ -39,7 +39,6 @@ SECONDS_A_STEP = 4e-8  # of a lane's step on one core; decides no more than the 
 PROBES = 64
 NOT_DONE = -1
 
-STATUS = ("no steady sliding", "stable", "unstable", "out of range")
 ONSET = ("none", "supercritical", "subcritical", "degenerate")
 
 

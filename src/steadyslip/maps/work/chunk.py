@@ -6,6 +6,7 @@ import ctypes
 import platform
 import time
 import traceback
+import warnings
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -14,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import SteadyslipError
+from steadyslip.core.errors import OutOfRangeWarning, SteadyslipError
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Generated
 from steadyslip.maps.plan.map import AnyMeasure, Map, evaluate
@@ -94,7 +95,8 @@ def do_chunk(job: Job, number: int) -> Done:
         if job.sampling is not None:
             samples = job.sampling.part(region[-1].start, region[-1].stop)
             vary |= samples
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", OutOfRangeWarning)  # the map's text says of what its points have none
             results = evaluate(job.rig, job.protocol, job.compute, vary)
         store.write(number, results, samples)
     except OSError as error:

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, NUMBERS, THREADS, checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
+from steadyslip.model.range import beyond_range
 from steadyslip.model.sliding import steady_states
 from steadyslip.motion import History, simulate
 from steadyslip.motion.jobs import prepare
@@ -129,7 +130,7 @@ def basin(
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
     rest = rest_of(own, np.full(1, drive), np.zeros(1))
     if not rest.exists[0]:
-        raise NotAvailable(OUT_OF_RANGE)
+        raise beyond_range(own.point)
     length = float(rest.scales[0, own.reduction.names.index("x")])
     x = length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
     v = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else v  # type: ignore[assignment]

@@ -20,10 +20,11 @@ from steadyslip.protocol import Protocol
 Array = np.ndarray
 COARSE = 48  # sizes of the first scan of each rig
 WIDE = 0.1  # relative width of an undecided bracket beyond which its middle is no threshold
-BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding")
+BEYOND = (*OUTCOMES[:UNDECIDED], *(f"undecided: {doubt}" for doubt in DOUBTS), "edge", "unstable", "no steady sliding",
+          "out of range")  # fmt: skip
 """What limits the kicks of a rig: what comes of the smallest that fails, why there is no size, or another reason;
 `RETURNS`: none fails."""
-EDGE, UNSTABLE, ABSENT = range(len(OUTCOMES), len(OUTCOMES) + 3)
+EDGE, UNSTABLE, ABSENT, BEYOND_FLOATS = range(len(BEYOND) - 4, len(BEYOND))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +89,8 @@ def threshold_map(
         range fails, NaN where there is no steady sliding, and where kicks over more than a tenth of the size are
         undecided (`Threshold` of a single rig says more). After Ctrl-C, NaN too where nothing is known yet, and the
         middle of the bracket reached where something is. A DataArray has a coordinate ``limit`` beside it: what comes
-        of larger kicks, ``edge``, ``unstable``, ``no steady sliding`` or ``undecided`` with the reason; ``returns``
-        where none fails.
+        of larger kicks, ``edge``, ``unstable``, ``no steady sliding``, ``out of range`` (of floating point) or
+        ``undecided`` with the reason; ``returns`` where none fails.
     """
     found, dims, coords = threshold_brackets(
         rig, vary, kick, direction=direction, reference=reference, precision=precision, rtol=rtol, threads=threads,
@@ -148,7 +149,8 @@ class _Search:
         self.low, self.high = np.zeros(count), np.full(count, np.inf)
         self.doubt = np.full((count, 2), np.nan)  # ends of what is undecided inside the bracket,
         self.why = np.full(count, UNDECIDED)  # and why
-        self.beyond = np.where(self.exists, np.where(self.stable, INTERRUPTED, UNSTABLE), ABSENT)
+        absent = np.where(np.broadcast_to(kicked.jobs.in_range, (count,)), ABSENT, BEYOND_FLOATS)
+        self.beyond = np.where(self.exists, np.where(self.stable, INTERRUPTED, UNSTABLE), absent)
         self.whole = True
 
     def run(self, precision: float) -> None:
@@ -216,7 +218,7 @@ class _Search:
         beyond = np.where(np.isfinite(self.high) & ~known & self.whole, self.why, self.beyond)
         size = np.where(self.beyond == RETURNS, np.inf, size)
         size = np.where(self.beyond == UNSTABLE, 0.0, size)
-        low, high = (np.where(self.beyond == ABSENT, np.nan, a) for a in (self.low, self.high))
+        low, high = (np.where(self.beyond >= ABSENT, np.nan, a) for a in (self.low, self.high))
         high = np.where(self.beyond == UNSTABLE, 0.0, high)
         low = np.where(self.beyond == INTERRUPTED, np.where(low > 0, low, np.nan), low)
         return size, low, high, beyond

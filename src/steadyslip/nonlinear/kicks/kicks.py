@@ -132,7 +132,8 @@ class Kicked:
         self.sigma = np.broadcast_to(self.jobs.sigma, (self.size,))
         self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))
         self.near = Neighbourhood(self.rest)
-        self.exists, self.neutral = self.rest.exists, self.rest.exists & self.rest.neutral
+        self.exists = self.rest.exists & self.jobs.in_range
+        self.neutral = self.exists & self.rest.neutral
         self.stable = (self.rest.stable | self.neutral) & np.broadcast_to(self.jobs.posed, (self.size,))
         self.length = self.rest.scales[:, self.jobs.reduction.names.index("x")]
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, total
 from steadyslip.machine.slider import Slider
+from steadyslip.model.range import beyond_range
 from steadyslip.model.sliding import steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.spans import (
@@ -207,7 +208,7 @@ def threshold(
     steady_states(rig)  # raises, and says why
     kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol)
     if not kicked.exists[0]:
-        raise NotAvailable(OUT_OF_RANGE)
+        raise beyond_range(kicked.jobs.point)
     if not kicked.stable[0]:
         nothing = float(kicked.amount(0.0)[0])
         return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), nothing, kicked.kick.unit, "unstable", kicked.highest,

@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import OUT_OF_RANGE, NotAvailable
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import boundary
-from steadyslip.linear.polynomials import stable_set
+from steadyslip.linear.polynomials import quietly, stable_set
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.status import UNKNOWN, status
-from steadyslip.linear.stiffness import characteristic, in_chunks, stiffness_polynomials
+from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import characteristic, require_range
 from steadyslip.model.taylor import Taylor, taylor
 
 Array = np.ndarray
@@ -159,8 +159,7 @@ def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
     edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]
     oscillatory = [edge for edge in edges if edge.kind == "oscillatory"]
     if not oscillatory:
-        if status(operating_point(rig, branch=branch)) == UNKNOWN:
-            raise NotAvailable(OUT_OF_RANGE)
+        require_range(operating_point(rig, branch=branch))
         found = "; ".join(str(edge) for edge in edges) or "stability does not change at all"
         raise NotAvailable(f"no oscillatory edge of stability along {name}: {found}")
     own = float(rig.parameters()[name].value)  # type: ignore[arg-type]  # boundary() refuses None
@@ -187,7 +186,11 @@ def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
     point = _flat(rig, name, [edge.value], branch)
     found = coefficients(point, np.array([edge.angular_frequency]))
     if not np.isfinite(found["c1"][0]):
-        raise NotAvailable(f"the kind of onset at {name} = {edge.value:.4g} is lost in rounding")
+        where = f"{name} = {shown(edge.value, edge.unit, area=rig.area)}"
+        raise NotAvailable(
+            f"the kind of onset at {where} cannot be told: the numbers of this rig are so far apart that it is lost in "
+            "rounding, or beyond floating point"
+        )
     return Onset(
         rig=rig,
         along=name,
@@ -299,6 +302,7 @@ def _onsets(point: OperatingPoint, place: int) -> Array:
     return result.reshape(*point.shape, 3)
 
 
+@quietly
 def coefficients(point: OperatingPoint, omega: Array) -> dict[str, Array]:
     """First Lyapunov coefficients of rigs on an oscillatory edge.
 
@@ -312,7 +316,8 @@ def coefficients(point: OperatingPoint, omega: Array) -> dict[str, Array]:
     Returns
     -------
     dict
-        ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa), each (m,).
+        ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa), each (m,); NaN
+        where they are lost in rounding or leave the range of floating point.
     """
     expansion = taylor(point)
     size = max(len(omega), len(expansion.gradient))
@@ -333,13 +338,16 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
     def solve(matrix: Array, right: Array) -> Array:
         """matrix⁻¹ right, in scaled rows and columns; NaN where rounding has made the matrix singular."""
         balanced = scaled(matrix)
-        singular = np.linalg.cond(balanced) > 1 / np.finfo(float).eps
+        singular = ~np.all(np.isfinite(balanced), axis=(1, 2))
+        balanced = np.where(singular[:, None, None], np.eye(n), balanced)
+        singular |= np.linalg.cond(balanced) > 1 / np.finfo(float).eps
         balanced = np.where(singular[:, None, None], np.eye(n), balanced)
         found: Array = columns * np.linalg.solve(balanced, (rows * right)[:, :, None])[:, :, 0]
         return np.where(singular[:, None], np.nan, found)
 
     critical = scaled(gradient - 1j * omega[:, None, None] * mass)
-    left, _, right = np.linalg.svd(critical)
+    beyond = ~np.all(np.isfinite(critical), axis=(1, 2))  # of floating point
+    left, _, right = np.linalg.svd(np.where(beyond[:, None, None], np.eye(n), critical))
     q = columns * right[:, -1].conj()
     p = rows * left[:, :, -1]
     place = expansion.system.place
@@ -357,7 +365,7 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
             expansion.quadratic(q.conj(), double),
         )
     ]
-    c1 = np.real(sum(terms))
+    c1 = np.where(beyond, np.nan, np.real(sum(terms)))
     with np.errstate(all="ignore"):
         share = np.abs(c1) / sum(np.abs(term) for term in terms)
     return {"c1": c1, "share": share, "stress_ratio": 2 * np.abs(q[:, spring])}

@@ -22,9 +22,9 @@ from steadyslip.core.results import ReadOnly
 from steadyslip.linear.boundary import boundary, present_zeros
 from steadyslip.linear.polynomials import roots
 from steadyslip.linear.search import Search
-from steadyslip.linear.stiffness import characteristic
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import characteristic, in_range
 from steadyslip.nonlinear.continuation import Failure, Point, Track, turned_round
 from steadyslip.nonlinear.onset.hopf import coefficients, kinds, parameter_along
 
@@ -227,8 +227,10 @@ class _Plane:
 
     def _polynomials(self, u: Array) -> tuple[Array, Array]:
         """P(iβ) and the sum of the sizes of its terms."""
-        with np.errstate(all="ignore"):
-            c = characteristic(self.values(u))
+        values = self.values(u)
+        if not np.all(in_range(values)):
+            raise Failure("numbers leave the range of floating point")
+        c = characteristic(values)
         if not np.all(np.isfinite(c)):
             raise Failure("no steady sliding")
         powers = (1j * self.parameters(u)[2][:, None]) ** np.arange(c.shape[-1])

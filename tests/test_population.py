@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.stats import binom
 
 import lab_records as lab
 import steadyslip as ss
+from command import run
 from steadyslip.experiments.numerics.pooling import Told, log_evidence, pooled
 
 MEAN, SPREAD = np.array([-4.5, 1.2]), np.array([0.12, 0.05])
@@ -144,6 +146,94 @@ def test_a_population_of_fits(fits):
     panels = everyone.plot()
     assert len(panels) == 4
     assert panels[0].get_xlabel()
+
+
+def test_a_population_for_arviz(fits):
+    """Draws chain by chain, what every experiment has by its label, units, and values as the population's own."""
+    arviz = pytest.importorskip("arviz")
+    rock = ss.population(fits, ["a", "mu_ref"], conditions="normal stress", count=1000)
+    posterior = rock.to_arviz()["posterior"]
+    assert dict(posterior.sizes) == {"chain": 40, "draw": 25, "experiment": 6}
+    assert list(posterior["experiment"].values) == list(fits)
+    assert posterior["friction.a"].attrs["units"] == "1"
+    low, high = np.quantile(posterior["friction.a"].sel(experiment="run 3"), [0.025, 0.975])
+    own = rock.experiment("run 3", "a")
+    assert (low, high) == pytest.approx((own.low, own.high), rel=1e-6)
+    assert np.median(posterior["friction.a.normal stress"]) == pytest.approx(rock.slope("a", "normal stress")[0])
+    assert np.median(posterior["friction.mu_ref.spread"]) == pytest.approx(rock.spread("mu_ref")[0])
+    assert float(arviz.rhat(posterior["friction.a.mean"].values)) < 1.1
+
+
+def test_levels_of_friction_at_different_rates_are_no_population(fits):
+    other = ss.fit(ss.lab_rig(v_ref="2 um/s"), lab.record(lab.rig(), lab.STEP, 9, count=400))
+    with pytest.raises(ss.ParameterError, match=r"v_ref: differs between the fits .*run 1 1 um/s.*other 2 um/s"):
+        ss.population(fits | {"other": other})
+
+
+SPEC = """
+[friction]
+evolution = "slip"
+{}
+[population]
+parameters = ["a", "mu_ref"]
+"""
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Three files of records that begin at different rates."""
+    folder = tmp_path_factory.mktemp("rock")
+    for j, (a, rate) in enumerate([(0.010, 1e-6), (0.011, 2e-6), (0.012, 1e-6)]):
+        step = ss.VelocityStep(at=60.13, to=5e-6)
+        rig = lab.rig(a=a).with_values({"drive.velocity": rate})
+        found = lab.columns(rig, ss.Protocol(pieces=(step,), until=150.0), count=300)
+        friction = found["friction"] + 1e-4 * np.random.default_rng(j).standard_normal(300)
+        columns = np.column_stack([found["time"], 1e6 * found["displacement"], friction, 1e-6 * found["normal"]])
+        np.savetxt(folder / f"p{j + 1}.csv", columns, delimiter=",", comments="",
+                   header="time (s),displacement (um),friction,normal stress (MPa)")  # fmt: skip
+    return folder
+
+
+def fit_all(files, text, *arguments):
+    (files / "rock.toml").write_text(text)
+    return run("fit", "p1.csv", "p2.csv", "p3.csv", "rock.toml", *arguments, folder=files)
+
+
+def test_a_population_from_files(files):
+    """One command; every level of friction is that at one rate, though the records begin at two."""
+    outputs = [word for end in ("json", "png", "html", "nc") for word in ("-o", f"rock.{end}")]
+    done = fit_all(files, SPEC.format(""), *outputs)
+    assert done.returncode == 0, done.stderr
+    assert "population of 3 experiments" in done.stdout
+    assert "p2  alone 0.01" in done.stdout
+    found = json.loads((files / "rock.json").read_text())
+    levels = found["parameters"]["friction.mu_ref"]["experiments"]
+    assert [levels[f"p{j}"]["value"] for j in (1, 2, 3)] == pytest.approx([0.62] * 3, abs=2e-4)
+    assert "Population of 3 experiments" in (files / "rock.html").read_text(encoding="utf-8")
+    assert (files / "rock.png").stat().st_size > 5000
+    assert (files / "rock.nc").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('condition = "temperature"', "population.values: missing; give the temperature of every record"),
+        ("values = [1, 2, 3]", "population.condition: missing"),
+        ('condition = "normal stress"\nvalues = [1, 2, 3]', "population.values: the normal stress is that"),
+        ('condition = "T"\nvalues = [1, 2]', "population: got 3 records; allowed: 4 or more"),
+        ("draws = 5", "population.draws: got 5; allowed: a whole number from 100"),
+    ],
+)
+def test_what_is_wrong_with_a_population_in_a_file(files, text, words):
+    done = fit_all(files, SPEC.format("a = 0.01\nb = 0.014\nd_c = '12 um'") + text)
+    assert done.returncode == 2
+    assert words in " ".join(done.stderr.split())
+
+
+def test_a_population_goes_with_one_law_and_no_bootstrap(files):
+    done = fit_all(files, SPEC.format("") + "[fit]\ncompare = ['slip', 'aging']\n")
+    assert "fit.compare: cannot be combined with [population]" in done.stderr
+    assert "--bootstrap: cannot be combined" in fit_all(files, SPEC.format(""), "--bootstrap", 5).stderr
 
 
 def test_what_cannot_be_a_population_is_refused(fits):

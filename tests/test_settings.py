@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 import steadyslip as ss
 from file_schema import file_schema
 from steadyslip.core.records import Named, Part, Settings, is_required, role_of
-from steadyslip.core.roles import Label, Names, Option, Parameter, Quantity, Span, Text, Whole
+from steadyslip.core.roles import Label, Names, Option, Parameter, Quantity, Series, Span, Text, Whole
 from steadyslip.experiments.fitting.settings import FitSettings
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.settings import RecordSettings
@@ -30,6 +30,7 @@ def value_of(role):
     kinds = {
         Text: WORD, Names: st.lists(WORD, max_size=3).map(tuple), Label: WORD | st.integers(1, 9),
         Span: st.tuples(NUMBER, NUMBER), Quantity: NUMBER | st.just("1 GPa/m"),
+        Series: st.lists(NUMBER, min_size=1, max_size=9).map(tuple),
     }  # fmt: skip
     if isinstance(role, Whole):
         return st.integers(role.low, 2**40 if role.high is None else role.high)
@@ -106,6 +107,13 @@ FAULTS = {
         "offset = 1": "allowed: true or false",
         "states = 0": "allowed: a whole number from 1",
         "windos = true": "did you mean 'windows'?",
+    },
+    "population": {
+        "scale = 0": "allowed: a number above 0, up to 100",
+        "draws = 99": "allowed: a whole number from 100",
+        "values = 'hot'": "got 'hot'",
+        "condition = 3": "allowed: a text",
+        "parameters = [3]": "allowed: a list of names",
     },
     "record": {
         "between = [1]": "allowed: [start, end] in s",

@@ -146,7 +146,7 @@ def rig_page() -> str:
 
 FIT_HEAD = """# File of a fit
 
-It is a [rig file](rig-file.md) with two more tables. In the tables of the rig, what is missing is fitted: `a`, `b`,
+It is a [rig file](rig-file.md) with three more tables. In the tables of the rig, what is missing is fitted: `a`, `b`,
 `d_c`, `mu_ref`, α (with `normal_memory = "linker-dieterich"`) and the stiffness; what is given is kept. If nothing is
 missing, all of the friction law and the stiffness are fitted. `[contact]`, `[drive]` and `v_ref` may be missing too:
 normal stress and rates are those of the records. A `[protocol]` says what moved the load point where the records do

@@ -41,6 +41,7 @@ from .experiments import (
     load_fit as load_fit,
     normal_draws as normal_draws,
     population as population,
+    population_files as population_files,
     posterior as posterior,
     precision as precision,
     predict as predict,

@@ -158,14 +158,22 @@ def fit(
 ) -> None:
     """Which friction do these records show, and how sure is that?"""
     from steadyslip.core.errors import ParameterError, Problem
-    from steadyslip.experiments import bootstrap as resample, fit_files
-    from steadyslip.experiments.commands import ENDINGS, as_json as plain, split_files, write_fit
+    from steadyslip.experiments import bootstrap as resample, fit_files, population_files
+    from steadyslip.experiments.commands import ENDINGS, as_json as plain, split_files, write_fit, write_population
+    from steadyslip.experiments.from_files import spec_of
     from steadyslip.files.output import check_output
 
     check_output(output or (), ENDINGS)
     if bootstrap == 1:
         raise ParameterError([Problem("--bootstrap", "got 1; allowed: 0 for none, or 2 or more resampled records")])
     records, spec = split_files(files)
+    if spec is not None and spec_of(spec, changes or ()).population is not None:
+        if bootstrap:
+            message = "cannot be combined with [population], whose draws carry the uncertainty"
+            raise ParameterError([Problem("--bootstrap", message)])
+        members = population_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
+        give(members, output or (), as_json, write_population)
+        return
     found, comparison = fit_files(records, spec, changes or (), skip_bad_lines=skip_bad_lines)
     for path in output or ():
         write_fit(found, comparison, path)

@@ -10,9 +10,10 @@ from steadyslip.experiments.answers.validation import CrossValidation, cross_val
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit, load_fit
+from steadyslip.experiments.from_files import fit_files, population_files
 from steadyslip.experiments.measured.read import read_record, record_from_arrays
 from steadyslip.experiments.measured.record import Record
-from steadyslip.experiments.spec import Spec, fit_files, lab_rig, read_spec
+from steadyslip.experiments.spec import Spec, lab_rig, read_spec
 
 __all__ = [
     "CrossValidation",
@@ -37,6 +38,7 @@ __all__ = [
     "load_fit",
     "normal_draws",
     "population",
+    "population_files",
     "posterior",
     "precision",
     "predict",

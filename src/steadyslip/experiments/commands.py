@@ -9,6 +9,7 @@ from typing import Any
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.answers.laws import LawComparison
+from steadyslip.experiments.answers.population import Population
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.files.output import FIGURES, write_by_ending
@@ -50,6 +51,27 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Dra
         write_page(fit, target, title=f"Fit of {path.stem}", comparison=comparison, draws=draws)
 
     write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
+
+
+def write_population(found: Population, path: Path) -> None:
+    """Write a population by the ending of the name.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+
+    def as_text(target: Path) -> None:
+        target.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+    def as_page(target: Path) -> None:
+        write_page(found, target, title=f"Population of {path.stem}")
+
+    def as_draws(target: Path) -> None:
+        found.to_arviz().to_netcdf(str(target))
+
+    write_by_ending(path, {".nc": as_draws, ".html": as_page, ".json": as_text}, found.plot)
 
 
 def as_json(fit: Fit, comparison: LawComparison | None) -> dict[str, Any]:

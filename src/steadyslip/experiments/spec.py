@@ -1,8 +1,7 @@
-"""The file that says how to fit: a rig file in which what is to be fitted may be missing, and two more tables."""
+"""The file that says how to fit: a rig file in which what is to be fitted may be missing, and three more tables."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import Field, dataclass, field, fields, replace
 from os import PathLike
@@ -10,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.progress import progress_text
 from steadyslip.core.records import FrozenRecord, Part, given, resolve, role_of
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.settings import MOST_STATES, FitSettings
+from steadyslip.experiments.fitting.settings import MOST_STATES, FitSettings, PopulationSettings
 from steadyslip.experiments.measured.read import read_record
 from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.settings import RecordSettings
@@ -33,7 +31,9 @@ from steadyslip.machine.drive import Drive
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
-TABLES = (Section("record", RecordSettings), Section("fit", FitSettings))
+TABLES = (
+    Section("record", RecordSettings), Section("fit", FitSettings), Section("population", PopulationSettings)
+)  # fmt: skip
 """The tables of such a file besides those of a rig."""
 
 
@@ -59,6 +59,8 @@ class Spec(Displayed):
         Whether it says what presses the surfaces together.
     drive_given : bool
         Whether it says how fast the load point moves before a protocol changes that; as in the records unless given.
+    population : PopulationSettings or None
+        Whether, and how, records are experiments of their own that are members of a population.
     """
 
     rig: Slider
@@ -70,6 +72,7 @@ class Spec(Displayed):
     v_ref_given: bool = False
     contact_given: bool = True
     drive_given: bool = True
+    population: PopulationSettings | None = None
 
     def read(self, path: str | PathLike[str], skip_bad_lines: bool = False) -> Record:
         """Read a record as the file says."""
@@ -100,7 +103,7 @@ class Spec(Displayed):
             )
             raise ParameterError([Problem("normal", message)])
         rate = parts[0].initial_rate
-        rig = self.rig
+        rig = self.referred_to(parts[0]).rig
         if self.protocol is not None and not self.drive_given:
             if rate is None or not rate > 0:
                 message = (
@@ -109,11 +112,16 @@ class Spec(Displayed):
                 )
                 raise ParameterError([Problem("drive.velocity", message)])
             rig = rig.with_values({"drive.velocity": rate})
-        references = [name for name in rig.of_kind("reference rate") if name.startswith("friction.")]
+        return rig, parts
+
+    def referred_to(self, record: Record) -> Spec:
+        """The same with mu_ref at the rate at which a record begins, unless the file says at which."""
+        references = [name for name in self.rig.of_kind("reference rate") if name.startswith("friction.")]
         if self.v_ref_given or not references:
-            return rig, parts
-        slow = rig.drive.velocity if rate is None or not rate > 0 else rate
-        return rig.with_values(dict.fromkeys(references, slow)), parts
+            return self
+        rate = record.initial_rate
+        slow = self.rig.drive.velocity if rate is None or not rate > 0 else rate
+        return replace(self, rig=self.rig.with_values(dict.fromkeys(references, slow)), v_ref_given=True)
 
 
 @checked()
@@ -147,7 +155,13 @@ def _spec(found: Specification, filled: _Filled) -> Spec:
     record, settings = found.further.get("record"), found.further.get("fit")
     settings = settings if isinstance(settings, FitSettings) else FitSettings()
     missing = filled.missing - found.changed
-    left = () if found.problems or found.rig is None else _left_open(missing, settings, found.rig)
+    left = [] if found.problems or found.rig is None else _left_open(missing, settings, found.rig)
+    members = found.further.get("population")
+    members = members if isinstance(members, PopulationSettings) else None
+    if members is not None:
+        left += members.faults()
+        if settings.compare:
+            left.append(Problem("fit.compare", "cannot be combined with [population]; fit one law"))
     rig = found.checked_rig(*filled.problems, *left)
     own = ("states", "compare", "windows")
     options = {n: list(v) if isinstance(v, tuple) else v for n, v in given(settings).items() if n not in own}
@@ -155,9 +169,10 @@ def _spec(found: Specification, filled: _Filled) -> Spec:
         options["free"] = sorted(name for name in missing if name in rig.parameters())
         if known := [name for name in rig.of_kind("friction level") if name not in missing]:
             options["fixed"] = [*settings.fixed, *known]
+    v_ref, contact, drive = (filled.given(kind, found.changed) for kind in _Filled.FROM_RECORDS)
     return Spec(
         rig, found.protocol, record if isinstance(record, RecordSettings) else RecordSettings(), options,
-        settings.compare, settings.windows, *(filled.given(kind, found.changed) for kind in _Filled.FROM_RECORDS),
+        settings.compare, settings.windows, v_ref, contact, drive, members,
     )  # fmt: skip
 
 
@@ -341,55 +356,3 @@ def _left_open(missing: set[str], settings: FitSettings, rig: Slider) -> list[Pr
         return problems
     message = "has no value and is not fitted; give it one, or name it in [fit] free"
     return [Problem(name, message) for name in sorted(absent)]
-
-
-@checked()
-def fit_files(
-    paths: Sequence[str | PathLike[str]], spec: str | PathLike[str] | None = None, changes: Iterable[str] = (),
-    *, skip_bad_lines: bool = False,
-) -> tuple[Fit, LawComparison | None]:  # fmt: skip
-    """Read records and fit them, as the command line does; shows progress on a terminal.
-
-    Parameters
-    ----------
-    paths : sequence of path
-        Records, fitted together.
-    spec : path, optional
-        The file of the fit; one-state slip law at the measured normal stress unless given.
-    changes : iterable of str
-        As for `read_spec`.
-    skip_bad_lines : bool
-
-    Returns
-    -------
-    fit : Fit
-        The best, where laws are compared.
-    comparison : LawComparison or None
-
-    Raises
-    ------
-    ParameterError
-        Listing everything that is wrong with the files: of all records, and of the file of the fit.
-    """
-    text = "[friction]\n" if spec is None else text_of(spec)
-    plan = spec_from_text(text, "default" if spec is None else str(spec), changes)
-    records, faults = [], []
-    for path in paths:
-        try:
-            records.append(plan.read(path, skip_bad_lines))
-        except (ParameterError, NotAvailable) as error:
-            faults.append(error)
-    if len(faults) == 1:
-        raise faults[0]
-    if faults:
-        raise NotAvailable("\n".join(map(str, faults)))
-    with progress_text("searching") as said:
-
-        def told(what: str, starts: int, rms: float) -> None:
-            reached = f", residuals {rms:.3g} of friction" if math.isfinite(rms) else ""
-            said(f"{what}: {starts} starts tried{reached}; Ctrl-C ends it")
-
-        if plan.laws:
-            found = plan.compare(records, progress=told)
-            return found.fits[found.best], found
-        return plan.fit(records, progress=told), None

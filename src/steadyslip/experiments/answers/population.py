@@ -18,15 +18,16 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range
 from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.answers.inference import inference_data
 from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.settings import DRAWS, STRESS
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.pooling import Pooled, Told, pooled
 from steadyslip.model.sliding import steady_state
 
 Array = np.ndarray
 FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
-STRESS = "normal stress"
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +135,32 @@ class Population(ReadOnly):
         """
         return draw(self, ax=ax)
 
+    def to_arviz(self) -> Any:
+        """The draws for ArviZ, chain by chain, values in SI units.
+
+        Returns
+        -------
+        arviz.InferenceData, or xarray.DataTree from version 1 of ArviZ on
+            Group ``posterior``: for every parameter, as ``friction.a``, that of each experiment, its ``.mean`` and
+            ``.spread`` (as `spread` counts), and its slope with every condition, as ``friction.a.temperature``.
+
+        Raises
+        ------
+        NotAvailable
+            If ArviZ is not installed.
+        """
+        found: dict[str, Array] = {}
+        units: dict[str, str] = {}
+        for p, (name, one) in enumerate(zip(self.names, self.unknowns, strict=True)):
+            size, unit = (1.0, "1") if one.logarithmic else (one.size, one.unit)
+            found |= {name: one.value(self.draws.members[:, :, p]), f"{name}.mean": one.value(self.draws.mean[:, p, 0]),
+                      f"{name}.spread": size * self.draws.spread[:, p]}  # fmt: skip
+            units |= {name: one.unit, f"{name}.mean": one.unit, f"{name}.spread": unit}
+            for k, condition in enumerate(self.conditions, start=1):
+                found[f"{name}.{condition}"] = size * self.draws.mean[:, p, k]
+                units[f"{name}.{condition}"] = unit
+        return inference_data(found, units, self.draws.chains, members=list(self.fits))
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units."""
         ends = ("median", "low", "high")
@@ -177,7 +204,7 @@ def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str
     return f"from {condition} {whole} the mean changes by {change}"
 
 
-@checked(scale=finite(0, 100), count=whole(100, 10**6))
+@checked(scale=finite(0, 100), count=whole(*DRAWS))
 def population(
     fits: Mapping[str, Fit] | Sequence[Fit], names: Sequence[str] | None = None, *,
     conditions: str | Mapping[str, Sequence[float]] | None = None, scale: float = 1.0, count: int = 4000, seed: int = 0,
@@ -225,6 +252,7 @@ def population(
         problems.append(Problem("fits", f"got none; allowed: {FEWEST} or more"))
     if not problems and len({type(one.plan.rig.friction) for one in labelled.values()}) > 1:
         problems.append(Problem("fits", "are of several friction laws; allowed: one"))
+    problems += [] if problems else _references(labelled)
     if problems:
         raise ParameterError(problems)
     own_names = _names(labelled, names)
@@ -245,6 +273,18 @@ def population(
         raise ParameterError(problems)
     draws = pooled(told, len(own_names), np.full(len(own_names), scale), count, seed)
     return Population(labelled, own_names, given, scale, unknowns, draws)
+
+
+def _references(fits: Mapping[str, Fit]) -> list[Problem]:
+    """Levels of friction are those at a reference rate, which must be the same in all."""
+    found = []
+    rigs = {label: one.plan.rig for label, one in fits.items()}
+    for name in next(iter(rigs.values())).of_kind("reference rate"):
+        rates = {label: rig.value(name) for label, rig in rigs.items() if name.startswith("friction.")}
+        if len(set(rates.values())) > 1:
+            each = ", ".join(f"{label} {shown(rate or 0.0, 'm/s')}" for label, rate in rates.items())
+            found.append(Problem(name, f"differs between the fits ({each}); give all rigs the same"))
+    return found
 
 
 def _labelled(fits: Sequence[Fit]) -> dict[str, Fit]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +12,7 @@ from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly
+from steadyslip.experiments.answers.inference import inference_data
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 from steadyslip.experiments.numerics.sampling import walked
@@ -95,24 +95,9 @@ class Draws(ReadOnly):
         NotAvailable
             If ArviZ is not installed.
         """
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", FutureWarning)  # about versions of its own to come
-                import arviz
-        except ImportError as error:
-            raise NotAvailable("this needs the package arviz; install steadyslip[lab]") from error
-        groups: dict[str, Any] = {"posterior": {name: self._by_chain(values) for name, values in self.values.items()}}
-        if self.log_probability is not None:
-            groups["sample_stats"] = {"lp": self._by_chain(self.log_probability)}
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "More chains", UserWarning)  # walkers are many, and meant to be
-            found = arviz.from_dict(**groups) if hasattr(arviz, "InferenceData") else arviz.from_dict(groups)
-        for one in self.fit.space.unknowns:
-            found["posterior"][one.name].attrs["units"] = one.unit
-        return found
-
-    def _by_chain(self, values: Array) -> Array:
-        return values.reshape(self.chains, -1)
+        statistics = None if self.log_probability is None else {"lp": self.log_probability}
+        units = {one.name: one.unit for one in self.fit.space.unknowns}
+        return inference_data(self.values, units, self.chains, statistics=statistics)
 
 
 @checked(count=whole(1, 10**8))

@@ -1,4 +1,4 @@
-"""The table ``[fit]`` of a file, and the options of `steadyslip.fit`: declared once, for both."""
+"""The tables ``[fit]`` and ``[population]`` of a file, and the options of `steadyslip.fit`: declared once, for both."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Settings, option, parameter, setting
-from steadyslip.core.roles import Domain, Names, Whole
+from steadyslip.core.roles import Domain, Names, Series, Text, Whole
 
 STARTS = 48
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")
@@ -52,6 +52,48 @@ class FitSettings(Settings):
     compare: tuple[str, ...] = setting(
         Names("laws to compare: `slip`, `aging`, `prz`, each also with `, two states`"), default=()
     )
+
+
+STRESS = "normal stress"
+DRAWS = (100, 10**6)
+_scale = Domain(0, 100, False, True, "a number above 0, up to 100")
+
+
+class PopulationSettings(Settings):
+    """Every record is an experiment of its own, and a member of a population, such as samples of one rock."""
+
+    parameters: tuple[str, ...] | None = setting(
+        Names("parameters that differ from experiment to experiment; all of the friction law unless given"),
+        default=None,
+    )
+    condition: str | None = setting(
+        Text(f"what their means may depend on: `{STRESS}`, which is that of the records, or a name for `values`"),
+        default=None,
+    )
+    values: tuple[float, ...] | None = setting(
+        Series("1", "of the condition, one for each record in the order in which records are given"), default=None
+    )
+    scale: float = parameter(
+        "1", _scale, "of the half-normal prior of the spreads, e-folds or natural sizes", default=1.0
+    )
+    draws: int = setting(Whole("draws from the posterior", *DRAWS), default=4000)
+
+    def depends_on(self) -> str | dict[str, tuple[float, ...]] | None:
+        """As `steadyslip.population` takes them."""
+        if self.condition is None or self.values is None:
+            return self.condition
+        return {self.condition: self.values}
+
+    def faults(self) -> tuple[Problem, ...]:
+        """What does not go together."""
+        if self.condition is None and self.values is not None:
+            return (Problem("population.condition", "missing; say what the values are, such as 'temperature'"),)
+        if self.condition == STRESS and self.values is not None:
+            return (Problem("population.values", f"the {STRESS} is that of the records; leave them away"),)
+        if self.condition not in (None, STRESS) and self.values is None:
+            message = f"missing; give the {self.condition} of every record, or write condition = {STRESS!r}"
+            return (Problem("population.values", message),)
+        return ()
 
 
 def faults(options: Mapping[str, Any]) -> tuple[Problem, ...]:

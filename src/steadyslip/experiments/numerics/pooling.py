@@ -15,7 +15,9 @@ from steadyslip.experiments.numerics.sampling import walked
 
 Array = np.ndarray
 LEAST = -16.0  # logarithm of a spread, in units of the prior: below, it is none
-STEPS, WALKERS, BURN = 500, 40, 150
+WALKERS, BURN = 40, 250
+APART = 20  # steps between draws of a walker, about as many as they remember,
+FEWEST = 350  # steps, however few draws
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +60,15 @@ class Pooled:
         θ of every experiment.
     time : float
         Autocorrelation time of the spreads, steps.
+    chains : int
+        Walkers that the draws belong to, one after another and equally long.
     """
 
     mean: Array
     spread: Array
     members: Array
     time: float
+    chains: int = 1
 
 
 def log_evidence(told: list[Told], spread: Array) -> tuple[Array, Array, Array]:
@@ -100,7 +105,7 @@ def pooled(told: list[Told], size: int, scale: Array, count: int, seed: int) -> 
     scale : ndarray (p,)
         Of the half-normal priors of the spreads.
     count : int
-        Draws.
+        Draws, at least: as many of every walker.
     seed : int
 
     Raises
@@ -120,10 +125,13 @@ def pooled(told: list[Told], size: int, scale: Array, count: int, seed: int) -> 
     generator = np.random.default_rng(seed)
     walkers = max(WALKERS, 2 * size + 2)
     begin = np.log(_scatter(told, size, scale) / scale) + 0.5 * generator.standard_normal((walkers, size))
-    sampler, time = walked(log_probability, np.clip(begin, LEAST + 1, 3.0), STEPS, seed, "a population")
-    kept = sampler.get_chain(discard=BURN).reshape(-1, size)
-    spread = scale * np.exp(kept[generator.choice(len(kept), count, replace=len(kept) < count)])
-    return _given(told, spread, time, generator)
+    each = -(-count // walkers)
+    steps = max(APART * each, FEWEST)
+    sampler, time = walked(log_probability, np.clip(begin, LEAST + 1, 3.0), BURN + steps, seed, "a population")
+    kept = sampler.get_chain(discard=BURN)
+    own = np.round(np.linspace(0, steps - 1, each)).astype(int)
+    spread = scale * np.exp(kept[own].transpose(1, 0, 2).reshape(-1, size))
+    return _given(told, spread, time, walkers, generator)
 
 
 def _scatter(told: list[Told], size: int, scale: Array) -> Array:
@@ -136,7 +144,7 @@ def _scatter(told: list[Told], size: int, scale: Array) -> Array:
     return found
 
 
-def _given(told: list[Told], spread: Array, time: float, generator: np.random.Generator) -> Pooled:
+def _given(told: list[Told], spread: Array, time: float, chains: int, generator: np.random.Generator) -> Pooled:
     """Means and members for given spreads, exactly."""
     count, size = spread.shape
     _, precision, best = log_evidence(told, spread)
@@ -154,4 +162,4 @@ def _given(told: list[Told], spread: Array, time: float, generator: np.random.Ge
         weight = np.linalg.solve(variance, (one.values - seen)[:, :, None])[:, :, 0]
         drawn[:, one.seen] += spread[:, one.seen] ** 2 * weight
         members[:, j] = drawn
-    return Pooled(mean, spread, members, time)
+    return Pooled(mean, spread, members, time, chains)

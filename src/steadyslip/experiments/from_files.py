@@ -1,0 +1,137 @@
+"""From files of records, and the file that says how, to a fit or a population, as the command line does it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.options import checked
+from steadyslip.core.progress import progress_text
+from steadyslip.experiments.answers.laws import LawComparison
+from steadyslip.experiments.answers.population import FEWEST, Population, population
+from steadyslip.experiments.fitting.result import Fit
+from steadyslip.experiments.fitting.search import Told
+from steadyslip.experiments.fitting.settings import PopulationSettings
+from steadyslip.experiments.measured.record import Record
+from steadyslip.experiments.spec import Spec, spec_from_text
+from steadyslip.files.specifications.read import text_of
+
+Paths = Sequence[str | PathLike[str]]
+
+
+def spec_of(spec: str | PathLike[str] | None, changes: Iterable[str] = ()) -> Spec:
+    """What the file of a fit says; one-state slip law at the measured normal stress unless there is one."""
+    text = "[friction]\n" if spec is None else text_of(spec)
+    return spec_from_text(text, "default" if spec is None else str(spec), changes)
+
+
+@checked()
+def fit_files(
+    paths: Paths, spec: str | PathLike[str] | None = None, changes: Iterable[str] = (), *, skip_bad_lines: bool = False
+) -> tuple[Fit, LawComparison | None]:
+    """Read records and fit them, as the command line does; shows progress on a terminal.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Records, fitted together.
+    spec : path, optional
+        The file of the fit; one-state slip law at the measured normal stress unless given.
+    changes : iterable of str
+        As for `read_spec`.
+    skip_bad_lines : bool
+
+    Returns
+    -------
+    fit : Fit
+        The best, where laws are compared.
+    comparison : LawComparison or None
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong with the files: of all records, and of the file of the fit.
+    """
+    plan = spec_of(spec, changes)
+    records = _read(plan, paths, skip_bad_lines)
+    with progress_text("searching") as said:
+        told = _teller(said)
+        if plan.laws:
+            found = plan.compare(records, progress=told)
+            return found.fits[found.best], found
+        return plan.fit(records, progress=told), None
+
+
+@checked()
+def population_files(
+    paths: Paths, spec: str | PathLike[str], changes: Iterable[str] = (), *, skip_bad_lines: bool = False
+) -> Population:
+    """Read records, fit each on its own and pool what they say, as the command line does; shows progress on a terminal.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        Records, each an experiment of its own.
+    spec : path
+        The file of the fit; its table ``[population]`` says which parameters differ, and on what they may depend.
+    changes : iterable of str
+        As for `read_spec`.
+    skip_bad_lines : bool
+
+    Returns
+    -------
+    Population
+        Its experiments labelled by the names of the files.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong with the files, or if they do not determine a population.
+    NotAvailable
+        If emcee is not installed.
+    """
+    plan = spec_of(spec, changes)
+    members = plan.population or PopulationSettings()
+    records = _read(plan, paths, skip_bad_lines)
+    needed = FEWEST + (members.condition is not None)
+    if len(records) < needed:
+        raise ParameterError([Problem("population", f"got {len(records)} records; allowed: {needed} or more")])
+    if members.values is not None and len(members.values) != len(records):
+        message = f"got {len(members.values)}; allowed: {len(records)}, one for each record"
+        raise ParameterError([Problem("population.values", message)])
+    plan = plan.referred_to(records[0])  # all levels of friction at one rate
+    fits: dict[str, Fit] = {}
+    with progress_text("searching") as said:
+        for path, record in zip(paths, records, strict=True):
+            stem = Path(path).stem
+            label = stem if stem not in fits else f"{stem} ({len(fits) + 1})"
+            fits[label] = plan.fit([record], progress=_teller(said, f"{label}, "))
+    return population(
+        fits, members.parameters, conditions=members.depends_on(), scale=members.scale, count=members.draws
+    )
+
+
+def _read(plan: Spec, paths: Paths, skip_bad_lines: bool) -> list[Record]:
+    """All records; every fault of every file at once."""
+    records, faults = [], []
+    for path in paths:
+        try:
+            records.append(plan.read(path, skip_bad_lines))
+        except (ParameterError, NotAvailable) as error:
+            faults.append(error)
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        raise NotAvailable("\n".join(map(str, faults)))
+    return records
+
+
+def _teller(said: Callable[[str], None], of: str = "") -> Told:
+    def told(what: str, starts: int, rms: float) -> None:
+        reached = f", residuals {rms:.3g} of friction" if math.isfinite(rms) else ""
+        said(f"{of}{what}: {starts} starts tried{reached}; Ctrl-C ends it")
+
+    return told

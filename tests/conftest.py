@@ -18,7 +18,7 @@ if os.environ.get("CI"):
     settings.load_profile("ci")
 
 SLOW = Path(__file__).with_name("slow.txt")
-QUICK = 0.5  # CPU seconds that a test, with all of its parameters, may take before the rest of them is slow
+QUICK = 0.3  # CPU seconds that a test, with all of its parameters, may take before the rest of them is slow
 
 
 def pytest_addoption(parser):

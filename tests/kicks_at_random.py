@@ -208,9 +208,11 @@ def rates(y, t, p):
 def in_slip(y, p):
     """Rates over those of a clock that the block drives when it is fast; time itself comes last."""
     found = rates(y[:-1], 0.0, p)
+    fast = 1 + found[0] + p[7]
     out = np.empty(len(y))
-    out[:-1] = found / (1 + found[0] + p[7])
-    out[-1] = 1 / (1 + found[0] + p[7])
+    for i in range(len(found)):  # numba compiles assigned slices for seconds
+        out[i] = found[i] / fast
+    out[-1] = 1 / fast
     return out
 
 
@@ -223,7 +225,9 @@ def slopes(y, t, p, size):
         beside[j] = y[j] + 10 * size[j]
         above = rates(beside, t, p)
         beside[j] = y[j] - 10 * size[j]
-        out[:, j] = (above - rates(beside, t, p)) / (20 * size[j])
+        below = rates(beside, t, p)
+        for i in range(len(y)):
+            out[i, j] = (above[i] - below[i]) / (20 * size[j])
     return out
 
 

@@ -71,7 +71,7 @@ def test_kernels_follow_the_model(law, contact, mass):
     a_rig = rig(friction=friction, contact=contact, mass=mass, radiation_damping=0.0 if law == "lugre" else 2e10)
     got, outcome = interpreted(a_rig, ss.NormalStressStep(at=until / 3, by=1e5), until, {"x": kick}, 1e-9)
     assert outcome.status[0] == 1
-    method = "Radau" if mass or law == "lugre" else "DOP853"  # for what is stiff, and what is not
+    method = "LSODA" if mass or law == "lugre" else "DOP853"  # for what may be stiff, and what is not
     x, v, *memory = Oracle(a_rig, plain=plain).run(until / 3, x=kick, method=method)
     pressed = Oracle(a_rig, pressure=lambda t: 1e5, plain=plain)
     expected = pressed.run(until, x=x, v=v, memory=memory, start=until / 3, method=method)
@@ -158,6 +158,6 @@ def test_inputs_that_vary_in_time(changes, inputs):
     oracle, state = Oracle(a_rig, **functions), None
     for start, stop in ((0.0, 0.5), (0.5, 1.5), (1.5, 2.0)):  # kinks at the ends of the ramp
         begin = {"x": 1e-7} if state is None else {"x": state[0], "v": state[1], "memory": state[2:]}
-        state = oracle.run(stop, start=start, method="Radau" if "mass" in changes else "DOP853", **begin)
+        state = oracle.run(stop, start=start, method="LSODA" if "mass" in changes else "DOP853", **begin)
     scale = np.maximum(np.abs(state), [1e-6, 1e-6, *[1e-3] * (len(state) - 2)])
     assert np.max(np.abs(got - state) / scale) < 2e-8

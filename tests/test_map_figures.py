@@ -183,3 +183,30 @@ def test_refined_points_and_sensitivity_are_drawn(maps, tmp_path):
     assert [ax.get_title() for ax in bars] == ["critical stiffness", "margin"]
     assert [t.get_text() for t in bars[1].get_yticklabels()] == ["a", "d c"]
     assert bars[0].get_xlabel() == "share of the variance (1)"
+
+
+def test_white_has_words(tmp_path):
+    """Where a picture has no number, the legend says why: asked of the rigs there, and of the store."""
+    over = {"friction.b": ss.Grid(0.010, 0.03, 9), "contact.angle": ss.Grid(-1.4, 1.2, 9)}
+    found = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "white.zarr", workers=1)
+    expected = "no critical stiffness (no steady sliding, stable at every stiffness)"
+    assert expected in labels(found.plot())
+    line = found.plot(x="friction.b", y="")
+    assert "where there is no line: no critical stiffness (stable at every stiffness)" in labels(line)
+    over = {"friction.b": ss.Grid(0.02, 0.03, 4), "contact.angle": ss.Grid(-0.1, 0.1, 4)}
+    full = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "full.zarr", workers=1)
+    assert labels(full.plot()) == []
+
+
+def test_numbers_out_of_range_have_words(tmp_path):
+    screw = ss.LuGre(mu_coulomb=0.12, mu_static=0.18, v_stribeck=1e-3, bristle_stiffness=2e5, bristle_damping=30.0)
+    base = ss.Slider(friction=screw, contact=rig().contact, stiffness=4e10, mass=3e3, drive=ss.Steady(5e-4))
+    over = {"friction.v_stribeck": list(np.geomspace(1e-200, 1e-1, 8)), "stiffness": ss.Grid(1e10, 1e12, 4)}
+    plan = ss.Map(base, over, ["status", "critical_stiffness"], chunk=4)
+    found = ss.run_map(plan, tmp_path / "screw.zarr", workers=1)
+    assert found.statistics()["status"]["out of range"] > 0
+    assert "numbers out of the range of floating point" in labels(found.plot())
+    assert "numbers out of the range of floating point" in labels(found.plot(x="friction.v_stribeck", y=""))
+    bare = ss.run_map(ss.Map(base, over, ["critical_stiffness"]), tmp_path / "bare.zarr", workers=1)
+    (words,) = (word for word in labels(bare.plot()) if word.startswith("no critical stiffness"))
+    assert "out of range" in words

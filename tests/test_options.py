@@ -172,3 +172,27 @@ def test_roles_take_any_value(kind):
         for name, item in inspect.signature(function).parameters.items():
             if (role := role_of(name, str(item.annotation))) is not None:
                 assert not judged(lambda r=role: r.checked(VALUES[kind]))
+
+
+@pytest.mark.parametrize("value", [float("nan"), 1e-30, 0.0, 0.5])
+def test_a_tolerance_has_one_range_wherever_it_is_given(value):
+    """Functions, options of runs and maps say the same."""
+    from steadyslip.motion.jobs import Options
+
+    said = set()
+    asked = (
+        lambda: ss.simulate(RIG, until=1.0, rtol=value),
+        lambda: ss.simulate_many(RIG, {}, until=1.0, rtol=value),
+        lambda: ss.cycles(RIG, rtol=value),
+        lambda: ss.threshold(RIG, rtol=value),
+        lambda: ss.threshold_map(RIG, {}, rtol=value),
+        lambda: ss.basin(RIG, rtol=value),
+        lambda: Options(rtol=value),
+        lambda: ss.Events(until=1.0, rtol=value),
+    )
+    for ask in asked:
+        with pytest.raises(ss.ParameterError, match="rtol") as caught:
+            ask()
+        (problem,) = caught.value.problems
+        said.add(problem.message.partition("allowed: ")[2].partition(",")[0].partition(" in ")[0])
+    assert len({text for text in said if text.startswith("a number from 1e-14 to 0.1")}) == len(said)

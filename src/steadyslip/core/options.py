@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, one
-from steadyslip.core.roles import Names, Option, Role, Text, Whole
+from steadyslip.core.roles import Domain, Names, Option, Role, Text, Whole, below_one, steps, tolerance
 
 LARGEST = 1.7e308  # integers may be larger than any float
 MOST = 1e150  # whose square is finite
@@ -46,6 +46,16 @@ def finite(above: float, most: float = math.inf, *, closed: bool = False) -> Rol
 
     least = "" if math.isinf(above) else f" {'from' if closed else 'above'} {above:g}"
     return Tested(f"a finite number{least}" + (f", up to {most:g}" if math.isfinite(most) else ""), passes)
+
+
+def within(domain: Domain) -> Role:
+    """Numbers of a domain, as a parameter of a record may be one."""
+
+    def passes(value: Any) -> bool:
+        plain = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+        return plain and bool(abs(value) <= LARGEST) and bool(domain.contains(value))
+
+    return Tested(domain.text, passes)
 
 
 def _all_numbers(value: Any) -> bool:
@@ -87,7 +97,10 @@ MAKERS = {
     "Slider": "read_rig", "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
     "Cycle": "cycles",
 }  # fmt: skip
-BY_WORD: dict[str, Role] = {"branch": BRANCH, "threads": THREADS, "workers": THREADS, "seed": SEED, "text": CONTENT}
+INTEGRATION = {"rtol": within(tolerance), "arrest": within(below_one), "most_steps": within(steps)}
+BY_WORD: dict[str, Role] = INTEGRATION | {
+    "branch": BRANCH, "threads": THREADS, "workers": THREADS, "seed": SEED, "text": CONTENT,
+}  # fmt: skip
 BY_ANNOTATION: dict[str, Role] = {
     "bool": FLAG, "str": NAME, "Sequence[str]": NAMES, "str | Sequence[str]": NAMES, "Vary": BY_NAME,
     "str | PathLike[str]": PLACE, **{names: _made(names, maker) for names, maker in MAKERS.items()},

@@ -12,7 +12,7 @@ from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.answers.population import Population
 from steadyslip.experiments.answers.uncertainty import Draws
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.files.output import FIGURES, write_by_ending
+from steadyslip.files.output import FIGURES, write_by_ending, write_text
 from steadyslip.files.standalone import write_page
 
 ENDINGS = (".nc", ".html", ".json", *FIGURES)
@@ -45,7 +45,7 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Dra
     """
 
     def as_text(target: Path) -> None:
-        target.write_text(json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        write_text(target, json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n")
 
     def as_page(target: Path) -> None:
         write_page(fit, target, title=f"Fit of {path.stem}", comparison=comparison, draws=draws)

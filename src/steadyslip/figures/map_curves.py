@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.figures.map_axes import KINDS, Scale, missing_note, place_axes, shown_name
+from steadyslip.figures.map_axes import KINDS, OUT_OF_RANGE, Scale, entry, missing_note, place_axes, shown_name
 from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, labelled
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
+from steadyslip.maps.view.absence import without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.result import MapResult
 
@@ -43,6 +45,7 @@ def _bands_of_status(ax: Axes, x: Array, status: Array) -> None:
         STABLE: {"facecolor": SKY, "alpha": 0.35, "label": "stable"},
         UNSTABLE: {"facecolor": ORANGE, "alpha": 0.3, "label": "unstable"},
         ABSENT: {"facecolor": "none", "edgecolor": GREY, "hatch": "///", "label": "no steady sliding"},
+        UNKNOWN: {"facecolor": "none", "edgecolor": GREY, "hatch": "xx", "label": OUT_OF_RANGE},
     }
     for code, style in styles.items():
         inside = np.concatenate([[False], status == code, [False]])
@@ -74,6 +77,8 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
             ax.set_ylim(top=1.3 * float(scale(finite.max())))
     else:
         ax.plot(x, np.where(np.isfinite(values), scale(values), np.nan), color=BLUE)
+        if gaps := without_number(found, view, name, hatched="status" in view.values):
+            entry(ax, Patch(facecolor="none", edgecolor="none", label=f"where there is no line: {gaps}"))
     ax.set_yscale("log" if scale.log else "linear")
     ax.set_ylabel(labelled(name.replace("_", " "), scale.unit))
     if name == "safety_factor":
@@ -120,6 +125,7 @@ def scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
         (UNSTABLE, "unstable", ORANGE, "v"),
         (STABLE, "stable", BLUE, "o"),
         (ABSENT, "no steady sliding", GREY, "x"),
+        (UNKNOWN, OUT_OF_RANGE, GREY, "+"),
     )
     if status is None:
         ax.plot(*across, ".", color=BLUE, markersize=4, linestyle="none")

@@ -15,9 +15,20 @@ from matplotlib.patches import Patch
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.figures.chart import absence_reasons
-from steadyslip.figures.map_axes import KINDS, MANY, Scale, entry, missing_note, place_axes, short, shown_name
+from steadyslip.figures.map_axes import (
+    KINDS,
+    MANY,
+    OUT_OF_RANGE,
+    Scale,
+    entry,
+    missing_note,
+    place_axes,
+    short,
+    shown_name,
+)
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, display_unit, labelled
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
+from steadyslip.maps.view.absence import points_at, without_number
 from steadyslip.maps.view.cut import View, own_value
 from steadyslip.maps.view.result import MapResult
 
@@ -61,6 +72,12 @@ def _regions(ax: Axes, found: MapResult, view: View, x: Array, y: Array) -> None
             ax.contourf(x, y, absent.astype(float), levels=[0.5, 1.5], colors="none", hatches=["///"])
         reasons = _reasons(found, view, absent)
         entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="///", label=f"no steady sliding{reasons}"))
+    if (unknown := status == UNKNOWN).any():
+        if min(unknown.shape) > 1:
+            ax.contourf(x, y, unknown.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xx"])
+        entry(ax, Patch(facecolor="white", edgecolor=GREY, hatch="xx", label=OUT_OF_RANGE))
+    if (status < 0).any():
+        entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
 
 
 def _reasons(found: MapResult, view: View, absent: Array) -> str:
@@ -69,12 +86,7 @@ def _reasons(found: MapResult, view: View, absent: Array) -> str:
         rig = found.rig
     except NotAvailable:
         return ""
-    rows = np.argwhere(absent)
-    points = []
-    for row in rows[np.unique(np.linspace(0, len(rows) - 1, 12).astype(int))]:
-        place = {n: float(p[i]) for n, p, i in zip(view.names, view.places, row[::-1], strict=True)}
-        points.append({n: v for n, v in (view.held | place).items() if not n.startswith("protocol.")})
-    found_reasons = absence_reasons(rig, points)
+    found_reasons = absence_reasons(rig, points_at(view, np.argwhere(absent)))
     return f" ({found_reasons})" if found_reasons else ""
 
 
@@ -132,6 +144,8 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         ax.pcolormesh(x, y, kinds, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)
         for code in np.unique(values[values >= 0]):
             entry(ax, Patch(facecolor=colours[int(code)], label=words[int(code)]))
+        if (values < 0).any():
+            entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
         return
     factor, unit, norm = scale or colour_scale([values], found.unit(name), found.area)
     mesh = ax.pcolormesh(x, y, np.where(np.isfinite(values), values, np.nan) / factor, cmap="cividis", norm=norm,
@@ -139,6 +153,8 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
     ax.figure.colorbar(mesh, ax=ax, label=labelled(name.replace("_", " "), unit))
     if note := missing_note(view, name):
         entry(ax, Patch(facecolor="none", label=f"median of samples{note}"))
+    if white := without_number(found, view, name):
+        entry(ax, Patch(facecolor="white", edgecolor=GREY, label=white))
 
 
 def colour_scale(fields: Sequence[Array], unit: str, area: float | None) -> tuple[float, str, Any]:

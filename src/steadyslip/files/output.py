@@ -16,6 +16,7 @@ from steadyslip.core.errors import NotAvailable
 if TYPE_CHECKING:
     import numpy as np  # commands start without it
 
+_NO_FILES = ("/dev", "/proc", "/sys")
 FIGURES = (".png", ".svg", ".pdf")
 
 
@@ -94,14 +95,17 @@ def write_by_ending(path: Path, writers: Mapping[str, Callable[[Path], object]],
 def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[str]:
     """The name of a temporary file, which takes the place of `path` once it is written without fault.
 
-    A `private` file is for its owner alone.
+    A link is followed, and what it leads to is replaced. A `private` file is for its owner alone, and takes the place
+    of a link.
 
     Raises
     ------
     NotAvailable
-        If the file cannot be written.
+        If the file cannot be written, or `path` is a device, a pipe or a folder: what is written whole takes the place
+        of what was there.
     """
-    target, temporary = Path(path), ""
+    target, temporary = Path(path) if private else Path(os.path.realpath(path)), ""
+    _refuse_other_than_files(path, target)
     try:
         descriptor, temporary = tempfile.mkstemp(dir=target.parent or Path(), suffix=target.suffix)
         os.close(descriptor)
@@ -117,6 +121,27 @@ def whole_file(path: str | PathLike[str], *, private: bool = False) -> Iterator[
         if isinstance(error, OSError):
             raise NotAvailable(f"cannot write {str(path)!r}: {error.strerror or error}") from error
         raise
+
+
+def _refuse_other_than_files(path: str | PathLike[str], target: Path) -> None:
+    """Nothing but a file may be replaced; a name such as /dev/stdout is none, wherever it leads."""
+    named = Path(os.path.abspath(path))
+    place = any(named.is_relative_to(folder) for folder in _NO_FILES) and not named.is_relative_to("/dev/shm")
+    if place or (target.exists() and not target.is_file()):
+        kind = "a folder" if target.is_dir() else "a device or a pipe"
+        raise NotAvailable(f"cannot write {str(path)!r}: it is {kind}; give the name of a file")
+
+
+def write_text(path: str | PathLike[str], text: str) -> None:
+    """Write text as UTF-8.
+
+    Raises
+    ------
+    NotAvailable
+        If the file cannot be written.
+    """
+    with whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_columns(path: str | PathLike[str], columns: Mapping[str, np.ndarray], form: str) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.pages import whole
-from steadyslip.files.output import whole_file
+from steadyslip.files.output import write_text
 
 FRAME = 'sandbox="allow-scripts allow-downloads" style="width:100%;height:900px;border:0"'
 
@@ -38,8 +38,7 @@ class Standalone:
         NotAvailable
             If it cannot be written.
         """
-        with whole_file(path) as name:
-            Path(name).write_text(self.html, encoding="utf-8")
+        write_text(path, self.html)
 
     def open(self) -> Path:
         """Show it in the browser; the file it is in."""

@@ -14,7 +14,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
-from steadyslip.files.output import whole_file
+from steadyslip.files.output import write_text
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import find_law
 from steadyslip.maps.plan.axes import SAMPLE
@@ -98,8 +97,7 @@ class Refined(ReadOnly):
             sides: Any = self.sides[:, side] if len(self.sides) else []
             columns.append([words[int(s)] if words else ("below", "above")[int(s)] for s in sides])
         rows = [",".join([*names, "one side", "other side"]), *(",".join(row) for row in zip(*columns, strict=True))]
-        with whole_file(path) as temporary:
-            Path(temporary).write_text("\n".join(rows) + "\n", encoding="utf-8")
+        write_text(path, "\n".join(rows) + "\n")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw new points and edge; see `steadyslip.figures.refined`."""

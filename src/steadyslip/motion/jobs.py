@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.options import INTEGRATION
 from steadyslip.core.questions import question
 from steadyslip.core.records import twin
 from steadyslip.kernels.formulation import Choice
@@ -59,12 +60,11 @@ class Options:
         problems = []
         if self.method not in METHODS:
             problems.append(Problem("method", unknown_name("method", self.method, METHODS)))
-        checks = {"rtol": 1e-14 <= self.rtol <= 0.1, "arrest": 0 <= self.arrest < 1, "most_steps": self.most_steps >= 1}
-        allowed = {"rtol": "a number from 1e-14 to 0.1", "arrest": "a number from 0 to below 1",
-                   "most_steps": "a whole number >= 1"}  # fmt: skip
-        for name, good in checks.items():
-            if not good:
-                problems.append(Problem(name, f"got {getattr(self, name)!r}; allowed: {allowed[name]}"))
+        for name, role in INTEGRATION.items():
+            try:
+                role.checked(getattr(self, name))
+            except ParameterError as error:
+                problems += [Problem(name, fault.message) for fault in error.problems]
         if problems:
             raise ParameterError(problems)
 

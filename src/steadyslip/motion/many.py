@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Together, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.core.options import NUMBERS, checked, finite, whole
+from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
@@ -114,9 +114,7 @@ class Ensemble(ReadOnly):
         return xr.Dataset(variables, coords=coords)
 
 
-@checked(
-    until=finite(0), arrest=finite(0, 1, closed=True), times=NUMBERS, rtol=finite(0, 0.1), most_steps=whole(1, 10**12)
-)
+@checked(until=finite(0), times=NUMBERS)
 def simulate_many(
     rig: Slider,
     vary: Mapping[str, Any],

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.options import NUMBERS, checked, finite, whole
+from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
 from steadyslip.machine.slider import Slider
@@ -29,9 +29,7 @@ OWN_STEPS = 500_000
 """Limit of steps of a run that reports them all: some hundred bytes each, up to four times."""
 
 
-@checked(
-    until=finite(0), arrest=finite(0, 1, closed=True), times=NUMBERS, rtol=finite(0, 0.1), most_steps=whole(1, 10**12)
-)
+@checked(until=finite(0), times=NUMBERS)
 def simulate(
     rig: Slider,
     protocol: Any = None,

@@ -11,8 +11,8 @@ REMEDIES = {
     "contact lost": "the normal stress fell to zero; press harder (preload), or change what takes the load off",
     "blow-up": "the massless model reaches infinite velocity at this time; give the slider a mass or "
     "radiation_damping to follow the motion further",
-    "too many steps": "the limit of steps is used up; shorten until, loosen rtol, report at given times (times, "
-    "--samples), for which more steps are allowed, or raise most_steps",
+    "too many steps": "the limit of steps is used up; shorten the run (--until), loosen --rtol, or report at given "
+    "times (--samples, in Python times), for which more steps are allowed; in Python most_steps raises the limit",
     "stuck": "no step is small enough: the equations have no solution beyond this point (without mass, friction that "
     "falls at once when the block speeds up; or a normal stress that answers too strongly to acceleration), or change "
     "faster than floating point can follow (a mass near zero, say); give the slider mass or damping, or check the "

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Named, key_of
 from steadyslip.core.roles import Value
+from steadyslip.files.output import write_text
 from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -25,10 +25,10 @@ def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None 
     ------
     ParameterError
         If the rig has a law without registered name.
-    OSError
+    NotAvailable
         If the file cannot be written.
     """
-    Path(path).write_text(rig_to_text(rig, protocol), encoding="utf-8")
+    write_text(path, rig_to_text(rig, protocol))
 
 
 @checked()

@@ -18,7 +18,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
 from steadyslip.core.records import FrozenRecord, option, parameter
-from steadyslip.core.roles import Domain, positive
+from steadyslip.core.roles import Domain, below_one, positive, steps, tolerance
 from steadyslip.linear import critical_stiffness, growth_rate, safety_factor, stable_stiffness
 from steadyslip.linear.polynomials import most_intervals
 from steadyslip.linear.response import has_closed_form
@@ -197,7 +197,6 @@ class OnsetKind(Measure, name="onset"):
 
 
 small = Domain(0, 0.1, False, True, "a number > 0 and <= 0.1")
-steps = Domain(1, 1e9, True, True, "a whole number from 1 to 1e9", whole=True)
 
 
 class Events(Measure, name="events"):
@@ -206,8 +205,8 @@ class Events(Measure, name="events"):
     moves = True
     until: float | None = parameter("s", positive, "end of every run; that of the protocol unless given", default=None)
     method: str = option("auto", "explicit", "rosenbrock", doc="of integration", default="auto")
-    rtol: float = parameter("1", small, "error allowed per step", default=1e-7)
-    arrest: float = parameter("1", small, "velocity over the drive's below which a block counts as held", default=1e-3)
+    rtol: float = parameter("1", tolerance, "error allowed per step", default=1e-7)
+    arrest: float = parameter("1", below_one, "velocity over the drive's below which a block is held", default=1e-3)
     most_steps: float = parameter("1", steps, "steps after which a run is given up", default=1_000_000)
 
     def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:

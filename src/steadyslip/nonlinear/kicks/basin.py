@@ -77,7 +77,6 @@ class Basin(ReadOnly):
 @checked(
     x=NUMBERS,
     v=NUMBERS,
-    rtol=finite(0, 0.1),
     threads=THREADS,
     branch=BRANCH,
     along=NAME,

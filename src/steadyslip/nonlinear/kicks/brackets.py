@@ -49,7 +49,6 @@ class Brackets:
 
 @checked(
     precision=finite(1e-13, 0.1),
-    rtol=finite(0, 0.1),
     threads=THREADS,
     branch=BRANCH,
     kick=NAME,

@@ -140,7 +140,6 @@ class Threshold(Displayed):
 
 @checked(
     precision=finite(0, 0.1),
-    rtol=finite(0, 0.1),
     branch=BRANCH,
     kick=NAME,
     reference=NAME,

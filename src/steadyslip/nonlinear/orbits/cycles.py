@@ -30,7 +30,6 @@ LARGER = (1e-4, 1e-3, 1e-2)  # amplitudes to begin with where smaller cycles can
     amplitude=finite(SMALLEST, 0.1, closed=True),
     most_points=whole(1),
     doublings=whole(0, 100),
-    rtol=finite(0, 0.1),
     between=LOW_AND_HIGH,
     branch=BRANCH,
     along=NAME,

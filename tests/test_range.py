@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
+from steadyslip.linear.polynomials import is_hurwitz
 from steadyslip.linear.status import without_edge
 from steadyslip.linear.stiffness import in_chunks, interval_ends
 from steadyslip.model.point import operating_point
@@ -181,3 +182,42 @@ def test_a_run_that_blows_up_has_no_sample_that_is_none():
     run = ss.simulate(ss.read_rig(EXAMPLES / "inclined-spring.toml", ["friction.b=1e200"]), until=100.0)
     assert run.status == "blow-up"
     assert all(np.all(np.isfinite(values)) for values in run.data.values())
+
+
+CANCELLED = [
+    ("inclined-spring", "friction.normal_memory.alpha", 1e50),
+    ("lead-screw", "drive.velocity", 1e50),
+    ("two-states", "friction.states.1.d_c", 1e-50),
+]
+
+
+@pytest.mark.parametrize(("stem", "name", "value"), CANCELLED)
+def test_a_verdict_that_rounding_decides_says_so(stem, name, value):
+    """Terms cancel that are fifty orders of magnitude larger than what is left: signs of coefficients are chance."""
+    found = ss.analyze(ss.read_rig(EXAMPLES / f"{stem}.toml").with_values({name: value}))
+    assert found.on_edge
+    assert "neither verdict should be relied on" in str(found)
+
+
+@pytest.mark.parametrize("stem", ["double-direct-shear", "strengthening-gouge"])
+def test_a_verdict_does_not_depend_on_how_slow_a_rig_is_driven(stem):
+    """These strengthen with velocity at any rate; 1e-150 m/s makes coefficients differ by 1e400."""
+    rig = ss.read_rig(EXAMPLES / f"{stem}.toml")
+    slow = ss.analyze(rig.with_values({"drive.velocity": 1e-150}))
+    assert slow.stable is ss.analyze(rig).stable is True
+    assert not slow.on_edge
+    assert slow.stable_stiffness
+
+
+@given(st.lists(st.floats(0.3, 3.0), min_size=2, max_size=4), st.integers(-240, 240), st.integers(0, 1))
+@settings(max_examples=60, deadline=None)
+def test_hurwitz_is_the_same_in_any_unit_of_time(rates, decades, flip):
+    """A product of factors s + r, one of them perhaps s - r, in units of time that put coefficients far apart."""
+    signs = [-1.0 if flip and i == 0 else 1.0 for i in range(len(rates))]
+    c = np.array([1.0])
+    for rate, sign in zip(rates, signs, strict=True):
+        c = np.convolve(c, [sign * rate, 1.0])
+    unit = 10.0 ** (decades / len(rates))
+    scaled = c * unit ** -np.arange(len(c))
+    if np.all(np.isfinite(scaled)) and np.all(np.abs(scaled) > 1e-300):
+        assert is_hurwitz(scaled) == (not flip)

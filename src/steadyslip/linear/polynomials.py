@@ -184,8 +184,27 @@ def is_hurwitz(c: Array) -> NDArray[np.bool_]:
         if d < max(n - 1, 0):  # the equations have lost more than their inertia: ill-posed
             continue
         rows = np.flatnonzero(degree == d)
-        result[rows] = np.all(routh_column(flat[rows, : d + 1]) > 0, axis=-1)
+        result[rows] = np.all(routh_column(_in_own_time(flat[rows, : d + 1])) > 0, axis=-1)
     return result.reshape(c.shape[:-1])
+
+
+def _in_own_time(c: Array) -> Array:
+    """Polynomials whose coefficients lie far apart, for time in units in which lowest and highest are alike.
+
+    The Routh array of such a polynomial, and of its largest coefficient's size, would lose the least ones.
+    """
+    size = np.abs(c)
+    apart = np.min(size, axis=-1) < 1e-100 * np.max(size, axis=-1)
+    rows = np.flatnonzero(apart & np.all(c != 0, axis=-1))
+    if not rows.size:
+        return c
+    mantissa, exponent = np.frexp(c[rows])
+    steps = np.arange(c.shape[-1])
+    slope = np.rint((exponent[:, :1] - exponent[:, -1:]) / steps[-1]).astype(int)
+    exponent = exponent + slope * steps
+    out = c.copy()
+    out[rows] = np.ldexp(mantissa, exponent - np.max(exponent, axis=-1, keepdims=True))
+    return out
 
 
 @quietly

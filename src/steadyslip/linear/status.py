@@ -16,6 +16,7 @@ from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import characteristic, in_range
 
 ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms, that rounding alone can make
+LAST_DIGITS = 24  # trials of other last digits
 ABSENT, STABLE, UNSTABLE, UNKNOWN = range(4)
 WORDS = ("no steady sliding", "stable", "unstable", "out of range")
 """What they are called; out of the range of floating point."""
@@ -65,6 +66,20 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
         verdict = np.where(is_hurwitz(characteristic(point)), STABLE, UNSTABLE)
         found = np.where(np.isfinite(point.sigma), verdict, ABSENT)
         return np.where(in_range(point) & point.valid, found, UNKNOWN)
+
+
+def decided_by_rounding(point: OperatingPoint) -> bool:
+    """Whether the verdict on a single rig changes as its numbers do in their last digits.
+
+    So it does at an edge, and where terms of the equations cancel that are many orders of magnitude larger than what
+    is left of them.
+    """
+    chance = np.random.default_rng(0)
+    arguments = [
+        value * (1 + 4 * np.finfo(float).eps * chance.choice([-1.0, 1.0], LAST_DIGITS)) for value in point.arguments
+    ]
+    others = point.with_arguments(arguments, (LAST_DIGITS,))
+    return bool(np.any(status(others) != status(point)))
 
 
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from steadyslip.core.quantities import shown, stress_name
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
-from steadyslip.linear.status import on_edge
+from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.linear.stiffness import ill_posed, set_of_one
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -102,7 +102,7 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
         values = operating_point(rig, None, present_zeros(rig), branch)
         numbers = linear_numbers(rig, values)
-        on_the_edge = bool(on_edge(values))
+        on_the_edge = bool(on_edge(values)) or decided_by_rounding(values)
         distances = margins(rig, branch=branch)
         found = Analysis(
             rig=rig,

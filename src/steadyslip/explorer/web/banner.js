@@ -1,5 +1,5 @@
 // The verdict: a sentence, why, and a bar of the stable stiffnesses.
-import { make, svg } from "./dom.js";
+import { make, svg, tell } from "./dom.js";
 import { ABSENT } from "./linear.js";
 import { headline, kindOf, quantity, reason } from "./words.js";
 
@@ -17,8 +17,8 @@ export class Banner {
 
   show(answer, drive) {
     this.box.dataset.kind = kindOf(answer);
-    this.sentence.textContent = headline(answer, drive);
-    this.reason.textContent = reason(answer, this.data);
+    tell(this.sentence, headline(answer, drive));
+    tell(this.reason, reason(answer, this.data));
     this.showBar(answer);
   }
 
@@ -38,13 +38,8 @@ export class Banner {
     const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
     const parts = intervals.map((one) => svg("rect", { class: "stable", x: x(one.low), width: x(one.high) - x(one.low), y: 0, height: 10 }));
     const drawing = svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, svg("rect", { class: "unstable", x: 0, y: 0, width: 100, height: 10 }), ...parts);
-    const at = make("i", { className: "own" });
-    at.style.left = `${x(own)}%`;
-    const labels = ends.map((k) => {
-      const text = make("span", { textContent: stiffness(k) });
-      text.style.left = `${Math.min(88, Math.max(12, x(k)))}%`;
-      return text;
-    });
+    const at = make("i", { className: "own", style: `left: ${x(own)}%` });
+    const labels = ends.map((k) => make("span", { textContent: stiffness(k), style: `left: ${Math.min(88, Math.max(12, x(k)))}%` }));
     this.bar.replaceChildren(drawing, at, ...labels);
     const words = intervals.map(({ low: a, high: b }) => (b === Infinity ? `above ${stiffness(a)}` : `${stiffness(a)} to ${stiffness(b)}`));
     this.bar.setAttribute("aria-label", `stable stiffness: ${words.join(", or ") || "none"}`);

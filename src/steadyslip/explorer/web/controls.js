@@ -1,6 +1,6 @@
 // A slider and a typed value for each parameter; every slider's track is painted with what would be.
 import { CLASSES } from "./chart.js";
-import { make } from "./dom.js";
+import { make, put, tell } from "./dom.js";
 import { display, parse, shown } from "./quantities.js";
 import { inside } from "./rig.js";
 
@@ -60,15 +60,16 @@ export class Controls {
     const { rig, tracks } = this.page;
     this.rows.forEach(({ slider, text, fault, name }, i) => {
       const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = display(value * one.factor, one.unit);
-      slider.value = String(STEPS * this.page.scale(i).of(value));
-      slider.setAttribute("aria-valuetext", shown(value * one.factor, one.unit));
+      const place = String(STEPS * this.page.scale(i).of(value)), words = `${Number(((value * one.factor) / factor).toPrecision(6))} ${unit.replace("^2", "²")}`.trim();
+      if (slider.value !== place) slider.value = place;
+      put(slider, "aria-valuetext", shown(value * one.factor, one.unit));
       if (document.activeElement !== text || !fault.textContent) {
-        text.value = `${Number(((value * one.factor) / factor).toPrecision(6))} ${unit.replace("^2", "²")}`.trim();
-        fault.textContent = "";
+        if (text.value !== words) text.value = words;
+        tell(fault, "");
       }
       name.classList.toggle("changed", !Object.is(value, one.value));
       const stops = tracks[i].flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));
-      slider.style.setProperty("--track", `linear-gradient(to right, ${stops.join(", ")})`);
+      put(slider, "style", `--track: linear-gradient(to right, ${stops.join(", ")})`);
     });
   }
 }

@@ -19,6 +19,13 @@ const DISTURBANCES = {
 const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // ms of the whole when it is played
 
 export class Course {
+  /** @type {any} */ course; // what the rig did last
+  /** @type {any} */ before;
+  /** @type {any} */ now; // its series as they are drawn
+  /** @type {any[]} */ boxes;
+  /** @type {any[]} */ dots;
+  playing = 0;
+
   /** @param {import("./page.js").Page} page @param {() => any} library */
   constructor(page, library) {
     this.page = page;

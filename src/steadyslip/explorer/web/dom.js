@@ -25,3 +25,13 @@ export function svg(name, attributes = {}, ...children) {
 export function button(text, label, action) {
   return make("button", { type: "button", textContent: text, title: label, "aria-label": label, onclick: action });
 }
+
+/** Write only what is not there yet: a browser does work for each write. @param {any} element @param {string} name @param {string} value */
+export function put(element, name, value) {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}
+
+/** The same for the text of an element. @param {any} element @param {string} text */
+export function tell(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

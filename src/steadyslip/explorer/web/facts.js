@@ -1,5 +1,5 @@
 // Steady sliding in numbers, eigenvalues with their locus, and the list of nearest edges.
-import { make } from "./dom.js";
+import { make, put, tell } from "./dom.js";
 import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
 import { Locus } from "./locus.js";
 import { digits, shown } from "./quantities.js";
@@ -7,6 +7,12 @@ import { inside } from "./rig.js";
 import { quantity } from "./words.js";
 
 const BECOMES = { [ABSENT]: "no steady sliding", [STABLE]: "becomes stable", [UNKNOWN]: "no rig" };
+
+/** Rows of words in a list: elements are made where their number changes, and else told what is new. */
+function rewrite(list, rows, row, many) {
+  if (list.children.length !== many * rows.length) list.replaceChildren(...rows.flatMap(row));
+  rows.forEach((words, n) => words.forEach((text, k) => tell(many === 1 ? list.children[n].children[k] : list.children[many * n + k], text)));
+}
 
 export class Facts {
   /** @param {import("./page.js").Page} page */
@@ -28,13 +34,14 @@ export class Facts {
   show(answer) {
     const { rig } = this.page, { area } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
     const facts = [["normal stress", answer.sigma, "Pa"], ...rig.data.facts.observed.map(([name, unit]) => [name.replace(/_/g, " "), answer.observed[name], unit])];
-    this.steady.replaceChildren(...(absent ? [] : facts).flatMap(([name, value, unit]) => [
-      make("dt", { textContent: area && unit === "Pa" ? name.replace("stress", "force") : name }), make("dd", { textContent: quantity(value, unit, area) })]));
-    this.eigenvalues.replaceChildren(...answer.eigenvalues.filter((s) => s.im >= 0).map((s) => {
+    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit]) => [area && unit === "Pa" ? name.replace("stress", "force") : name, quantity(value, unit, area)]),
+      () => [make("dt", {}), make("dd", {})], 2);
+    const modes = answer.eigenvalues.filter((s) => s.im >= 0);
+    rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
-      const cells = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
-      return make("tr", { className: s.re > 0 ? "grows" : "" }, ...cells.map((textContent) => make("td", { textContent })));
-    }));
+      return [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
+    }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
+    modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
     this.locus.show(answer);
   }
 

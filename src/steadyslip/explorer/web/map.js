@@ -1,6 +1,6 @@
 // The chart of stability over two parameters, with the rig's point in it.
-import { regions } from "./chart.js";
-import { make, svg } from "./dom.js";
+import { CLASSES, regions } from "./chart.js";
+import { make, put, svg } from "./dom.js";
 import { axis } from "./plot.js";
 import { shown } from "./quantities.js";
 
@@ -8,6 +8,8 @@ const ROWS = 60, ROWS_SEARCHED = 24; // where steady sliding has to be searched 
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Chart {
+  /** @type {Record<string, any>} */ regions;
+
   /** @param {import("./page.js").Page} page @param {[number, number]} axes which parameters at first */
   constructor(page, axes) {
     this.page = page;
@@ -64,20 +66,33 @@ export class Chart {
       this.painted = others;
       const rows = facts.affine ? ROWS : ROWS_SEARCHED;
       const { paths, outline } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
-      const inner = svg("g", { transform: `translate(${box.left} ${box.top})` });
-      for (const [name, path] of Object.entries(paths)) inner.append(svg("path", { class: `region ${name}`, d: path }));
-      const stripes = svg("pattern", { id: this.stripes, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("line", { x1: 0, y1: 0, x2: 0, y2: 8, class: "stripe" }));
-      inner.append(stripes, svg("path", { d: paths.none, fill: `url(#${this.stripes})` }), svg("path", { class: "outline", d: outline }));
-      this.point = svg("circle", { r: 8, class: "point" });
-      this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
-      this.canvas.replaceChildren(inner,
-        axis(box, x, ranges[i], parameters[i].factor, parameters[i].unit, parameters[i].name, false),
-        axis(box, y, ranges[j], parameters[j].factor, parameters[j].unit, parameters[j].name, true), this.point);
+      this.frame(i, j, x, y);
+      for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);
+      put(this.hatched, "d", paths.none);
+      put(this.outline, "d", outline);
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
     this.point.setAttribute("cx", String(box.left + at[0] * box.width));
     this.point.setAttribute("cy", String(box.top + (1 - at[1]) * box.height));
     const words = [i, j].map((n) => `${parameters[n].name} ${shown(rig.values[n] * parameters[n].factor, parameters[n].unit)}`);
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
+  }
+
+  /** Everything that only axes, ranges and size decide. */
+  frame(i, j, x, y) {
+    const { size: box, ranges, rig: { data: { parameters } } } = this.page, known = [i, j, ...ranges[i], ...ranges[j], box.width].join();
+    if (known === this.framed) return;
+    this.framed = known;
+    const inner = svg("g", { transform: `translate(${box.left} ${box.top})` });
+    this.regions = Object.fromEntries(Object.values(CLASSES).map((name) => [name, inner.appendChild(svg("path", { class: `region ${name}` }))]));
+    const stripes = svg("pattern", { id: this.stripes, width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("line", { x1: 0, y1: 0, x2: 0, y2: 8, class: "stripe" }));
+    this.hatched = svg("path", { fill: `url(#${this.stripes})` });
+    this.outline = svg("path", { class: "outline" });
+    inner.append(stripes, this.hatched, this.outline);
+    this.point = svg("circle", { r: 8, class: "point" });
+    this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
+    this.canvas.replaceChildren(inner,
+      axis(box, x, ranges[i], parameters[i].factor, parameters[i].unit, parameters[i].name, false),
+      axis(box, y, ranges[j], parameters[j].factor, parameters[j].unit, parameters[j].name, true), this.point);
   }
 }

@@ -5,6 +5,10 @@ import { zeros } from "../../kernels/printers/runtime.js";
 const SLICE = 2000, HEAR = 20; // ms between looks at what the page says
 
 export class Motion {
+  /** @type {{x: number, posed: boolean, share: number}} */ scales;
+  /** @type {number[]} */ settings;
+  /** @type {number} */ drive;
+
   /** @param {any} machine @param {any} facts @param {any} driver */
   constructor(machine, facts, driver) {
     this.machine = machine;

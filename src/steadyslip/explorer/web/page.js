@@ -14,6 +14,16 @@ const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66,
 const PARTS = 60; // of a track, at whose ends the status is asked for
 
 export class Page {
+  /** @type {any} */ answer;
+  // furnished once the verdict is to be seen
+  /** @type {[number, number][]} */ ranges;
+  /** @type {{from: number, to: number, status: number, below: number}[][]} */ tracks;
+  /** @type {Controls} */ controls;
+  /** @type {Chart} */ chart;
+  /** @type {Facts} */ facts;
+  /** @type {Course} */ course;
+  /** @type {any} */ tools;
+
   /**
    * @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library
    * @param {((values: number[]) => void) | null} [told] whom to tell of new values; then the address is not the page's own
@@ -202,6 +212,13 @@ export class Page {
     this.banner.show(this.answer, values[data.parameters.findIndex((one) => one.name === data.speed)]);
   }
 
+  /** The values in the address. */
+  address() {
+    try {
+      history.replaceState(null, "", this.rig.hash() || location.pathname + location.search);
+    } catch { /* a frame without an address of its own */ }
+  }
+
   redraw() {
     this.judge();
     this.undoButton.disabled = !this.past.length;
@@ -217,10 +234,8 @@ export class Page {
       if (!this.sliding) this.told(this.rig.values);
       return;
     }
-    const hash = this.rig.hash();
-    try {
-      if (!this.sliding) history.replaceState(null, "", hash || location.pathname + location.search);
-    } catch { /* a frame without an address of its own */ }
+    clearTimeout(this.addressed);
+    if (!this.sliding) this.addressed = setTimeout(() => this.address(), 100); // browsers take long over it
   }
 }
 

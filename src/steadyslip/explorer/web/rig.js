@@ -125,7 +125,10 @@ export function scaleOf(one, low, high) {
   };
 }
 
-/** The range that a slider has at first: its whole domain if that is bounded, else some decades, and its nearest edge. */
+/**
+ * The range that a slider has at first: its whole domain if that is bounded, else some decades, and its nearest edge.
+ * @returns {[number, number]}
+ */
 export function rangeOf(rig, i) {
   const one = rig.data.parameters[i];
   if (one.low !== null && one.high !== null) {

@@ -2,6 +2,9 @@
 const SHIFT = 16, MOVING = ".ground, .body, .link"; // how far the block goes in the drawing at most
 
 export class Sketch {
+  gain = 0; // how far parts move for a metre of slip
+  first = 0;
+
   /** @param {string} text drawn by steadyslip/explorer/sketch.py */
   constructor(text) {
     this.canvas = /** @type {any} */ (document.importNode(new DOMParser().parseFromString(text, "image/svg+xml").documentElement, true));

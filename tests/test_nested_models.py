@@ -9,6 +9,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.nested import simpler
 from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.starts import starting_points
 
 ALLOWED = 1 + 1e-7  # what a converged search may leave
 
@@ -54,22 +55,36 @@ def test_what_is_simpler_is_told_by_the_records():
     """Every law says itself at which value a parameter does nothing; the general code knows no names."""
     record = made(lab.STEP)
 
-    def held(rig, **options):
-        plan = make_plan(rig, record, **options)
-        names = [one.name for one in plan.space().unknowns]
-        return [{names[i] for i in np.flatnonzero(model.held)} for model in simpler(plan.space(), rig.parameters())]
+    def further(rig, **options):
+        return [{*model.idle, *model.scales} for model in simpler(make_plan(rig, record, **options))]
 
-    assert held(ss.lab_rig()) == []
-    assert held(two()) == [{"friction.states.2.b", "friction.states.2.d_c"}]
-    assert held(ss.lab_rig(normal_memory="linker-dieterich")) == [{"friction.normal_memory.alpha"}]
-    assert held(ss.lab_rig(), trend=2, offset=True) == [{"offset"}, {"trend.2"}]
+    assert further(ss.lab_rig()) == []
+    assert further(two()) == [{"friction.states.2.b", "friction.states.2.d_c"}]
+    assert further(ss.lab_rig(normal_memory="linker-dieterich")) == [{"friction.normal_memory.alpha"}]
+    assert further(ss.lab_rig(), trend=2, offset=True) == [{"trend.2"}, {"offset"}]
+    assert further(ss.lab_rig(states=3)) == [{"friction.states.3.b", "friction.states.3.d_c"}]
+
+
+@pytest.mark.parametrize(
+    ("rig", "options"),
+    [(two(), {}), (ss.lab_rig(normal_memory="linker-dieterich"), {}), (ss.lab_rig(), {"trend": 2, "offset": True})],
+)
+def test_a_simpler_model_says_the_same_where_it_lies_in_the_richer_one(rig, options):
+    record = made(lab.PRESSED)
+    plan = make_plan(rig, record, **options)
+    space, richer = plan.space(), plan.comparison()
+    for model in simpler(plan):
+        own = model.plan.comparison()
+        z = np.clip(starting_points(own.parts, own.space, 2), own.space.low, own.space.high)[-1]
+        inside = model.within(space, z, space.low, space.high)
+        np.testing.assert_allclose(richer.misfit(inside), own.misfit(z[None])[0], rtol=1e-4)
 
 
 def test_times_of_later_steps_are_no_simpler_model():
     record = made(lab.PRESSED)
     plan = make_plan(ss.lab_rig(), record)
     assert "step.2.at" in [one.name for one in plan.space().unknowns]
-    assert simpler(plan.space(), plan.rig.parameters()) == ()
+    assert list(simpler(plan)) == []
 
 
 def test_a_sample_before_a_step_of_the_stress_shows_none_of_it():

@@ -53,7 +53,9 @@ class Condensed:
         ]
         self.size = sum(len(piece.rows) for piece in self.pieces)
         records = tuple(r.taken(p.rows, "thinned") for r, p in zip(plan.records, self.pieces, strict=True))
-        self.few = replace(plan, records=records, weights=None).comparison(whole.parts[0].forward.threads)
+        patience = whole.parts[0].forward.patience * whole.size // self.size  # motions are as long as before
+        threads = whole.parts[0].forward.threads
+        self.few = replace(plan, records=records, weights=None).comparison(threads, patience)
         self.data, constant = [], 0.0
         for piece, where in zip(self.pieces, whole.slices, strict=True):
             piece.weigh(whole.weights[where])
@@ -76,14 +78,22 @@ class Condensed:
 
 def condensed(plan: Plan, whole: Comparison, coordinates: Array) -> Comparison | Condensed:
     """The same in fewer numbers near coordinates (m, p), the best first, where that is possible and worthwhile."""
-    if not plan.follows or plan.loss != "linear" or not len(coordinates):
+    if not len(coordinates) or not _possible(plan):
         return whole
-    seen, slopes = whole.model(coordinates[:REFERENCES])
+    return condensed_along(plan, whole, *whole.model(coordinates[:REFERENCES]))
+
+
+def condensed_along(plan: Plan, whole: Comparison, seen: Array, slopes: Array) -> Comparison | Condensed:
+    """The same near what `whole.model` says: friction (m, n) and its slopes (m, p, n), the best first."""
     usable = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(slopes), axis=(1, 2))
-    if not np.any(usable):
+    if not np.any(usable) or not _possible(plan):
         return whole
-    found = Condensed(plan, whole, seen[usable], slopes[usable])
+    found = Condensed(plan, whole, seen[usable][:REFERENCES], slopes[usable][:REFERENCES])
     return found if found.size < WORTHWHILE * whole.size else whole
+
+
+def _possible(plan: Plan) -> bool:
+    return plan.follows and plan.loss == "linear"
 
 
 def _held(time: Array, loading: Loading, pressed: bool) -> Iterator[tuple[int, int]]:

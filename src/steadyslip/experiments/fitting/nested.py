@@ -1,128 +1,101 @@
 """Simpler models inside a richer one: a fit of the richer must not end above what they reach.
 
 A parameter whose record says at which value it does nothing (`Parameter.idle`) makes the model without it part of the
-model with it. Such models are fitted too, in the same coordinates with the idle ones held, and where each ends the
-richer one starts.
+model with it. Where such a model is anywhere near as good it is fitted too, exactly as anyone would fit it alone, and
+where it ends the richer one starts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steadyslip.core.records import Address
-from steadyslip.experiments.fitting.comparison import Comparison
-from steadyslip.experiments.fitting.condensed import Condensed
+from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.unknowns import Space
-from steadyslip.experiments.numerics.least_squares import Minima, minimise
+from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
-Told = Callable[[Minima], None]
 SPREAD = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of its other scales from which a member that was idle starts
-FEW = 8  # starts of a simpler model
-ROUGH, FINE = 40, 300  # iterations on few samples and on all
+ZERO = ("trend", "offset")  # what does nothing at zero, and is of no law
 
 
 @dataclass(frozen=True)
-class Idle:
-    """A simpler model: the coordinates that it holds, and at which of them the held part would begin to act.
+class Simpler:
+    """A simpler model, and what the richer one has besides.
 
     Attributes
     ----------
-    held : ndarray of bool (p,)
-    at : ndarray (p,)
-        Where they are held, elsewhere zero.
-    scales : tuple of int
-        Logarithmic coordinates among them, which say nothing while the part is idle.
+    plan : Plan
+    idle : dict of str to float
+        Values at which further parameters do nothing, by name.
+    scales : tuple of str
+        Further parameters that say nothing while the others are idle, such as the slip distance of a state.
     """
 
-    held: Array
-    at: Array
-    scales: tuple[int, ...]
+    plan: Plan
+    idle: dict[str, float]
+    scales: tuple[str, ...]
 
-
-def simpler(space: Space, addresses: Mapping[str, Address]) -> tuple[Idle, ...]:
-    """The models that lack one part of a law, one order of a trend, or the offset."""
-    together: dict[str, list[int]] = {}
-    orders = [int(u.parameter.rpartition(".")[2]) for u in space.unknowns if u.parameter.startswith("trend.")]
-    for i, one in enumerate(space.unknowns):
-        name = one.parameter
-        owner, _, _ = name.rpartition(".")
-        role = addresses[name].role if name in addresses else None
-        member = owner.rpartition(".")[2]
-        if name in (f"trend.{max(orders, default=0)}", "offset"):
-            together.setdefault(name, []).append(i)
-        elif role is not None and member.isdigit() and int(member) > 1:
-            together.setdefault(owner, []).append(i)
-        elif role is not None and role.idle is not None and not member.isdigit():
-            together.setdefault(name, []).append(i)
-    found = []
-    for places in together.values():
+    def held(self, space: Space) -> tuple[Array, Array]:
+        """Which coordinates of the richer model (p,) the simpler one does not have, and where those do nothing."""
         held, at = np.zeros(len(space), dtype=bool), np.zeros(len(space))
-        idle = 0
-        for i in places:
-            one = space.unknowns[i]
-            role = addresses[one.parameter].role if one.parameter in addresses else None
-            value = 0.0 if role is None else role.idle
-            if value is not None:
-                at[i] = float(one.coordinate(value))
-                idle += 1
-            held[i] = True
-        if idle:
-            found.append(Idle(held, at, tuple(i for i in places if space.unknowns[i].logarithmic)))
-    return tuple(found)
+        for i, one in enumerate(space.unknowns):
+            held[i] = one.parameter in self.idle or one.parameter in self.scales
+            if one.parameter in self.idle:
+                at[i] = float(one.coordinate(self.idle[one.parameter]))
+        return held, at
+
+    def within(self, space: Space, coordinates: Array, low: Array, high: Array) -> Array:
+        """Where coordinates of the simpler model lie in the richer one, (m, p): several places for open scales."""
+        known = dict(zip([one.name for one in self.plan.space().unknowns], coordinates, strict=True))
+        _, at = self.held(space)
+        own = np.array([known.get(one.name, at[i]) for i, one in enumerate(space.unknowns)])
+        found = np.tile(own, (len(SPREAD) if self.scales else 1, 1))
+        for i, one in enumerate(space.unknowns):
+            if one.parameter in self.scales:
+                alike = [k for k, other in enumerate(space.unknowns) if other.kind == one.kind and k != i]
+                found[:, i] = np.clip(own[alike[0] if alike else i] + np.log(SPREAD), low[i], high[i])
+        return found
 
 
-def from_simpler(
-    models: tuple[Idle, ...], quick: Comparison, whole: Comparison | Condensed, starts: Array, low: Array, high: Array,
-    known: float, told: Told,
-) -> Array:  # fmt: skip
-    """Where the simpler models end, as starts of the richer one, (m, p).
-
-    Parameters
-    ----------
-    models : tuple of Idle
-    quick, whole : Comparison
-        With few samples, and with all (or what stands for all).
-    starts : ndarray (n, p)
-        Of the richer model, the most promising first.
-    low, high : ndarray (p,)
-    known : float
-        Sum of squares that the richer model is known to reach on what stands for all samples.
-    told : callable
-    """
-    found = [np.empty((0, len(low)))]
-    for model in models:
-        begin = np.where(model.held & ~_within(model.scales, len(low)), model.at, starts[:FEW])
-        held = np.tile(model.held, (len(begin), 1))
-        rough = minimise(
-            lambda z, _: quick.residuals(z), begin, low, high, most=ROUGH, held=held, tolerance=1e-4, race=3, told=told
-        )
-        if not np.any(np.isfinite(rough.ssq)):
+def simpler(plan: Plan) -> Iterator[Simpler]:
+    """The models that lack the last order of a trend, the offset, the last member of a list, or one part of a law."""
+    if plan.trend:
+        yield Simpler(replace(plan, trend=plan.trend - 1), {f"trend.{plan.trend}": 0.0}, ())
+    if plan.offset:
+        yield Simpler(replace(plan, offset=False), {"offset": 0.0}, ())
+    addresses, seen = plan.rig.parameters(), set()
+    for name in plan.free:
+        role = addresses[name].role if name in addresses else None
+        if role is None:
             continue
-        best, _ = rough.distinct(2)
-        held = np.tile(model.held, (len(best), 1))
-        ends = minimise(
-            lambda z, _: whole.residuals(z), best, low, high, most=FINE, held=held, race=1, known=known, told=told
-        )
-        ended = ends.sorted().coordinates[0]
-        spread = np.tile(ended, (len(SPREAD) if model.scales else 1, 1))
-        for i in model.scales:
-            spread[:, i] = np.clip(_usual(whole.space, i, ended) + np.log(SPREAD), low[i], high[i])
-        found.append(spread)
-    return np.concatenate(found)
+        owner, _, _ = name.rpartition(".")
+        family, _, member = owner.rpartition(".")
+        if not member.isdigit():
+            if role.idle is not None:
+                rig = plan.rig.with_values({name: role.idle})
+                yield Simpler(_without(plan, rig, [name]), {name: role.idle}, ())
+            continue
+        last = int(member) > 1 and not any(key.startswith(f"{family}.{int(member) + 1}.") for key in addresses)
+        if not last or owner in seen:
+            continue
+        seen.add(owner)
+        names = [key for key in plan.free if key.startswith(f"{owner}.")]
+        idle = {key: value for key in names if (value := addresses[key].role.idle) is not None}
+        if idle:
+            scales = tuple(key for key in names if key not in idle)
+            yield Simpler(_without(plan, _shorter(plan.rig, family), names), idle, scales)
 
 
-def _within(places: tuple[int, ...], size: int) -> Array:
-    inside = np.zeros(size, dtype=bool)
-    inside[list(places)] = True
-    return inside
+def _without(plan: Plan, rig: Slider, names: list[str]) -> Plan:
+    free, separate = (tuple(key for key in keys if key not in names) for keys in (plan.free, plan.separate))
+    return replace(plan, rig=rig, free=free, separate=separate)
 
 
-def _usual(space: Space, place: int, coordinates: Array) -> float:
-    """The scale of the same kind in the part before: of the first state for that of the second."""
-    kind = space.unknowns[place].kind
-    alike = [i for i, u in enumerate(space.unknowns) if u.kind == kind and i != place]
-    return float(coordinates[alike[0] if alike else place])
+def _shorter(rig: Slider, family: str) -> Slider:
+    """The rig without the last member of a list, such as ``friction.states``."""
+    part, _, field = family.partition(".")
+    law = getattr(rig, part)
+    return replace(rig, **{part: replace(law, **{field: getattr(law, field)[:-1]})})

@@ -9,14 +9,14 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
-from steadyslip.experiments.fitting.condensed import Condensed, condensed
-from steadyslip.experiments.fitting.nested import from_simpler, simpler
+from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
+from steadyslip.experiments.fitting.nested import Simpler, simpler
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.starts import search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
-from steadyslip.experiments.numerics.least_squares import SAME, Minima, minimise
+from steadyslip.experiments.numerics.least_squares import HOPE, SAME, Minima, minimise
 from steadyslip.experiments.numerics.noise import DETECTED, lag_one
 
 Array = np.ndarray
@@ -27,6 +27,7 @@ MOST = 300  # iterations on all samples, or on what stands for them;
 LAST = 12  # on all samples after that
 ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
+FEW = 8  # starts of a simpler model, to see whether it comes near
 NEAREST = 3  # of the ends on few numbers that go on with all samples
 SURPASSED = 1e-8  # of the sum of squares: by so much less on few numbers, an end is worth a look on all samples
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
@@ -43,6 +44,7 @@ class Found:
     ----------
     coordinates : ndarray (p,)
         Of the best minimum.
+    ssq : float
     comparison : Comparison
         In which it is one.
     story : SearchStory
@@ -51,12 +53,25 @@ class Found:
     """
 
     coordinates: Array
+    ssq: float
     comparison: Comparison
     story: SearchStory
     bounds: tuple[Array, Array]
 
 
-def searched(plan: Plan, starts: int, threads: int | None, progress: Told | None) -> Found:
+Known = dict[tuple[tuple[str, ...], int, bool], Found | None]
+"""Fits of simpler models that are there already, by what is free."""
+
+
+def _tried(plan: Plan, starts: int, threads: int | None, progress: Told | None, known: Known) -> Found | None:
+    """The best minimum of a simpler model, if it has any."""
+    try:
+        return searched(plan, starts, threads, progress, known)
+    except NotAvailable:
+        return None
+
+
+def searched(plan: Plan, starts: int, threads: int | None, progress: Told | None, known: Known | None = None) -> Found:
     """The best minimum, and how it was found.
 
     A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
@@ -68,7 +83,7 @@ def searched(plan: Plan, starts: int, threads: int | None, progress: Told | None
     NotAvailable
         If the model cannot follow the records from any start.
     """
-    search = _Search(plan, threads, progress)
+    search = _Search(plan, starts, threads, progress)
     for upto in dict.fromkeys((-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts)):
         search.try_starts(upto)
         if not np.any(np.isfinite(search.rough.ssq)):
@@ -87,11 +102,11 @@ def searched(plan: Plan, starts: int, threads: int | None, progress: Told | None
                 "the model cannot follow these records from any start; are law and drive those of the experiment?"
             )
         found = search.polished()
-    found = search.nested(found)
+    found = search.nested(found, {} if known is None else known)
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     best = ordered(found.coordinates[:1], search.whole.space)[0]
-    return Found(best, search.whole, search.story(found), (search.low, search.high))
+    return Found(best, float(found.ssq[0]), search.whole, search.story(found), (search.low, search.high))
 
 
 class _Search:
@@ -100,6 +115,8 @@ class _Search:
     Parameters
     ----------
     plan : Plan
+    starts : int
+        As the user has them, for simpler models.
     threads : int or None
     progress : callable or None
 
@@ -109,18 +126,21 @@ class _Search:
         Where starts ended on few samples.
     best : Minima
         Where the most promising of those end on what stands for all samples.
+    followed : ndarray (m, p)
+        The finalists, whose motion goes through all samples.
     arrived : int
         How many starts lead to the best minimum.
     """
 
-    def __init__(self, plan: Plan, threads: int | None, progress: Told | None) -> None:
-        self.plan, self.progress = plan, progress
+    def __init__(self, plan: Plan, starts: int, threads: int | None, progress: Told | None) -> None:
+        self.plan, self.starts, self.threads, self.progress = plan, starts, threads, progress
         self.whole = plan.comparison(threads)
         self.thin = replace(_thinned(plan), rtol=1e-5)
         self.quick = self.thin.comparison(threads, HASTY)
         self.low, self.high = search_bounds(self.whole.parts, self.whole.space)
         self.rough = self.best = Minima.none(len(self.whole.space))
         self.few: Comparison | Condensed = self.whole
+        self.followed = self.best.coordinates
         self.arrived = 0
 
     def told(self, what: str, among: Comparison) -> Callable[[Minima], None]:
@@ -146,7 +166,9 @@ class _Search:
         if len(self.best.ssq):  # where earlier starts have led
             begin = np.concatenate([begin, self.best.sorted().coordinates[:1]])
             counts = np.append(counts, 0)
-        self.few = condensed(self.plan, self.whole, begin)
+        begin, counts, seen, slopes = self._followed(begin, counts)
+        self.followed = begin
+        self.few = condensed_along(self.plan, self.whole, seen, slopes)
         if self.few is self.whole:
             self.best = Minima.at(begin)
             self.arrived = int(np.sum(self.rough.ssq <= np.min(self.rough.ssq) * (1 + SAME)))
@@ -157,24 +179,60 @@ class _Search:
         )  # fmt: skip
         self.arrived = int(np.sum(counts[self.best.ssq <= np.min(self.best.ssq) * (1 + SAME)]))
 
+    def _followed(self, begin: Array, counts: Array) -> tuple[Array, Array, Array, Array]:
+        """Those of the finalists whose motion goes through all samples, and what the model says there.
+
+        On few samples, with looser tolerances, a motion may pass that runs away on all. If all of them do, the next.
+        """
+        waiting, first = [(begin, counts)], 0
+        while waiting:
+            points, own = waiting.pop()
+            seen, slopes = self.whole.model(points)
+            good = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(slopes), axis=(1, 2))
+            if np.any(good):
+                return points[good], own[good], seen[good], slopes[good]
+            first += len(points)
+            every, numbers = self.rough.distinct(len(self.rough.ssq), hope=np.inf)
+            if len(every) > first:
+                waiting = [(every[first : first + FINALISTS], numbers[first : first + FINALISTS])]
+        return begin, counts, np.empty((0, self.whole.size)), np.empty((0, begin.shape[1], self.whole.size))
+
     def polished(self) -> Minima:
         """The best of the promising brought to their end on all samples, the best first."""
         begin = self.best.coordinates if self.few is self.whole else self.best.distinct(NEAREST)[0]
-        begin = begin if len(begin) else self.rough.sorted().coordinates[:1]
         found = self._on_all(begin)
+        if not len(begin) or not np.isfinite(found.ssq[0]):  # few numbers have led astray
+            found = self._on_all(self.followed)
         inside = _released(self.whole.space, found.coordinates[0], self.low, self.high)
         return (found + self._refined(inside)).sorted() if len(inside) else found
 
-    def nested(self, found: Minima) -> Minima:
+    def nested(self, found: Minima, known: Known) -> Minima:
         """The same, or better ones where simpler models inside this one lead."""
-        models = simpler(self.whole.space, self.plan.rig.parameters())
-        if not models:
-            return found
-        begin = from_simpler(
-            models, self.quick, self.few, self.rough.sorted().coordinates, self.low, self.high,
-            float(np.min(self.best.ssq)), self.told("refining", self.whole),
+        for model in simpler(self.plan):
+            if not self._near(model):
+                continue
+            key = model.plan.free, model.plan.trend, model.plan.offset
+            if key not in known:
+                known[key] = _tried(model.plan, self.starts, self.threads, self.progress, known)
+            if (other := known[key]) is None:
+                continue
+            begin = model.within(self.whole.space, other.coordinates, self.low, self.high)
+            better = other.ssq < found.ssq[0] * (1 - SURPASSED)
+            found = (found + (self._on_all(begin) if better else self._refined(begin))).sorted()
+        return found
+
+    def _near(self, model: Simpler) -> bool:
+        """Whether a simpler model comes anywhere near, on few samples and from a few starts."""
+        held, at = model.held(self.whole.space)
+        begin = np.where(held, at, self.rough.sorted().coordinates[:FEW])
+        for i, one in enumerate(self.whole.space.unknowns):
+            if one.parameter in model.scales:
+                begin[:, i] = self.rough.sorted().coordinates[: len(begin), i]
+        ends = minimise(
+            lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH,
+            held=np.tile(held, (len(begin), 1)), tolerance=1e-4, race=3, told=self.told("refining", self.quick),
         )  # fmt: skip
-        return (found + self._refined(begin)).sorted()
+        return bool(np.min(ends.ssq, initial=np.inf) <= HOPE * np.min(self.rough.ssq))
 
     def _refined(self, begin: Array) -> Minima:
         """Where starts end on all samples: on what stands for them to begin with."""
@@ -188,10 +246,20 @@ class _Search:
         return self._on_all(begin)
 
     def _on_all(self, begin: Array) -> Minima:
-        told, most = self.told("refining", self.whole), MOST if self.few is self.whole else LAST
-        return minimise(
-            lambda z, _: self.whole.residuals(z), begin, self.low, self.high, most=most, race=1, told=told
-        ).sorted()
+        """Where starts end on all samples; from what few numbers lead to, a few steps, and more if those do not do."""
+
+        def ends(start: Array, most: int) -> Minima:
+            told = self.told("refining", self.whole)
+            return minimise(
+                lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, told=told
+            ).sorted()
+
+        if self.few is self.whole:
+            return ends(begin, MOST)
+        found = ends(begin, LAST)
+        if len(begin) and np.isfinite(found.ssq[0]) and not found.converged[0]:
+            found = (ends(found.coordinates[:1], MOST) + found).sorted()
+        return found
 
     def story(self, found: Minima) -> SearchStory:
         """How the minimum was found."""

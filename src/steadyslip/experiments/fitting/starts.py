@@ -165,7 +165,8 @@ def starting_points(parts: Sequence[RecordPart], space: Space, count: int = STAR
     for i, unknown in enumerate(space.unknowns):
         part = parts[unknown.record or 0]
         own = found[unknown.record or 0]
-        values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, grid[:, 5]))
+        alone = sum(one.kind == unknown.kind and one.record == unknown.record for one in space.unknowns) == 1
+        values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, grid[:, 5]), alone)
     return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
 
 
@@ -192,8 +193,8 @@ def search_bounds(parts: Sequence[RecordPart], space: Space) -> tuple[Array, Arr
     return low, high
 
 
-def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Array, ...]) -> Array:
-    """Starting values of one parameter."""
+def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Array, ...], alone: bool) -> Array:
+    """Starting values of one parameter, `alone` if no other is of its kind."""
     name = unknown.parameter
     d_c, a, b, steepness, alpha, spare = design
     rig = part.rig
@@ -205,7 +206,7 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         rate = rig.drive.velocity / (references[0] or 1.0) if references else 1.0
         return np.asarray(own.friction - (a - b) * np.log(rate))
     if unknown.kind == "evolution effect":
-        if member:  # the first state takes up what the others leave
+        if member and not alone:  # the first state takes up what the others leave
             return b * (0.35 + 0.5 * spare) if member == 1 else b * (0.65 - 0.5 * spare)
         return b
     if unknown.kind == "slip distance":

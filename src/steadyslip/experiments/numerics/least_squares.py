@@ -70,13 +70,13 @@ class Minima:
         count = len(coordinates)
         return cls(coordinates, np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
 
-    def distinct(self, most: int) -> tuple[Array, Array]:
+    def distinct(self, most: int, hope: float = HOPE) -> tuple[Array, Array]:
         """Coordinates of the best, each place once, as far as there is hope for them; how many ended at each."""
         ranked = self.sorted()
         chosen: list[Array] = []
         counts: list[int] = []
         for z, ssq in zip(ranked.coordinates, ranked.ssq, strict=True):
-            if not np.isfinite(ssq) or ssq > HOPE * ranked.ssq[0]:
+            if not np.isfinite(ssq) or ssq > hope * ranked.ssq[0]:
                 break
             near = [i for i, other in enumerate(chosen) if np.max(np.abs(z - other)) < NEAR]
             if near:

@@ -70,6 +70,14 @@ def test_lines_of_names_and_words_become_tables():
     assert found.count("<p>") == 2
 
 
+def test_a_sentence_over_two_lines_is_one_paragraph():
+    text = (
+        "A head\nthe stiffness is so many times the critical stiffness, above which sliding is\nstable, it seems.\nmore"
+    )
+    assert rows_of(text).count("<p>") == 3
+    assert "above which sliding is stable, it seems." in rows_of(text)
+
+
 def test_formulas_need_no_script_and_no_entity():
     text = math(ss.formula(OWN_RIG))
     _Balanced(text)

@@ -80,6 +80,7 @@ def inside(result: Any) -> str:
 def rows_of(text: str) -> str:
     """Words of an answer as HTML: lines of a name and what it is as a table, the others as paragraphs."""
     parts: list[str] = []
+    words: list[str] = []
     rows: list[list[str]] = []
     for line in text.splitlines():
         found = re.match(r"(\S(?:.*?\S)?) {2,}(\S.*)$", line.strip())
@@ -87,10 +88,19 @@ def rows_of(text: str) -> str:
             rows[-1][-1] += f" {line.strip()}"
         elif found:
             rows.append([found[1], *re.split(r" {2,}", found[2])])
+        elif line.strip() and words and _goes_on(words[-1]) and not rows:
+            words[-1] += f" {line.strip()}"
+            parts[-1] = paragraph(words[-1])
         elif line.strip():
             parts += [_even(rows), paragraph(line.strip())]
+            words.append(line.strip())
             rows = []
     return "".join([*parts, _even(rows)])
+
+
+def _goes_on(line: str) -> bool:
+    """Whether a sentence was cut where a terminal's line ends."""
+    return len(line) > 60 and line[-1] not in ".:;)"
 
 
 def _even(rows: list[list[str]]) -> str:

@@ -19,8 +19,8 @@ STYLE = """
 .steadyslip-told h2 { font-size: 18px; margin: 26px 0 6px; break-after: avoid; }
 .steadyslip-told h3 { font-size: 15px; margin: 14px 0 4px; break-after: avoid; }
 .steadyslip-told table { border-collapse: collapse; margin: 6px 0; }
-.steadyslip-told td, .steadyslip-told th { padding: 3px 14px 3px 0; border-bottom: 1px solid #d5dae1;
-  text-align: left; vertical-align: top;
+.steadyslip-told.steadyslip-told td, .steadyslip-told.steadyslip-told th { padding: 3px 14px 3px 0;
+  border-bottom: 1px solid #d5dae1; text-align: left; vertical-align: top;
   font-variant-numeric: tabular-nums; background: none; }
 .steadyslip-told th { font-weight: 650; }
 .steadyslip-told .n { white-space: nowrap; }

@@ -38,9 +38,10 @@ export class Banner {
     const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
     const parts = intervals.map((one) => svg("rect", { class: "stable", x: x(one.low), width: x(one.high) - x(one.low), y: 0, height: 10 }));
     const drawing = svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, svg("rect", { class: "unstable", x: 0, y: 0, width: 100, height: 10 }), ...parts);
-    const at = make("i", { className: "own", style: `left: ${x(own)}%` });
-    const labels = ends.map((k) => make("span", { textContent: stiffness(k), style: `left: ${Math.min(88, Math.max(12, x(k)))}%` }));
-    this.bar.replaceChildren(drawing, at, ...labels);
+    const within = (place) => `left: ${Math.min(82, Math.max(18, place))}%`, at = make("i", { className: "own", style: `left: ${x(own)}%` });
+    const begins = new Set(intervals.map((one) => one.low)), labels = ends.map((k) => make("span", { textContent: `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`, style: within(x(k)) }));
+    const now = make("span", { className: "now", textContent: `now ${stiffness(own)}`, style: within(x(own)) });
+    this.bar.replaceChildren(drawing, at, now, ...labels);
     const words = intervals.map(({ low: a, high: b }) => (b === Infinity ? `above ${stiffness(a)}` : `${stiffness(a)} to ${stiffness(b)}`));
     this.bar.setAttribute("aria-label", `stable stiffness: ${words.join(", or ") || "none"}`);
   }

@@ -11,6 +11,7 @@ import { Rig, inside, rangeOf, scaleOf } from "./rig.js";
 
 /** Where the chart's axes are, on a narrow page and on a wide one: its letters stay as large as the others. */
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
+const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
 const PARTS = 60; // of a track, at whose ends the status is asked for
 
 export class Page {
@@ -23,6 +24,7 @@ export class Page {
   /** @type {Facts} */ facts;
   /** @type {Course} */ course;
   /** @type {any} */ tools;
+  size = WIDE;
 
   /**
    * @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library
@@ -39,6 +41,7 @@ export class Page {
     if (!told) this.rig.values = this.rig.fromHash(location.hash);
     this.banner = new Banner(data, this.differs);
     root.classList.add("steadyslip");
+    this.measure();
     root.replaceChildren(this.head(), this.banner.box);
     this.judge();
     requestAnimationFrame(() => setTimeout(() => this.furnish(library))); // the verdict is to be seen first
@@ -53,7 +56,6 @@ export class Page {
     const k = Math.max(0, data.parameters.findIndex((one) => one.name === data.stiffness)), [first] = this.edges().filter((edge) => edge.i !== k);
     rig.values = values;
     values.forEach((value, i) => this.reach(i, value));
-    this.size = root.clientWidth < 600 ? NARROW : WIDE;
     this.controls = new Controls(this);
     this.chart = new Chart(this, [first ? first.i : k === 0 ? 1 % data.parameters.length : 0, k]); // the edge that is nearest
     this.facts = new Facts(this);
@@ -65,9 +67,7 @@ export class Page {
     }));
     this.redraw();
     new ResizeObserver(() => {
-      const size = root.clientWidth < 600 ? NARROW : WIDE;
-      if (size === this.size) return;
-      this.size = size;
+      if (!this.measure()) return;
       this.chart.show();
       this.course.draw();
     }).observe(root);
@@ -75,6 +75,14 @@ export class Page {
       if (!this.told && location.hash !== rig.hash()) this.change(rig.fromHash(location.hash));
     });
     root.dataset.ready = "yes";
+  }
+
+  /** How wide the page is, which need not be the window's width; true if its charts are to be drawn anew. */
+  measure() {
+    const width = this.root.clientWidth, before = this.size;
+    this.root.dataset.width = width < MIDDLE ? "narrow" : width < WIDE_FROM ? "middle" : "wide";
+    this.size = width < 600 ? NARROW : WIDE;
+    return this.size !== before;
   }
 
   head() {

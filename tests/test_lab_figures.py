@@ -29,7 +29,7 @@ def fit(record):
 def test_a_record_with_its_commanded_loading(record):
     panels = ss.figures.record(record, Figure().subplots(3, 1))
     np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), record.friction)
-    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point rate (µm/s)", "normal stress (MPa)"]
+    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point\nrate (µm/s)", "normal stress (MPa)"]
     assert len(panels[0].lines) == 1 + len(record.steps)
     np.testing.assert_allclose(panels[1].lines[1].get_ydata(), 1e6 * record.loading.load.at(record.time))
     np.testing.assert_allclose(panels[2].lines[1].get_ydata(), 1e-6 * record.loading.stress.at(record.time))
@@ -139,6 +139,7 @@ def test_shares_of_kicks_sum_to_all_draws(fit):
     shares = [float(part.split()[-1]) for part in title.split("%")[:-1]]
     assert len(shares) == 4
     assert sum(shares) == pytest.approx(100)
+    assert panels[1].get_title() == "fails at a kick: all 200 draws"
     assert panels[0].get_xlabel() == "velocity kick that is survived, ln(new/old velocity) (1)"
     assert panels[1].get_xlabel() == "normal-stress kick that is survived, share of the steady one (1)"
     assert "ln(new/old velocity)" in str(kicked)

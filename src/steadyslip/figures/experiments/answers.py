@@ -130,6 +130,7 @@ def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
         text = shown(float(error), si, 2, first.area) if np.isfinite(error) else "not determined"
         ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
     ax.set_yticks(place, labels)
+    ax.set_ylim(-0.6, len(labels) - 0.4)
     ax.set_xlabel(labelled(f"error of {brief(result.parameter)}", unit))
     return ax
 
@@ -202,6 +203,8 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
             "undecided, or no steady sliding": np.mean(np.isnan(sizes)),
         }
         words = [f"{name} {percent(float(share))}" for name, share in shares.items() if share]
+        if len(words) == 1:
+            words = [f"{words[0].rpartition(' 100')[0]}: all {len(sizes)} draws"]
         panel.set_title("\n".join(textwrap.wrap(", ".join(words), 48)), fontsize="small")
         panel.set_xlabel(labelled(f"{kick} kick that is survived, {KICKS[kick].size}", "1"))
         panel.set_ylabel("draws (1)")

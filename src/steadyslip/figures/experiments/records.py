@@ -56,7 +56,7 @@ def rates(data: Record, ax: Axes, time: np.ndarray) -> None:
     course, rate = data.loading.load, data.rate
     if course is None or rate is None:
         ax.text(0.5, 0.5, "load point not measured", ha="center", transform=ax.transAxes)
-        ax.set_ylabel("load-point rate")
+        ax.set_ylabel("load-point\nrate")
         return
     commanded = course.at(data.time)
     high = float(np.max(np.abs(commanded))) or float(np.max(np.abs(rate)))
@@ -70,5 +70,5 @@ def rates(data: Record, ax: Axes, time: np.ndarray) -> None:
         ax.set_ylim(-0.5 * high / size, 2.0 * high / size)
     ax.plot(time, rate / size, ".", color=SKY, markersize=1.5, rasterized=True, label="slopes of the record")
     ax.plot(time, commanded / size, color=BLACK, linewidth=1, label="commanded, as found")
-    ax.set_ylabel(labelled("load-point rate", name))
+    ax.set_ylabel(labelled("load-point\nrate", name))
     ax.legend(loc="best", fontsize="x-small", markerscale=4)

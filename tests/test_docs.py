@@ -92,7 +92,7 @@ def test_equations_page_has_every_function_of_the_paper():
 
 def test_the_arrow_line_is_the_same_everywhere():
     arrow = (
-        "friction law + contact law -> slider + drive -> Model (symbolic) -> steady sliding "
+        "friction law + contact law -> slider or machine -> Model (symbolic) -> steady sliding "
         "-> linear stability -> verdict, figures, command line"
     )
     for path in ("README.md", "docs/explanation/how-it-works.md"):

@@ -14,7 +14,14 @@ from steadyslip.core.quantities import is_per_area, total_unit
 from steadyslip.core.records import FrozenRecord, Named, Part, Settings, key_of
 from steadyslip.core.roles import Option, Parameter, Series, Value
 from steadyslip.experiments.spec import TABLES as FIT_TABLES
-from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.files.specifications.layout import (
+    PROTOCOL,
+    has_choice,
+    machine_sections,
+    own_fields,
+    sections,
+    selector,
+)
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.measures import Measure
 from steadyslip.maps.plan.settings import GridSettings, MapSettings, RangeSettings, SampleSettings
@@ -29,7 +36,8 @@ RIG_HEAD = """# Rig file
 
 A rig file is TOML, plain text in UTF-8, with the tables `[friction]`, `[contact]`, `[slider]` and `[drive]`; a
 table `[protocol]` may say what is done to the rig in an experiment. A whole one is
-[examples/inclined-spring.toml](../../examples/inclined-spring.toml).
+[examples/inclined-spring.toml](../../examples/inclined-spring.toml). Rigs of several bodies have the tables of a
+[machine](#machines) instead.
 
 - A number without quotes is in the SI unit of the table below. Text such as `"9 GPa/m"` or `"-45 deg"` carries its
   unit and is checked for the right dimension; anything that can be written so may be.
@@ -92,10 +100,10 @@ def row(item, role, totals: bool) -> str:
     return f"| `{key_of(item)}` | {unit} | {allowed} | {default_of(item)} | {role.doc} |"
 
 
-def table(law) -> list[str]:
-    """The keys of a record; those of settings have one unit only, whatever the rig's area."""
+def table(law, totals: bool = True) -> list[str]:
+    """The keys of a record; those of settings and machines have one unit only, whatever the rig's area."""
     rows = [
-        row(item, role, not issubclass(law, Settings))
+        row(item, role, totals and not issubclass(law, Settings))
         for item, role in own_fields(law)
         if not getattr(role, "by_name", False)
     ]
@@ -139,7 +147,38 @@ def rig_page() -> str:
             lines += [f'## `[{section.name}]` with `{key} = "{name}"`{absent}', "", summary(law), "", *table(law)]
             lines += parts_of(law, done)
     lines += [f"## `[{PROTOCOL.name}]`", "", summary(Protocol), "", *table(Protocol), *parts_of(Protocol, done)]
+    lines += [MACHINE_HEAD, *machine_tables()]
     return "\n".join(lines).rstrip() + "\n"
+
+
+MACHINE_HEAD = """## Machines
+
+A machine has bodies, links, contacts and a drive, each body, link and contact in a table under a name that you give it:
+`[bodies.table]`, `[links.screw]`, `[contacts.guide]`. A whole one is
+[examples/machines/feed-axis.toml](../../examples/machines/feed-axis.toml); see
+[Describe several bodies](../how-to/describe-several-bodies.md).
+
+- Names have letters, digits, hyphens and underscores; a dotted name such as `links.screw.stiffness` goes through them.
+- Quantities are totals: kg, N/m, N. Where a contact has an `area`, its laws may be in stresses, too; without one only
+  forces are allowed.
+- Ends of links, and what contacts slide on, are bodies, `"ground"`, or `"drive"`, what moves at the drive's velocity.
+"""
+
+
+def machine_tables() -> list[str]:
+    """The tables of bodies, links, contacts and drives of machines."""
+    lines: list[str] = []
+    for section in machine_sections():
+        head = f"[{section.name}.NAME]" if section.keyed else f"[{section.name}]"
+        if not has_choice(section.family):
+            lines += [f"### `{head}`", "", summary(section.family), "", *table(section.family, False)]
+            continue
+        key, default = selector(section.family)
+        for name, law in section.family.registry.items():
+            absent = f", or without `{key}`" if name == default else ""
+            of = "" if section.keyed else " of a machine"
+            lines += [f'### `{head}`{of} with `{key} = "{name}"`{absent}', "", summary(law), "", *table(law, False)]
+    return lines
 
 
 # --- fit-file.md ------------------------------------------------------------------------------------
@@ -268,6 +307,11 @@ GROUPS = {
     "schemas": "Schema of files",
     "laws.contact": "Contact laws",
     "machine.drive": "Drives",
+    "machine.machine": "Machines",
+    "machine.bodies": "Bodies of machines",
+    "machine.links": "Links of machines",
+    "machine.surfaces": "Contacts of machines",
+    "machine.servo": "Drives of machines",
     "core.errors": "Exceptions",
     "laws.friction": "Friction laws",
     "experiments": "Records and fits",
@@ -284,6 +328,7 @@ GROUPS = {
 ORDER = (
     *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
     "schemas",
+    *("machine.machine", "machine.bodies", "machine.links", "machine.surfaces", "machine.servo"),
     *("verdict", "model.sliding", "linear", "model", "core.records"),
     *("core.errors", "experiments", "motion", "nonlinear", "maps"),
 )

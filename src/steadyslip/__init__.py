@@ -1,6 +1,6 @@
 """Stability of frictional sliding, from lab presses and machine slides to faults.
 
-    friction law + contact law -> slider + drive -> Model (symbolic) -> steady sliding
+    friction law + contact law -> slider or machine -> Model (symbolic) -> steady sliding
         -> linear stability -> verdict (`analyze`), figures, command line
     Model + protocol -> compiled kernels -> motion (`simulate`, `simulate_many`) -> figures, command line
     linear stability + motion -> onset, cycles, thresholds -> verdict, figures, command line

@@ -64,6 +64,7 @@ from .files.specifications import (
     write_rig as write_rig,
 )
 from .laws.contact import (
+    Compliant as Compliant,
     Constant as Constant,
     ContactLaw as ContactLaw,
     DilatingLayer as DilatingLayer,
@@ -98,6 +99,7 @@ from .laws.friction import (
 from .linear import (
     Boundary as Boundary,
     Margin as Margin,
+    Mode as Mode,
     Response as Response,
     boundary as boundary,
     critical_stiffness as critical_stiffness,
@@ -105,13 +107,21 @@ from .linear import (
     formula as formula,
     growth_rate as growth_rate,
     margins as margins,
+    modes as modes,
     paper as paper,
     safety_factor as safety_factor,
     small_signal as small_signal,
     stability as stability,
     stable_stiffness as stable_stiffness,
+    stable_values as stable_values,
     state_space as state_space,
     to_control as to_control,
+)
+from .machine.bodies import (
+    Body as Body,
+    PlanarBody as PlanarBody,
+    RotatingBody as RotatingBody,
+    SlidingBody as SlidingBody,
 )
 from .machine.drive import (
     PD as PD,
@@ -119,8 +129,31 @@ from .machine.drive import (
     Drive as Drive,
     Steady as Steady,
 )
+from .machine.links import (
+    Link as Link,
+    Screw as Screw,
+    Shaft as Shaft,
+    Spring as Spring,
+)
+from .machine.machine import (
+    Machine as Machine,
+)
+from .machine.servo import (
+    Cascade as Cascade,
+    MachineDrive as MachineDrive,
+    PositionPD as PositionPD,
+    PositionPID as PositionPID,
+    Pull as Pull,
+    RotaryCascade as RotaryCascade,
+    RotaryPD as RotaryPD,
+    RotaryPID as RotaryPID,
+    RotaryPull as RotaryPull,
+)
 from .machine.slider import (
     Slider as Slider,
+)
+from .machine.surfaces import (
+    Surface as Surface,
 )
 from .maps import (
     Events as Events,
@@ -145,6 +178,8 @@ from .model import (
     build_model as build_model,
 )
 from .model.sliding import (
+    SteadyContact as SteadyContact,
+    SteadyMachine as SteadyMachine,
     SteadySliding as SteadySliding,
     steady_state as steady_state,
     steady_states as steady_states,
@@ -205,6 +240,7 @@ from .reports import (
 from .schemas import json_schema as json_schema
 from .verdict import (
     Analysis as Analysis,
+    MachineAnalysis as MachineAnalysis,
     Tolerated as Tolerated,
     analyze as analyze,
     tolerate as tolerate,

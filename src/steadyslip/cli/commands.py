@@ -82,7 +82,7 @@ def analyze(
         say(rest)
         if formula:
             _echo_formula(result)
-    if any(one.interrupted for one in result.kicks):
+    if any(one.interrupted for one in getattr(result, "kicks", ())):
         raise typer.Exit(130)
     if require_stable and (not result.stable or result.on_edge):
         raise typer.Exit(1)
@@ -121,11 +121,11 @@ def _predicted(
 ) -> None:
     """The verdict with the friction of a fit: that of the best values, and its probability."""
     from steadyslip.experiments import load_fit, predict
-    from steadyslip.files.specifications import read_rig
+    from steadyslip.files.specifications import read_slider
     from steadyslip.verdict import analyze as run
 
     refuse_branch(fitted, branch)
-    found = predict(read_rig(rig, changes), load_fit(fitted), kick=kick)
+    found = predict(read_slider(rig, changes), load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
         data = best.to_dict() | {"prediction": found.to_dict()} | (_formula(best) if formula else {})
@@ -218,11 +218,11 @@ def explore(
     """A page for the browser: the verdict as the rig's values are moved. It needs nothing else, and can be sent on."""
     from steadyslip.explorer import explore as run
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications import read_rig
+    from steadyslip.files.specifications import read_slider
 
     if output is not None:
         check_output([output], [".html"])
-    found = run(read_rig(rig, changes or ()), title=rig.stem, branch=branch)
+    found = run(read_slider(rig, changes or ()), title=rig.stem, branch=branch)
     if output is None:
         say(f"opened {found.open()}")
         return
@@ -248,7 +248,7 @@ def report(
 ) -> None:
     """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications import named_value, read_rig
+    from steadyslip.files.specifications import named_value, read_slider
     from steadyslip.reports import report as run
 
     if output is not None:
@@ -259,7 +259,7 @@ def report(
         from steadyslip.experiments import load_fit
 
         options["fit"] = load_fit(fitted)
-    found = run(read_rig(rig, changes or ()), title=rig.stem, source=rig, **options)
+    found = run(read_slider(rig, changes or ()), title=rig.stem, source=rig, **options)
     if output is None:
         say(f"opened {found.open()}")
         return

@@ -125,6 +125,9 @@ class NoSteadySliding(SteadyslipError, ValueError):
         super().__init__(message)
 
 
+MACHINES_CAN = "machines have analyze, stability, eigenvalues, modes, boundary, margins and stable_values"
+
+
 class NotAvailable(SteadyslipError, ValueError):
     """The question has no answer for this rig; the message says why and what to ask instead."""
 

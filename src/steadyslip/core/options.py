@@ -12,8 +12,8 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, one
-from steadyslip.core.roles import Domain, Names, Option, Role, Text, Whole, below_one, steps, tolerance
+from steadyslip.core.errors import MACHINES_CAN, ParameterError, Problem, one
+from steadyslip.core.roles import Domain, Names, Option, Role, Text, Whole, below_one, fault, steps, tolerance
 
 LARGEST = 1.7e308  # integers may be larger than any float
 MOST = 1e150  # whose square is finite
@@ -69,10 +69,22 @@ def _all_numbers(value: Any) -> bool:
         return False
 
 
+@dataclass(frozen=True)
+class Made(Tested):
+    """An object that a function gives; a machine in place of a slider is told that this is yet to come."""
+
+    def refused(self, value: Any) -> ParameterError:
+        if type(value).__name__ == "Machine":
+            return fault(
+                f"this is not offered for a machine yet, {self.words.partition(',')[0]} is allowed; {MACHINES_CAN}"
+            )
+        return super().refused(value)
+
+
 def _made(names: str, maker: str) -> Role:
     """An object of one of some classes, by name, which `maker` gives."""
     wanted = names.split(" | ")
-    return Tested(
+    return Made(
         f"{one(' or '.join(wanted))}, such as {maker} gives",
         lambda value: any(kind.__name__ in wanted for kind in type(value).__mro__),
     )
@@ -94,7 +106,8 @@ FUNCTION = Tested("a function", callable)
 PLACE = Tested("a path", lambda value: isinstance(value, (str, os.PathLike)) and bool(os.fspath(value)))
 CONTENT = Tested("the text of a file", lambda value: isinstance(value, str))
 MAKERS = {
-    "Slider": "read_rig", "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
+    "Slider": "read_rig", "Machine": "read_rig", "Slider | Machine": "read_rig",
+    "Fit": "fit", "Fit | Draws": "fit", "Map": "read_map", "MapResult": "open_map",
     "Cycle": "cycles",
 }  # fmt: skip
 INTEGRATION = {"rtol": within(tolerance), "arrest": within(below_one), "most_steps": within(steps)}

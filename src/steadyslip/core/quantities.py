@@ -56,6 +56,9 @@ _TABLE: dict[str, tuple[float, Dimension]] = {
     "degree": (units.deg, Dimension(0, 0, 0, 1)),
     "degrees": (units.deg, Dimension(0, 0, 0, 1)),
     "°": (units.deg, Dimension(0, 0, 0, 1)),
+    "rev": (2 * math.pi, Dimension(0, 0, 0, 1)),
+    "turn": (2 * math.pi, Dimension(0, 0, 0, 1)),
+    "rpm": (2 * math.pi / units.minute, Dimension(0, 0, -1, 1)),
     "%": (1e-2, Dimension()),
     "1": (1.0, Dimension()),
 }
@@ -198,12 +201,13 @@ def parse(text: str, expected: str) -> float:
         raise QuantityError(f"{text!r} is not a quantity: {error}; write for example {example(expected)}") from error
     if found != wanted:
         message = f"{text!r} has the wrong dimension; expected {described(expected)}, for example {example(expected)}"
-        if wanted.mass == 1 and found == wanted.times(_AREA):
+        per_area = total_unit(expected) in _TOTALS
+        if per_area and found == wanted.times(_AREA):
             message += (
                 "; it is the total of a contact, and this is per unit area: add the contact's area to the rig file, "
                 "[slider] area = '0.01 m^2', or divide by it"
             )
-        elif is_per_area(expected):
+        elif per_area:
             message += (
                 f", or with the contact's area in the rig file, [slider] area = '0.01 m^2', {total_unit(expected)}"
             )
@@ -302,6 +306,10 @@ def described(expected: str) -> str:
     return "a number without unit" if expected == "1" else f"a quantity in {expected}"
 
 
+_TOTALS = ("N", "N/m", "N s/m", "N/m/s", "kg", "N s")
+"""Units of the totals that people have names for."""
+
+
 def is_per_area(unit_name: str) -> bool:
     """Whether a quantity is per unit area inside and a total (N, N/m, kg, ...) of a rig with an area."""
     return unit(unit_name)[1].mass == 1
@@ -311,7 +319,7 @@ def total_unit(unit_name: str) -> str:
     """Name of the unit of the total that belongs to a per-area unit."""
     _, dimension = unit(unit_name)
     wanted = dimension.times(_AREA)
-    for candidate in ("N", "N/m", "N s/m", "N/m/s", "kg", "N s"):
+    for candidate in _TOTALS:
         if unit(candidate)[1] == wanted:
             return candidate
     return f"{unit_name} m^2"
@@ -378,7 +386,7 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
                 return f"{value / size:.{digits}g} {name}"
-    first = re.match(r"Pa|N|m|s", si_unit)
+    first = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)  # of a power, a prefix would be one of the base
     if first is None or value == 0 or not math.isfinite(value):
         return f"{value:.{digits}g} {si_unit}"
     size = abs(value)

@@ -11,7 +11,8 @@ schema, the reference page, the symbol in the equations and the range searched f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cache
 from typing import Any, ClassVar, TypeVar, dataclass_transform
@@ -28,6 +29,7 @@ class Part(Role):
     """A field that holds another record; ``inline`` puts its parameters beside the owner's.
 
     With ``many`` it holds a tuple of them: a list of tables, or with ``by_name`` tables named after their laws.
+    With ``keyed`` it holds `Members`: a table of tables, each under a name that the user gives it.
     """
 
     family: type[FrozenRecord]
@@ -35,13 +37,30 @@ class Part(Role):
     inline: bool = False
     many: bool = False
     by_name: bool = False
+    keyed: bool = False
 
     def checked(self, value: Any) -> Any:
+        if self.keyed:
+            return self._keyed(value)
         if not self.many:
             return self._member(value, "")
         if not isinstance(value, (list, tuple)):
             raise fault(f"got {came(value)}; allowed: a list of {self.family.__name__}")
         return tuple(self._member(one, f"{i}") for i, one in enumerate(value, start=1))
+
+    def _keyed(self, value: Any) -> Members:
+        if not isinstance(value, Mapping):
+            raise fault(f"got {came(value)}; allowed: names, and {one(self.family.__name__)} for each")
+        problems = [Problem(str(name), wrong) for name in value if (wrong := unfit_name(name))]
+        found = {}
+        for name, member in value.items():
+            try:
+                found[name] = self._member(member, str(name))
+            except ParameterError as error:
+                problems += error.problems
+        if problems:
+            raise ParameterError(problems)
+        return Members(found)
 
     def _member(self, value: Any, index: str) -> FrozenRecord:
         if isinstance(value, self.family):
@@ -51,6 +70,38 @@ class Part(Role):
     def allowed(self) -> str:
         known = ", ".join(law.__name__ for law in self.family.registry.values())
         return one(self.family.__name__) + (f" ({known})" if known else "")
+
+
+_PLAIN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+def unfit_name(name: Any) -> str:
+    """Why a name cannot be that of a member, part of dotted names; empty if it can."""
+    if isinstance(name, str) and _PLAIN_NAME.fullmatch(name) and len(name) <= 40:
+        return ""
+    return "is no name; allowed: up to 40 letters, digits, hyphens and underscores, a letter first"
+
+
+class Members(Mapping[str, Any]):
+    """Records by the names that the user gave them, in order; never changes."""
+
+    def __init__(self, of: Mapping[str, Any] | None = None) -> None:
+        self._of = dict(of or {})
+
+    def __getitem__(self, name: str) -> Any:
+        return self._of[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._of)
+
+    def __len__(self) -> int:
+        return len(self._of)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._of.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._of)
 
 
 @dataclass(frozen=True)
@@ -151,6 +202,11 @@ def parts(family: type[FrozenRecord], doc: str, *, default: tuple[()], by_name: 
     return field(default=default, metadata={_ROLE: Part(family, doc, many=True, by_name=by_name)})
 
 
+def members(family: type[FrozenRecord], doc: str, *, default: Any = MISSING) -> Any:
+    """Declare a field that holds records of `family` by names that the user gives."""
+    return field(default=default, metadata={_ROLE: Part(family, doc, keyed=True)})
+
+
 def named(family: type[FrozenRecord], doc: str, *, listed: bool = False) -> Any:
     """Declare a field that holds a mapping of dotted names to records, None by default."""
     return field(default=None, metadata={_ROLE: Named(family, doc, listed)})
@@ -164,7 +220,7 @@ def setting(role: Value, *, default: Any = MISSING, key: str = "") -> Any:
 @dataclass_transform(
     kw_only_default=True,
     frozen_default=True,
-    field_specifiers=(parameter, option, samples, part, parts, named, setting),
+    field_specifiers=(parameter, option, samples, part, parts, members, named, setting),
 )
 class FrozenRecord(Displayed):
     """Frozen, checked when built, addressed by dotted names.
@@ -181,6 +237,10 @@ class FrozenRecord(Displayed):
     short: ClassVar[tuple[str, ...]] = ()
     """Keys of its table that a single value, or a list of values in their order, stands for."""
     registry: ClassVar[dict[str, type[FrozenRecord]]] = {}
+    chosen_by: ClassVar[tuple[str, str | None]] = ("law", None)
+    """Of a family: the key of its tables that names the law, and the law meant where it is absent."""
+    in_totals: ClassVar[bool] = False
+    """Whether its table is about a contact of its own `area`: per-area quantities in it are totals for people."""
 
     def __init_subclass__(
         cls, *, name: str = "", family: str = "", section: str = "", kw_only: bool = True, **kwargs: Any
@@ -276,6 +336,26 @@ def checked(item: Field[Any], value: Any) -> Any:
     return None if value is None and item.default is None else role_of(item).checked(value)
 
 
+def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str, FrozenRecord]]:
+    """The records that a field holds, each with what stands before the names of its parameters."""
+    if role.many:
+        yield from ((f"{name}.{index}.", member) for index, member in enumerate(value, start=1))
+    elif role.keyed:
+        yield from ((f"{name}.{key}.", member) for key, member in value.items())
+    elif value is not None:
+        yield (prefix if role.inline else f"{name}."), value
+
+
+def _each(role: Part, value: Any, name: str, prefix: str, change: Callable[[Any, str], Any]) -> Any:
+    """The same with every record changed, given what stands before its names."""
+    changed = [change(member, before) for before, member in below(role, value, name, prefix)]
+    if role.many:
+        return tuple(changed)
+    if role.keyed:
+        return Members(dict(zip(value, changed, strict=True)))
+    return changed[0] if changed else None
+
+
 @dataclass(frozen=True)
 class Address:
     """One parameter of a record: dotted name, declaration and present value (None if not given)."""
@@ -292,11 +372,9 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
         value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Parameter):
             found[name] = Address(name, role, value)
-        elif isinstance(role, Part) and role.many:
-            for index, member in enumerate(value, start=1):
-                found |= parameters(member, f"{name}.{index}.")
-        elif isinstance(role, Part) and value is not None:
-            found |= parameters(value, prefix if role.inline else f"{name}.")
+        elif isinstance(role, Part):
+            for before, member in below(role, value, name, prefix):
+                found |= parameters(member, before)
     return found
 
 
@@ -307,12 +385,8 @@ def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Co
     yield from ((own[condition.name], condition) for condition in record.conditions())
     for field_name, _, role in layout:
         if isinstance(role, Part):
-            value, name = getattr(record, field_name), own[field_name]
-            if role.many:
-                for index, member in enumerate(value, start=1):
-                    yield from conditions(member, f"{name}.{index}.")
-            elif value is not None:
-                yield from conditions(value, prefix if role.inline else f"{name}.")
+            for before, member in below(role, getattr(record, field_name), own[field_name], prefix):
+                yield from conditions(member, before)
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:
@@ -342,12 +416,8 @@ def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
     own: dict[str, Any] = {}
     for field_name, own_name, role in _layout(record):
         value, name = getattr(record, field_name), prefix + own_name
-        if isinstance(role, Part) and role.many:
-            own[field_name] = tuple(
-                replaced(member, changes, f"{name}.{index}.") for index, member in enumerate(value, start=1)
-            )
-        elif isinstance(role, Part) and value is not None:
-            own[field_name] = replaced(value, changes, prefix if role.inline else f"{name}.")
+        if isinstance(role, Part):
+            own[field_name] = _each(role, value, name, prefix, lambda member, at: replaced(member, changes, at))
         elif name in changes:
             own[field_name] = changes[name]
     return replace(record, **own)  # type: ignore[type-var]
@@ -361,10 +431,8 @@ def twin(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
     copy: R = object.__new__(type(record))
     for field_name, own_name, role in _layout(record):
         value, name = getattr(record, field_name), prefix + own_name
-        if isinstance(role, Part) and role.many:
-            value = tuple(twin(member, values, f"{name}.{i}.") for i, member in enumerate(value, start=1))
-        elif isinstance(role, Part) and value is not None:
-            value = twin(value, values, prefix if role.inline else f"{name}.")
+        if isinstance(role, Part):
+            value = _each(role, value, name, prefix, lambda member, at: twin(member, values, at))
         elif isinstance(role, Parameter):
             value = values.get(name, value)
         object.__setattr__(copy, field_name, value)
@@ -380,10 +448,9 @@ def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
             shape.append("none" if value is None else "zero" if role.structural and value == 0 else "given")
         elif isinstance(role, Series):
             shape.append("samples")
-        elif isinstance(role, Part) and role.many:
-            shape.append(tuple(shape_of(member) for member in value))
         elif isinstance(role, Part):
-            shape.append(None if value is None else shape_of(value))
+            inside = [shape_of(member) for _, member in below(role, value, "", "")]
+            shape.append((tuple(value), *inside) if role.keyed else tuple(inside))
         else:
             shape.append(value)
     return tuple(shape)

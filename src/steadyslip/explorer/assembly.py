@@ -26,7 +26,7 @@ from steadyslip.linear.status import STABLE, UNSTABLE, status
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
-from steadyslip.verdict.analyze import linear_numbers
+from steadyslip.verdict.analyze import numbers_of
 
 MODULES = (
     "dom", "quantities", "polynomials", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map", "locus",
@@ -227,7 +227,7 @@ def _answer(rig: Slider, names: list[str], branch: int) -> dict[str, Any]:
     require_range(point)
     if answer["status"] in (STABLE, UNSTABLE):
         with np.errstate(all="ignore"):
-            numbers = linear_numbers(rig, point)
+            numbers = numbers_of(rig, point)
         answer["critical"] = numbers.get("critical_stiffness")
         answer["eigenvalues"] = [[s.real, s.imag] for s in numbers["eigenvalues"]]
     return answer

@@ -5,8 +5,10 @@ from __future__ import annotations
 from steadyslip.linear import paper
 from steadyslip.linear.boundary import Margin, boundary, margins
 from steadyslip.linear.formula import formula
+from steadyslip.linear.modes import Mode, modes
 from steadyslip.linear.response import Response, small_signal
 from steadyslip.linear.search import Boundary
+from steadyslip.linear.stable_values import stable_values
 from steadyslip.linear.state_space import state_space, to_control
 from steadyslip.linear.status import stability
 from steadyslip.linear.stiffness import (
@@ -20,6 +22,7 @@ from steadyslip.linear.stiffness import (
 __all__ = [
     "Boundary",
     "Margin",
+    "Mode",
     "Response",
     "boundary",
     "critical_stiffness",
@@ -27,11 +30,13 @@ __all__ = [
     "formula",
     "growth_rate",
     "margins",
+    "modes",
     "paper",
     "safety_factor",
     "small_signal",
     "stability",
     "stable_stiffness",
+    "stable_values",
     "state_space",
     "to_control",
 ]

@@ -14,6 +14,8 @@ from steadyslip.core.options import LOW_AND_HIGH, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Parameter
 from steadyslip.linear.search import Boundary, Search
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
@@ -50,7 +52,9 @@ class Margin(Displayed):
 
 
 @checked(between=LOW_AND_HIGH)
-def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, branch: int = 0) -> tuple[Boundary, ...]:
+def boundary(
+    rig: Slider | Machine, name: str, between: Sequence[Any] | None = None, *, branch: int = 0
+) -> tuple[Boundary, ...]:
     """Every value of a parameter at which stability of steady sliding changes.
 
     Parameters
@@ -78,12 +82,17 @@ def boundary(rig: Slider, name: str, between: Sequence[Any] | None = None, *, br
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, between)
     if limits is not None:
-        operating_point(rig, {full: np.asarray(limits)}, present_zeros(rig), branch)  # refuses what breaks a condition
-    return Search(rig, full, present_zeros(rig), branch).boundaries(limits)
+        operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
+    return Search(rig, full, _kept(rig, full), branch).boundaries(limits)
+
+
+def _kept(rig: Rig, name: str) -> tuple[str, ...]:
+    """The terms that are kept while one of them is varied."""
+    return (name,) if isinstance(rig, Machine) and not rig.value(name) else present_zeros(rig)
 
 
 @checked()
-def margins(rig: Slider, *, branch: int = 0) -> tuple[Margin, ...]:
+def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
     """Distance of every parameter to its nearest edge of stability, the most critical first."""
     present = present_zeros(rig)
     found = []
@@ -117,14 +126,19 @@ def _urgency(margin: Margin) -> float:
     return float(f"{abs(margin.absolute if margin.unit == 'rad' else margin.relative):.9g}")
 
 
-def present_zeros(rig: Slider) -> tuple[str, ...]:
-    """Terms that are zero and worth keeping in the equations, because they may be varied from there."""
+def present_zeros(rig: Rig) -> tuple[str, ...]:
+    """Terms that are zero and worth keeping in the equations, because they may be varied from there.
+
+    Of a machine none is: what bodies without mass or damping add to the degree of its polynomial would hide others.
+    """
+    if isinstance(rig, Machine):
+        return ()
     return tuple(
         name for name, a in rig.parameters().items() if a.role.structural and a.value == 0 and not a.role.adds_state
     )
 
 
-def _role(rig: Slider, full: str) -> Parameter:
+def _role(rig: Rig, full: str) -> Parameter:
     address = rig.parameters()[full]
     if address.value is None:
         raise ParameterError([Problem(full, "has no boundary: the rig does not have it; give it a value first")])

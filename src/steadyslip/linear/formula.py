@@ -12,6 +12,7 @@ from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
 
@@ -21,7 +22,7 @@ MU_SS = sp.Symbol("mu_ss", real=True)
 
 
 @checked()
-def formula(rig: Slider) -> sp.Eq:
+def formula(rig: Slider | Machine) -> sp.Eq:
     """Critical stiffness of a rig with one memory variable, as a SymPy equation.
 
     Parameters
@@ -39,8 +40,8 @@ def formula(rig: Slider) -> sp.Eq:
     Raises
     ------
     NotAvailable
-        If the model has several memory variables or none, or integral control: then the boundary is a
-        root of a polynomial, which `stable_stiffness` solves.
+        If the rig is a machine, or the model has several memory variables or none, or integral control: then the
+        boundary is a root of a polynomial, which `stable_stiffness` solves.
 
     Notes
     -----

@@ -86,7 +86,7 @@ class Response(Displayed):
 
 def has_closed_form(model: Model) -> bool:
     """Whether the model is one that the cubic describes: one memory variable, no integral control."""
-    return len(model.contacts) == len(model.memory) == 1 and not model.integrals
+    return model.has_closed_form
 
 
 @question
@@ -99,6 +99,8 @@ def response(model: Model) -> Response:
         If the model has no memory, several memory variables, or integral control.
     """
     if not has_closed_form(model):
+        if not model.is_slider:
+            raise NotAvailable("the closed form is one of a Slider; stable_values gives a machine's edges as numbers")
         raise NotAvailable(
             "the closed form needs exactly one memory variable and no integral control; this model has "
             f"{len(model.memory)} memory variables; stable_stiffness gives the edges as numbers"

@@ -4,7 +4,7 @@ The parameter is sampled over its range; where the status (stable, unstable, no 
 differs, the change is bracketed and narrowed to rounding. Dips of the damping between samples are followed,
 so that a narrow window is not stepped over. Samples whose status is a matter of rounding are left out: a rig on
 its edge has that edge in every parameter that moves it, and none in the others. For the stiffness itself the
-edges are exact (theory 3).
+edges are exact (theory 3), and so are those of whatever enters linearly in a machine (theory 11).
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, unit
-from steadyslip.linear.polynomials import Array, damping_measures, roots
+from steadyslip.linear.polynomials import Array, StableSet, damping_measures, roots
+from steadyslip.linear.stable_values import linear_set
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import ill_posed, set_of_one
-from steadyslip.machine.slider import Slider
+from steadyslip.machine.rig import Rig
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic
@@ -80,7 +81,7 @@ class Boundary(Displayed):
 class Search:
     """Scanning one parameter of one rig."""
 
-    def __init__(self, rig: Slider, name: str, present: Iterable[str], branch: int) -> None:
+    def __init__(self, rig: Rig, name: str, present: Iterable[str], branch: int) -> None:
         self.rig, self.name, self.present, self.branch = rig, name, tuple(present), branch
         address = rig.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
@@ -126,8 +127,8 @@ class Search:
     def natural_size(self) -> float:
         """A size for a parameter that is zero, from σss, v0 and the slip distance v0/r."""
         point = operating_point(self.rig, None, self.present, self.branch)
-        sigma, v0 = float(point.sigma), point.drive
-        length = v0 / (_decay_rate(point, sigma) or 1.0)
+        sigma, v0 = float(point.sigmas[0]), point.drive
+        length = v0 / (_decay_rate(point) or 1.0)
         _, d = unit(self.role.unit)
         by_velocity = -2 * d.mass - d.time
         sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
@@ -146,8 +147,9 @@ class Search:
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         grid = self.grid(between)
         with np.errstate(all="ignore"):
-            if self.name == "slider.stiffness":
-                return self._of_stiffness(grid[0], grid[-1])
+            exact = self._exact()
+            if exact is not None:
+                return self._of_set(exact, grid[0], grid[-1])
             grid = self._with_hidden_windows(grid)
             grid = grid[~on_edge(self.values(grid))]  # a status that rounding decides is none
             if len(grid) < 2:
@@ -208,7 +210,9 @@ class Search:
         stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         bracket = float(low), float(high)
-        return Boundary(self.name, float(middle), bracket, kind, frequency, stable, self.role.unit, self.rig.area)
+        return Boundary(
+            self.name, float(middle), bracket, kind, frequency, stable, self.role.unit, self.rig.area_of(self.name)
+        )
 
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
         """A wider bracket where steady sliding ends within rounding of the edge.
@@ -241,25 +245,33 @@ class Search:
             return "divergence", 0.0
         return "oscillatory", float(np.abs(found[np.argmax(found.real)].imag))
 
-    def _of_stiffness(self, low: float, high: float) -> tuple[Boundary, ...]:
+    def _exact(self) -> StableSet | None:
+        """The stable set of the stiffness of a slider, and of whatever enters linearly in a machine."""
+        point = operating_point(self.rig, None, self.present, self.branch)
+        if self.name == "slider.stiffness":
+            return set_of_one(point)
+        if point.model.is_slider or not point.exists or self.role.domain.low < 0:
+            return None
+        return linear_set(point, self.name)
+
+    def _of_set(self, edges: StableSet, low: float, high: float) -> tuple[Boundary, ...]:
         """The exact edges of the stable set."""
-        edges = set_of_one(operating_point(self.rig, None, self.present, self.branch))
         keep = np.flatnonzero(edges.changes & (edges.edges >= low) & (edges.edges <= high))
         return tuple(
-            self._stiffness_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
+            self._exact_edge(float(edges.edges[i]), float(edges.frequencies[i]), edges.intervals) for i in keep
         )
 
-    def _stiffness_edge(self, k: float, frequency: float, intervals: Array) -> Boundary:
+    def _exact_edge(self, k: float, frequency: float, intervals: Array) -> Boundary:
         kind = "divergence" if frequency == 0 else "ill-posed" if np.isinf(frequency) else "oscillatory"
         stable = "above" if np.any(intervals[:, 0] == k) else "below"
         bracket = (float(np.nextafter(k, 0)), float(np.nextafter(k, np.inf)))
         beta = frequency if kind == "oscillatory" else 0.0
-        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area)
+        return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area_of(self.name))
 
 
-def _decay_rate(point: OperatingPoint, sigma: float) -> float:
+def _decay_rate(point: OperatingPoint) -> float:
     """Fastest decay rate of the memory (1/s), zero without memory."""
     model, linear = point.model, linearise(point.model)
-    numbers = dict(zip(model.arguments, (*point.arguments, sigma), strict=True))
+    numbers = dict(zip(model.arguments, (*point.arguments, *point.sigmas), strict=True))
     own = [linear.rows[item.symbol][item.symbol].xreplace(numbers) for item in model.memory]
     return max((abs(float(rate)) for rate in own if rate.is_number), default=0.0)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.options import checked
+from steadyslip.core.questions import question
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
 from steadyslip.linear.response import has_closed_form, response_numbers
 from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.model import Model
+from steadyslip.model.linearisation import characteristic_coefficients
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import characteristic, in_range
 
@@ -24,7 +30,7 @@ EVERY, NONE = "stable at every stiffness", "stable at no stiffness"
 
 
 @checked()
-def stability(rig: Slider, vary: Vary | None = None) -> Any:
+def stability(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     """Whether steady sliding is stable, in words, for one rig or many.
 
     Parameters
@@ -64,7 +70,7 @@ def status(point: OperatingPoint) -> NDArray[np.int64]:
     """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed too) or UNKNOWN (out of floating point, or no rig)."""
     with np.errstate(all="ignore"):
         verdict = np.where(is_hurwitz(characteristic(point)), STABLE, UNSTABLE)
-        found = np.where(np.isfinite(point.sigma), verdict, ABSENT)
+        found = np.where(point.exists, verdict, ABSENT)
         return np.where(in_range(point) & point.valid, found, UNKNOWN)
 
 
@@ -82,6 +88,12 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     return bool(np.any(status(others) != status(point)))
 
 
+@question
+def _static_terms(model: Model) -> Callable[..., list[Any]]:
+    """What adds up to the static stiffness of a machine, a0."""
+    return model.function(sp.Add.make_args(characteristic_coefficients(model)[0]))
+
+
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits.
 
@@ -92,6 +104,8 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         if has_closed_form(point.model):
             part = response_numbers(point)
             terms = [part.k * np.ones_like(ratio), part.mu * part.k * part.B2, part.mu * part.B3]
+        elif not point.model.is_slider:
+            terms = [np.broadcast_to(term, point.shape) for term in point.evaluate(_static_terms(point.model))]
         else:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]

@@ -20,6 +20,7 @@ from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, most_intervals, quietly, roots, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
@@ -117,7 +118,7 @@ def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
 
 
 @checked()
-def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
+def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     """Eigenvalues of small perturbations of steady sliding.
 
     Parameters
@@ -140,7 +141,7 @@ def eigenvalues(rig: Slider, vary: Vary | None = None) -> Any:
 
 
 @checked()
-def growth_rate(rig: Slider, vary: Vary | None = None) -> Any:
+def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     """Largest real part of the eigenvalues (1/s): positive grows, negative decays.
 
     inf where the problem is ill-posed (theory 3: a3 < 0, or a3 = 0 and a2 <= 0), NaN without steady sliding and where

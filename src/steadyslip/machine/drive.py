@@ -7,7 +7,7 @@ error −x, so its proportional gain acts as a stiffness and its derivative gain
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from steadyslip.core.records import FrozenRecord, parameter
 from steadyslip.core.roles import nonnegative, positive
@@ -15,6 +15,8 @@ from steadyslip.core.roles import nonnegative, positive
 
 class Drive(FrozenRecord, family="drive", kw_only=False):
     """Base of drives: steady velocity and the gains of a controller, zero unless a subclass has them."""
+
+    chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
 
     velocity: float = parameter("m/s", positive, "velocity of the load point in steady sliding")
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
-from steadyslip.core.questions import Keeper, question
-from steadyslip.core.records import Address, Condition, FrozenRecord, parameter, parameters, part, replaced, resolve
+from steadyslip.core.errors import Problem
+from steadyslip.core.records import Condition, parameter, part
 from steadyslip.core.roles import nonnegative, positive
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
+from steadyslip.machine.mechanism import LOAD_POINT, Coordinate, Element, Integral, Mechanism, Touch
+from steadyslip.machine.rig import Rig
 
 
-class Slider(FrozenRecord, Keeper, section="slider"):
+class Slider(Rig, section="slider"):
     """A block pushed through a spring: m v̇ = T − τ(v, σ, memory) − ηv + q (theory 1).
 
     All stresses, stiffnesses, dampings and the mass are per unit nominal contact area; with area 1 the
@@ -26,6 +27,10 @@ class Slider(FrozenRecord, Keeper, section="slider"):
     Parameters have dotted names (``friction.a``, ``contact.angle``, ``slider.stiffness``,
     ``drive.velocity``); a bare last part is enough where it is unique.
     """
+
+    assumed: ClassVar[Mapping[str, str]] = {"slider.stiffness": "k"}
+    instead: ClassVar[Mapping[str, str]] = {"slider.axial_stiffness": "slider.stiffness"}
+    aside: ClassVar[tuple[str, ...]] = ("slider.area",)
 
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
@@ -56,63 +61,43 @@ class Slider(FrozenRecord, Keeper, section="slider"):
                 f"the contact {self.contact.name!r} has no axis at an angle; give stiffness instead",
             )
 
+        if self.contact.is_compliant():
+            yield Problem(
+                "contact",
+                f"the contact {self.contact.name!r} needs a body that moves away from the surface, which a "
+                "slider's does not; describe it as a machine, with a body that moves in the plane",
+            )
+
     def conditions(self) -> Iterator[Condition]:
         if self.stiffness is None and self.axial_stiffness is None:
             message = "missing; give stiffness such as '9 GPa/m' (or a drive with gain kp > 0)"
             gain = self.drive.proportional()
             yield Condition("stiffness", np.asarray(gain) > 0, message, (gain,))
 
-    def parameters(self) -> dict[str, Address]:
-        """Every parameter of the rig by dotted name: declaration and present value."""
-        return dict(_parameters(self))
-
-    def resolve(self, name: str) -> str:
-        """The full dotted name of a parameter.
-
-        Raises
-        ------
-        UnknownNameError
-            If `name` is unknown or ambiguous; the message lists the nearest valid names.
-        """
-        return resolve(name, self.parameters())
-
-    def of_kind(self, kind: str) -> tuple[str, ...]:
-        """Dotted names of the given parameters whose laws declare them to be of a `kind`, in order."""
-        return tuple(n for n, a in self.parameters().items() if a.role.kind == kind and a.value is not None)
-
     def stiffness_name(self) -> str:
         """The parameter that is this rig's stiffness: the spring's, along the slide or its axis, else a gain."""
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
-    def value(self, name: str) -> float | None:
-        """The value of a parameter in SI units, None if it is not given."""
-        return self.parameters()[self.resolve(name)].value
+    def area_of(self, name: str) -> float | None:
+        return self.area
 
-    def with_values(self, changes: Mapping[str, Any]) -> Slider:
-        """A copy with some parameters changed.
-
-        Parameters
-        ----------
-        changes : mapping of str to float or str
-            Dotted name to value in SI units, or text with a unit.
-
-        Raises
-        ------
-        UnknownNameError, ParameterError
-            If a name is unknown or a value is not allowed; all problems are listed.
-        """
-        problems, full = [], {}
-        for name, value in changes.items():
-            try:
-                full[self.resolve(name)] = value
-            except UnknownNameError as error:
-                problems.append(Problem(name, str(error)))
-        if problems:
-            raise ParameterError(problems)
-        return replaced(self, full)
-
-
-@question
-def _parameters(rig: Slider) -> dict[str, Address]:
-    return parameters(rig)
+    def mechanism(self) -> Mechanism:
+        """One coordinate, x, with the spring and controller between it and the load point."""
+        pulled = {"x": 1, LOAD_POINT: -1}
+        drive = self.drive
+        ki = drive.integral()
+        return Mechanism(
+            coordinates=(Coordinate("x", self.mass, drive.velocity),),
+            elements=(
+                Element("", {"x": 1}, pulled, self.stiffness, self.damping),
+                Element("", {"x": 1}, pulled, drive.proportional(), drive.derivative()),
+                Element("", {"x": 1}, {"x": 1}, 0, self.radiation_damping, grounded=True),
+            ),
+            integral=None if ki is None else Integral({"x": 1}, {"x": 1}, ki),
+            touches=(Touch("", self.friction, self.contact, {"x": 1}, {}, 1),),
+            velocity=drive.velocity,
+            disturbed="x",
+            gain=drive.proportional(),
+            axial_share=None if self.axial_stiffness is None else self.contact.sliding_stiffness(1),
+        )

@@ -32,13 +32,46 @@ class Variable:
 
 
 @dataclass(frozen=True, eq=False)
+class Coordinate:
+    """One way in which a body moves.
+
+    Attributes
+    ----------
+    name : str
+        Of the body, and what it moves in where that is not along the slide.
+    displacement, velocity, acceleration : sympy.Symbol
+        The first counts from steady sliding.
+    inertia, speed : sympy.Expr
+        Mass or moment of inertia, and the speed in steady sliding.
+    inertial : bool
+        Whether velocity is a variable of its own (inertia, or a normal stress that feels acceleration).
+    balance : sympy.Expr or None
+        Inertia less forces, zero in motion; None where the balance of a contact stands in its place.
+    unit : str
+        Of the displacement.
+    """
+
+    name: str
+    displacement: sp.Symbol
+    velocity: sp.Symbol
+    acceleration: sp.Symbol
+    inertia: sp.Expr
+    speed: sp.Expr
+    inertial: bool
+    balance: sp.Expr | None
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
 class Contact:
     """Where one body slides on another: an algebraic equation with its unknown, and the steady normal stress.
 
     Attributes
     ----------
-    slip, velocity, acceleration : sympy.Symbol
-        x, v and its rate, of the body that slides.
+    name : str
+        Of the contact; empty where there is but one.
+    slip, velocity, acceleration : sympy.Expr
+        x, v and its rate, of the surfaces against each other; the velocity is a symbol.
     spring, friction, normal : sympy.Symbol
         Stresses T, τ and σ, which the Model's `definitions` define.
     memory : tuple of Variable
@@ -46,7 +79,10 @@ class Contact:
     balance : sympy.Expr
         Friction law minus τ by the balance of forces; zero in motion.
     unknown : sympy.Symbol
-        What `balance` fixes: `acceleration`, or without inertia `velocity`.
+        What `balance` fixes: friction τ; or, where a single block has a single contact, so that the balance of forces
+        gives τ, `acceleration`, or without inertia `velocity`.
+    area : sympy.Expr
+        Over which the stresses act.
     sigma_ss : sympy.Symbol
         Normal stress in steady sliding.
     steady_stress : sympy.Expr
@@ -61,9 +97,10 @@ class Contact:
         What motion takes for sign(v), as its friction law states it: a step at rest cannot be integrated.
     """
 
-    slip: sp.Symbol
+    name: str
+    slip: sp.Expr
     velocity: sp.Symbol
-    acceleration: sp.Symbol
+    acceleration: sp.Expr
     spring: sp.Symbol
     friction: sp.Symbol
     normal: sp.Symbol
@@ -76,6 +113,7 @@ class Contact:
     steady_load: sp.Expr | None
     imposed: sp.Expr
     direction: sp.Expr
+    area: sp.Expr
 
     @property
     def inertial(self) -> bool:
@@ -87,9 +125,11 @@ class Contact:
 class Model(Keeper, Displayed):
     """A rig's equations.
 
-    The variables y obey y' = `rates`; one scalar equation for each contact, its `balance` = 0 (friction law against
-    balance of forces), fixes that contact's algebraic unknown: the acceleration if the body has inertia, else its
-    velocity. Stresses T, τ, σ are given by `definitions`, in this order, from variables, unknowns and inputs.
+    The variables y obey y' = `rates`; one scalar equation for each contact, its `balance` = 0, fixes that contact's
+    algebraic unknown, its friction; one for each coordinate, its balance of forces, the acceleration, or without
+    inertia the velocity. A single block with a single contact needs but one equation, friction law against forces.
+    Velocities of slip and the stresses T, τ, σ are given by `definitions`, in this order, from variables, unknowns and
+    inputs.
 
     A Model answers questions; what is worked out once is kept with it (`steadyslip.core.questions`): its `memory`,
     expressions `inlined` or `at_steady`, array functions of its parameters (`function`), and, in the modules beside
@@ -104,6 +144,7 @@ class Model(Keeper, Displayed):
         Time derivatives of the variables.
     definitions : dict of sympy.Symbol to sympy.Expr
         Spring stress T, friction stress tau by the balance of forces, normal stress sigma.
+    coordinates : tuple of Coordinate
     contacts : tuple of Contact
     inputs : dict of str to sympy.Symbol
         Load-point velocity, disturbance stress q, normal-stress disturbance (B4 of eq. 12), time.
@@ -124,6 +165,7 @@ class Model(Keeper, Displayed):
     variables: tuple[Variable, ...]
     rates: tuple[sp.Expr, ...]
     definitions: dict[sp.Symbol, sp.Expr]
+    coordinates: tuple[Coordinate, ...]
     contacts: tuple[Contact, ...]
     inputs: dict[str, sp.Symbol]
     parameters: dict[str, sp.Symbol]
@@ -137,21 +179,39 @@ class Model(Keeper, Displayed):
 
     @property
     def contact(self) -> Contact:
-        """The contact of a model that has one.
+        """The contact of a single block, whose friction follows from its balance of forces.
 
         Raises
         ------
         NotAvailable
-            If it has several; what asks for this is not ready for them.
+            If the model is of another kind; what asks for this is not ready for it.
         """
-        if len(self.contacts) != 1:
-            raise NotAvailable(f"this is not offered for a model with {len(self.contacts)} contacts; allowed: 1")
+        if not self.is_single:
+            raise NotAvailable(
+                f"this is not offered for a machine with {len(self.coordinates)} coordinates and {len(self.contacts)} "
+                "contacts; allowed: a Slider"
+            )
         return self.contacts[0]
+
+    @property
+    def is_single(self) -> bool:
+        """Whether this is a block with one contact: theory 1 and its closed forms."""
+        return len(self.contacts) == len(self.coordinates) == 1 and self.coordinates[0].balance is None
+
+    @property
+    def has_closed_form(self) -> bool:
+        """Whether the paper's cubic describes it: a slider with one memory variable and no integral control."""
+        return self.is_slider and len(self.memory) == 1 and not self.integrals
+
+    @property
+    def is_slider(self) -> bool:
+        """Whether it is the model of a slider, with a stiffness k of its own."""
+        return self.is_single and "slider.stiffness" in self.parameters
 
     @cached_property
     def inertial(self) -> bool:
-        """Whether every sliding body has a velocity of its own."""
-        return all(contact.inertial for contact in self.contacts)
+        """Whether every body has a velocity of its own."""
+        return all(one.inertial for one in self.coordinates)
 
     @property
     def imposed(self) -> bool:
@@ -203,7 +263,8 @@ class Model(Keeper, Displayed):
         """The model as SymPy equations, ready for LaTeX."""
         time = self.inputs["time"]
         found = [sp.Eq(symbol, expression, evaluate=False) for symbol, expression in self.definitions.items()]
-        found += [sp.Eq(contact.balance, 0, evaluate=False) for contact in self.contacts]
+        balances = [one.balance for one in self.contacts] + [one.balance for one in self.coordinates]
+        found += [sp.Eq(balance, 0, evaluate=False) for balance in balances if balance is not None]
         for variable, rate in zip(self.variables, self.rates, strict=True):
             found.append(sp.Eq(sp.Derivative(variable.symbol, time), rate, evaluate=False))
         return found

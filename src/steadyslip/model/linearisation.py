@@ -9,14 +9,15 @@ split p(s) + k q(s), and state-space matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 from sympy.polys.domains import ZZ
-from sympy.polys.matrices import DomainMatrix
 
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
+from steadyslip.model.statics import StandIns
 
 Row = dict[sp.Symbol, sp.Expr]
 
@@ -28,10 +29,10 @@ class Linearisation:
     Attributes
     ----------
     columns : tuple of sympy.Symbol
-        x, v, memory variables, integral: the order of `rows` and of the characteristic matrix.
+        Displacements, velocities, memory variables, integral, frictions that are unknowns.
     rows : dict
-        For each column the gradient, in columns, accelerations and inputs, of its rate; for the velocity of a contact
-        that of the contact's balance.
+        For each column the gradient, in columns, accelerations and inputs, of its rate; for a velocity that of the
+        balance of forces, for a friction that of its law less friction.
     outputs : dict
         Gradients of the observables.
     """
@@ -45,12 +46,13 @@ class Linearisation:
 @question
 def linearise(model: Model) -> Linearisation:
     """Differentiate a model at steady sliding."""
-    velocities = {contact.slip: contact.velocity for contact in model.contacts}
+    velocities = {one.displacement: one.velocity for one in model.coordinates}
     columns: dict[sp.Symbol, None] = {}
     for item in model.variables:  # a body without inertia has its velocity beside its slip all the same
         columns |= {item.symbol: None} | ({velocities[item.symbol]: None} if item.symbol in velocities else {})
+    columns |= dict.fromkeys(contact.friction for contact in model.contacts if contact.unknown is contact.friction)
     inputs = [s for name, s in model.inputs.items() if name != "time"]
-    basis = [*columns, *(contact.acceleration for contact in model.contacts), *inputs]
+    basis = [*columns, *(one.acceleration for one in model.coordinates), *inputs]
     intermediate: dict[sp.Symbol, Row] = {}
 
     def gradient(expression: sp.Expr) -> Row:
@@ -68,7 +70,9 @@ def linearise(model: Model) -> Linearisation:
     for name, definition in model.definitions.items():
         intermediate[name] = gradient(definition)
     rows = {symbol: gradient(rate) for symbol, rate in model.rate_of.items()}
-    rows |= {contact.velocity: gradient(contact.balance) for contact in model.contacts}
+    balances = {one.velocity: one.balance for one in model.coordinates if one.balance is not None}
+    balances |= {c.friction if c.unknown is c.friction else c.velocity: c.balance for c in model.contacts}
+    rows |= {symbol: gradient(balance) for symbol, balance in balances.items()}
     outputs = {name: gradient(expression) for name, (expression, _) in model.observables.items()}
     return Linearisation(model, tuple(columns), rows, outputs)
 
@@ -77,43 +81,80 @@ def linearise(model: Model) -> Linearisation:
 def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     """Coefficients of the characteristic polynomial in s, lowest power first (theory 3: a0, a1, ...).
 
-    The highest is m + f1 B0 times a positive factor where there is inertia; it may vanish for m = 0.
+    The highest is m + f1 B0 times a positive factor where there is inertia; it may vanish for m = 0. What the structure
+    alone makes cancel, of stiffnesses and inertias of several bodies, has cancelled exactly.
+    """
+    stand_ins = StandIns()
+    rows = characteristic_rows(model)
+    forces = {one.velocity: one.balance is not None for one in model.coordinates}
+
+    def stand_in(e: sp.Expr, row: sp.Symbol) -> sp.Expr:
+        if row not in forces:
+            return -stand_ins.whole(-e)  # a rate as it is
+        return stand_ins.polynomial(e) if forces[row] else stand_ins.whole(e)
+
+    matrix = [[[stand_in(e, name) for e in entry] for entry in row] for name, row in rows.items()]
+    return tuple(stand_ins.back(coefficient) for coefficient in _determinant(matrix))
+
+
+@question
+def characteristic_rows(model: Model) -> dict[sp.Symbol, list[tuple[sp.Expr, sp.Expr, sp.Expr]]]:
+    """The characteristic matrix: of every entry the coefficients of 1, s and s².
+
+    Columns are displacements, memory variables, integral, unknown frictions; rows the balances of forces, the rates
+    less s times their variables, the frictions less their laws, named as the rows of `Linearisation`.
     """
     linear = linearise(model)
-    s = sp.Symbol("s")
-    names: dict[sp.Symbol, sp.Expr] = {}
-
-    def stand_in(expression: sp.Expr) -> sp.Expr:
-        if expression.is_Number:
-            return expression
-        symbol = sp.Symbol(f"e{len(names)}")
-        names[symbol] = expression
-        return symbol
-
-    size = len(linear.columns)
-    matrix = sp.zeros(size, size)
-    faster = {contact.velocity: contact.acceleration for contact in model.contacts}
-    for i, row_symbol in enumerate(linear.columns):
-        row, sign = linear.rows[row_symbol], 1 if row_symbol in faster else -1
-        for j, column in enumerate(linear.columns):
-            entry = sign * stand_in(row[column])
-            if column in faster and row[faster[column]] != 0:
-                entry += sign * s * stand_in(row[faster[column]])
-            if i == j and row_symbol not in faster:
-                entry += s
-            matrix[i, j] = entry
-    polynomial = _determinant(matrix, s, list(names))
-    return tuple(coefficient.xreplace(names) for coefficient in polynomial)
+    bodies = {one.displacement: one for one in model.coordinates}
+    velocities = {one.velocity for one in model.coordinates}
+    frictions = {contact.friction for contact in model.contacts}
+    columns = [symbol for symbol in linear.columns if symbol not in velocities]
+    found = {}
+    for column in columns:
+        row_symbol = bodies[column].velocity if column in bodies else column
+        row = linear.rows[row_symbol]
+        # forces stand as inertia less force; friction as itself less its law; variables as s times them less their rate
+        sign = 1 if column in bodies and (bodies[column].balance is not None or model.is_single) else -1
+        entries = []
+        for other in columns:
+            body = bodies.get(other)
+            entry = [row[other], sp.Integer(0), sp.Integer(0)]
+            if body is not None:
+                entry[1:] = row[body.velocity], row[body.acceleration]
+            entry = [sign * e for e in entry]
+            if other is column and column not in bodies and column not in frictions:
+                entry[1] += 1
+            entries.append((entry[0], entry[1], entry[2]))
+        found[row_symbol] = entries
+    return found
 
 
-def _determinant(matrix: sp.Matrix, s: sp.Symbol, names: list[sp.Symbol]) -> list[sp.Expr]:
-    """Coefficients in s, lowest first, of a determinant, by a division-free method."""
-    ring = ZZ[[s, *names]]
-    entries = [[ring.from_sympy(entry) for entry in matrix.row(i)] for i in range(matrix.rows)]
-    signed = DomainMatrix(entries, matrix.shape, ring).charpoly()[-1]
-    expression = ring.to_sympy(signed) * (-1) ** matrix.rows
-    coefficients = sp.Poly(expression, s).all_coeffs()[::-1]
-    return [sp.sympify(c) for c in coefficients]
+def _determinant(matrix: list[list[list[sp.Expr]]]) -> list[sp.Expr]:
+    """Coefficients in s, lowest first, of a determinant, exactly: by rows, each minor of the rows below once."""
+    names = sorted({n for row in matrix for entry in row for e in entry for n in e.free_symbols}, key=str)
+    ring = ZZ[(sp.Symbol("s"), *names)].ring
+    s = ring.gens[0]
+    table = [
+        [sum((ring.from_expr(e) * s**power for power, e in enumerate(entry) if e != 0), ring.zero) for entry in row]
+        for row in matrix
+    ]
+    known = {frozenset[int](): ring.one}
+
+    def minor(columns: frozenset[int]) -> Any:
+        """Of the last rows, as many as there are columns."""
+        if columns not in known:
+            row, total, sign = table[len(table) - len(columns)], ring.zero, 1
+            for column in sorted(columns):
+                if row[column]:
+                    total += sign * row[column] * minor(columns - {column})
+                sign = -sign
+            known[columns] = total
+        return known[columns]
+
+    parts: dict[int, dict[tuple[int, ...], Any]] = {}
+    for (power, *rest), number in minor(frozenset(range(len(table)))).terms():
+        parts.setdefault(power, {})[(0, *rest)] = number
+    return [ring.from_dict(parts.get(power, {})).as_expr() for power in range(max(parts, default=0) + 1)]
 
 
 @question

@@ -18,10 +18,10 @@ from steadyslip.core.arrays import Together, broadcast, check_together, checked_
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.expressions import array_function
 from steadyslip.core.questions import Keeper, question
-from steadyslip.machine.slider import Slider
+from steadyslip.machine.rig import Rig
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
-from steadyslip.model.steady import steady_roots, steady_stress
+from steadyslip.model.steady import steady_roots, steady_stresses
 
 Vary = Mapping[str, Any]
 
@@ -72,8 +72,15 @@ class OperatingPoint(Keeper):
 
         Where there are several solutions, the one of `branch`.
         """
-        places = range(len(self.model.contacts))
-        return tuple(steady_stress(self.model, self.arguments, self.branch, place) for place in places)
+        return steady_stresses(self.model, self.arguments, self.branch)
+
+    @property
+    def exists(self) -> Any:
+        """Whether steady sliding does, over the varied parameters."""
+        found = np.isfinite(self.sigmas[0])
+        for sigma in self.sigmas[1:]:
+            found = found & np.isfinite(sigma)
+        return found
 
     @property
     def sigma(self) -> Any:
@@ -139,13 +146,13 @@ class OperatingPoint(Keeper):
 
 
 def operating_point(
-    rig: Slider, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False
+    rig: Rig, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False
 ) -> OperatingPoint:
     """The model of a rig and its parameters' values.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     vary : mapping of str to array_like or xarray.DataArray, optional
         Parameters to vary by dotted name, in SI units; arrays broadcast against each other as NumPy
         arrays do, DataArrays by dimension name.
@@ -172,12 +179,12 @@ def operating_point(
 
 
 @lru_cache(maxsize=256)
-def _own_point(rig: Slider, branch: int) -> OperatingPoint:
+def _own_point(rig: Rig, branch: int) -> OperatingPoint:
     """Of a rig as it is, with the answers that were asked of it before."""
     return _placed(build_model(rig), rig, _varied(rig, {}), branch, False)
 
 
-def _placed(model: Model, rig: Slider, together: Together, branch: int, scan: bool) -> OperatingPoint:
+def _placed(model: Model, rig: Rig, together: Together, branch: int, scan: bool) -> OperatingPoint:
     varied, valid = together.values, True
     if varied and scan:
         valid = valid_together(rig, "", varied)
@@ -185,9 +192,9 @@ def _placed(model: Model, rig: Slider, together: Together, branch: int, scan: bo
         check_together(rig, "", varied)
     values = {name: address.value for name, address in rig.parameters().items()} | varied
     if model.axial_share is not None:
-        values["slider.stiffness"] = values["slider.axial_stiffness"] * _axial_share(model)(values)
-    elif values["slider.stiffness"] is None:
-        values["slider.stiffness"] = 0.0  # a controller alone
+        for name, other in rig.instead.items():
+            values[other] = values[name] * _axial_share(model)(values)
+    values |= {name: 0.0 for name in rig.assumed if values[name] is None}  # a controller alone
     arguments = tuple(values[name] for name in model.parameters)
     return OperatingPoint(model, arguments, together.shape, together.wrap, branch, valid)
 
@@ -206,7 +213,7 @@ def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
     return lambda values: function(*(values[name] for name in names))[0]
 
 
-def _varied(rig: Slider, vary: Vary) -> Together:
+def _varied(rig: Rig, vary: Vary) -> Together:
     """Checked values by full name."""
     known, problems = rig.parameters(), []
     checked: dict[str, Any] = {}
@@ -218,10 +225,12 @@ def _varied(rig: Slider, vary: Vary) -> Together:
                 raise ParameterError(
                     [Problem(full, "got 0; without this term the rig has fewer states, ask for it apart")]
                 )
-            if known[full].value is None and full != "slider.stiffness":
+            if known[full].value is None and full not in rig.assumed:
                 raise ParameterError([Problem(full, "cannot be varied: the rig does not have it")])
-            if full == "slider.stiffness" and rig.axial_stiffness is not None:
-                raise ParameterError([Problem(full, "cannot be varied: the rig has axial_stiffness")])
+            for name, other in rig.instead.items():
+                if full == other and known[name].value is not None:
+                    given = name.rpartition(".")[2]
+                    raise ParameterError([Problem(full, f"cannot be varied: the rig has {given}")])
         except UnknownNameError as error:
             problems.append(Problem(name, str(error)))
         except ParameterError as error:

@@ -39,8 +39,8 @@ def stacked(parts: list[Any], point: OperatingPoint) -> Array:
     out = np.empty((*point.shape, len(parts)))
     for i, part in enumerate(parts):
         out[..., i] = part
-    if np.any(absent := np.isnan(point.sigma)):
-        out[np.broadcast_to(absent, point.shape)] = np.nan
+    if not np.all(exists := point.exists):
+        out[np.broadcast_to(~exists, point.shape)] = np.nan
     return out
 
 
@@ -70,7 +70,7 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
         known = ~beyond_floats(point.model, point.arguments, point.shape)
-        return np.asarray(known & (np.isnan(point.sigma) | (slopes & values)))
+        return np.asarray(known & (~point.exists | (slopes & values)))
 
 
 def surely_in_range(point: OperatingPoint, complete: bool) -> bool:

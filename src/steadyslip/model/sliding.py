@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, overload
 
+import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NoSteadySliding
@@ -14,11 +15,14 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.core.questions import question
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
-from steadyslip.model.steady import steady_equation
+from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 
 
 @dataclass(frozen=True)
@@ -56,13 +60,75 @@ class SteadySliding(Displayed):
         return "\n".join(rows)
 
 
+@dataclass(frozen=True)
+class SteadyContact:
+    """A contact of a machine in steady sliding.
+
+    Attributes
+    ----------
+    slip_rate : float
+        m/s.
+    normal_force, friction_force : float
+        N.
+    friction : float
+        The one over the other.
+    states : dict of str to float
+    """
+
+    slip_rate: float
+    normal_force: float
+    friction_force: float
+    friction: float
+    states: dict[str, float]
+
+
+@dataclass(frozen=True)
+class SteadyMachine(Displayed):
+    """The steady sliding of a machine: everything moves rigidly.
+
+    Attributes
+    ----------
+    velocity : float
+        Of the drive, m/s or rad/s.
+    speeds : dict of str to float
+        Of every body, m/s or rad/s.
+    contacts : dict of str to SteadyContact
+    links : dict of str to float
+        Force with which the first end of every link pulls the second, N along the slide or the link; N m in a shaft.
+    """
+
+    velocity: float
+    speeds: dict[str, float]
+    contacts: dict[str, SteadyContact]
+    links: dict[str, float]
+    units: dict[str, str] = field(repr=False)
+
+    def __str__(self) -> str:
+        rows = [f"steady sliding at {shown(self.velocity, self.units['drive'])}"]
+        rows += [f"  {name} moves at {shown(speed, self.units[name])}" for name, speed in self.speeds.items()]
+        for name, one in self.contacts.items():
+            rows.append(
+                f"  {name} slides at {shown(one.slip_rate, 'm/s')}: normal force {shown(one.normal_force, 'N')}, "
+                f"friction force {shown(one.friction_force, 'N')}, friction {one.friction:.4g}"
+            )
+        return "\n".join(rows)
+
+
+@overload
+def steady_state(rig: Slider) -> SteadySliding: ...
+
+
+@overload
+def steady_state(rig: Machine) -> SteadyMachine: ...
+
+
 @checked()
-def steady_state(rig: Slider) -> SteadySliding:
+def steady_state(rig: Slider | Machine) -> SteadySliding | SteadyMachine:
     """The steady sliding of a rig.
 
     Returns
     -------
-    SteadySliding
+    SteadySliding or SteadyMachine
         If there are several, the one with the lowest normal stress; see `steady_states`.
 
     Raises
@@ -72,7 +138,35 @@ def steady_state(rig: Slider) -> SteadySliding:
     NotAvailable
         If numbers leave the range of floating point.
     """
-    return steady_states(rig)[0]
+    return steady_machine(rig) if isinstance(rig, Machine) else steady_states(rig)[0]
+
+
+def steady_machine(rig: Machine) -> SteadyMachine:
+    """The steady sliding of a machine.
+
+    Raises
+    ------
+    NoSteadySliding
+        Naming the contact that locks up or lifts off.
+    """
+    point = operating_point(rig)
+    if not point.exists:
+        raise explain_absence(rig, point)
+    model = point.model
+    names, function = _observable_function(model)
+    numbers = dict(zip(names, (float(number) + 0.0 for number in point.evaluate(function)), strict=True))
+    contacts = {}
+    for contact in model.contacts:
+        own = {n.partition(".")[2]: x for n, x in numbers.items() if n.startswith(f"{contact.name}.")}
+        slip = float(point.evaluate(model.function([model.steady[contact.velocity]]))[0])
+        friction, force = own.pop("friction"), own.pop("friction_force")
+        normal = own.pop("normal_force")
+        contacts[contact.name] = SteadyContact(slip, normal, force, friction, own)
+    links = {n: numbers[f"links.{n}.force"] for n in rig.links}
+    units = {n: "rad/s" if body.turns else "m/s" for n, body in rig.bodies.items()}
+    units |= {"drive": "rad/s" if rig.drive.turns else "m/s"}
+    speeds = {n: float(speed) for n, speed in rig.speeds().items()}
+    return SteadyMachine(float(point.drive), speeds, contacts, links, units)
 
 
 @checked()
@@ -119,8 +213,8 @@ def _observable_function(model: Model) -> tuple[list[str], Callable[..., Any]]:
     return names, model.function(expressions)
 
 
-def explain_absence(rig: Slider, point: OperatingPoint) -> NoSteadySliding:
-    """The exception that says why a rig has no steady sliding.
+def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
+    """The exception that says why a rig has no steady sliding, of a machine which contact locks up or lifts off.
 
     Raises
     ------
@@ -128,40 +222,82 @@ def explain_absence(rig: Slider, point: OperatingPoint) -> NoSteadySliding:
         If the numbers leave the range of floating point.
     """
     require_range(point)
-    equation = steady_equation(point.model)
+    joint = joint_equation(point.model)
+    if joint is not None:
+        return _jointly_absent(point, joint)
+    missing = next(place for place, sigma in enumerate(point.sigmas) if not np.isfinite(sigma))
+    contact = point.model.contacts[missing]
+    law = rig.contacts[contact.name].contact if isinstance(rig, Machine) else rig.contact  # type: ignore[attr-defined]
+    area = rig.area_of(f"contacts.{contact.name}") if isinstance(rig, Machine) else rig.area  # type: ignore[attr-defined]
+    return _absent(point, missing, law, area)
+
+
+def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | None) -> NoSteadySliding:
+    """Why a contact that depends on no other has no steady normal stress."""
+    equation = steady_equation(point.model, place)
+    name = point.model.contacts[place].name
+    at = f" at contact {name}" if name else ""
+    force = "force" if name else "stress"
     if equation.parts is None:
         return NoSteadySliding(
-            "no steady sliding: no positive normal stress satisfies the contact law at the steady shear stress",
+            f"no steady sliding{at}: no positive normal {force} satisfies the contact law at the steady shear {force}",
             "no solution",
         )
     load, offset, slope = (float(part) for part in equation.parts(*point.arguments))
-    mu = _friction_coefficient(point)
+    mu = _friction_coefficient(point, place)
     if not slope < 1:
         margin = 1 - slope
-        hint = rig.contact.lock_up(mu)
+        hint = law.lock_up(mu)
         return NoSteadySliding(
-            "no steady sliding: lock-up. The pull raises friction by more than itself: "
+            f"no steady sliding: lock-up{at}. The pull raises friction by more than itself: "
             f"1 − μss dσ/dτ = {margin:.4g}, must be > 0" + (f"; {hint}" if hint else ""),
             "lock-up",
             margin,
         )
     remaining = load + offset
     return NoSteadySliding(
-        "no steady sliding: lift-off. The motion takes away more normal stress than the contact has: "
-        f"{shown(load, 'Pa', area=rig.area)} less {shown(-offset, 'Pa', area=rig.area)} leaves "
-        f"{shown(remaining, 'Pa', area=rig.area)}, must be > 0",
+        f"no steady sliding: lift-off{at}. The motion takes away more normal {force} than the contact has: "
+        f"{shown(load, 'Pa', area=area)} less {shown(-offset, 'Pa', area=area)} leaves "
+        f"{shown(remaining, 'Pa', area=area)}, must be > 0",
         "lift-off",
         remaining,
     )
 
 
+def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySliding:
+    """Why contacts that press on each other have no steady normal stresses."""
+    contacts = point.model.contacts
+    matrix, _ = joint.arrays(point.arguments)
+    sigma, gain = joint.solve(point.arguments)
+    if not gain < 1:
+        gains, modes = np.linalg.eig(matrix)
+        leading = np.abs(modes[:, np.argmin(np.abs(gains - gain))])
+        name = contacts[int(np.argmax(leading))].name
+        return NoSteadySliding(
+            f"no steady sliding: lock-up at contact {name}. Contacts press on each other by more than they are "
+            f"pressed: 1 − gain = {1 - gain:.4g}, must be > 0",
+            "lock-up",
+            float(1 - gain),
+        )
+    least = int(np.argmin(sigma))
+    force = point.evaluate(point.model.function([contacts[least].area]))[0] * sigma[least]
+    return NoSteadySliding(
+        f"no steady sliding: lift-off at contact {contacts[least].name}. Its normal force would be "
+        f"{shown(float(force), 'N')}, must be > 0",
+        "lift-off",
+        float(force),
+    )
+
+
 @question
-def _friction_function(model: Model) -> Callable[..., Any]:
-    contact = model.contact
-    return model.function([model.steady[contact.friction] / contact.sigma_ss])
+def _friction_function(model: Model, place: int) -> Callable[..., Any]:
+    contact = model.contacts[place]
+    others = [one.sigma_ss for one in model.contacts if one is not contact]
+    function = model.function([model.steady[contact.friction] / contact.sigma_ss])
+    return lambda arguments, stress: function(*arguments, *(stress for _ in (contact, *others)))
 
 
-def _friction_coefficient(point: OperatingPoint) -> float:
+def _friction_coefficient(point: OperatingPoint, place: int) -> float:
     """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact where τ is proportional to σ)."""
-    value = float(_friction_function(point.model)(*point.arguments, 1e6)[0])
+    value = float(_friction_function(point.model, place)(point.arguments, 1e6)[0])
     return value if math.isfinite(value) else float("nan")

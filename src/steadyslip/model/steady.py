@@ -23,6 +23,7 @@ Arguments = tuple[Any, ...]
 Array = np.ndarray
 GRID = np.geomspace(1e-12, 1e18, 6001)  # stresses between whose neighbours a root is looked for, Pa
 SOLVED = 1e-6  # misfit of a root as a share of its stress: a pole changes sign too
+_NEARLY_REAL = 1e-9  # relative imaginary part of what is real but for rounding
 _TOGETHER = 64  # rigs that are searched at once, so that arrays stay in the processor's cache
 _HALVINGS = 48  # of a cell of the grid, a hundredth of its stress wide, to rounding
 
@@ -50,14 +51,14 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
     Raises
     ------
     NotAvailable
-        If it depends on that of another contact: equations for several stresses at once are not solved yet. Or if no
-        place is named and there are several contacts.
+        If it depends on that of another contact (see `joint_equation`). Or if no place is named and there are several
+        contacts.
     """
     contact = model.contact if place is None else model.contacts[place]
     sigma = contact.sigma_ss
     others = {other.sigma_ss for other in model.contacts} - {sigma}
     if others & contact.steady_stress.free_symbols:
-        raise NotAvailable("contacts that press on each other in steady sliding are not offered yet")
+        raise NotAvailable("this contact is pressed by others; all steady normal stresses follow together")
     slope = derivative(contact.steady_coupling, sigma)
     given = contact.steady_load is None
     # where σss is given, the contact hands back that parameter and sigma_ss does not occur
@@ -71,6 +72,69 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
     parts = array_function(arguments, [load, offset, slope])
     solved = load if given else (load + offset) / (1 - slope)
     return SteadyEquation(True, given, residual, parts, solved, slope)
+
+
+@dataclass(frozen=True)
+class JointEquation:
+    """The steady normal stresses of contacts that press on each other: σ = A σ + b.
+
+    ``parts(*arguments)`` gives A, row by row, and b.
+    """
+
+    size: int
+    parts: Callable[..., Any]
+
+    def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
+        """A (..., n, n) and b (..., n)."""
+        found = np.broadcast_arrays(*(np.asarray(e, dtype=float) for e in self.parts(*arguments)))
+        count = self.size**2
+        matrix = np.stack(found[:count], axis=-1)
+        return matrix.reshape(*matrix.shape[:-1], self.size, self.size), np.stack(found[count:], axis=-1)
+
+    def solve(self, arguments: Arguments) -> tuple[Array, Array]:
+        """σ (..., n), and the largest real eigenvalue of A, −inf where none is real: at one and above it is lock-up."""
+        matrix, right = self.arrays(arguments)
+        good = np.all(np.isfinite(matrix), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1)
+        matrix = np.where(good[..., None, None], matrix, 0.0)
+        gains = np.linalg.eigvals(matrix)
+        largest = np.max(np.where(np.abs(gains.imag) <= _NEARLY_REAL * np.abs(gains), gains.real, -np.inf), axis=-1)
+        left = np.eye(self.size) - matrix
+        left = np.where((np.linalg.det(left) == 0)[..., None, None], np.nan, left)
+        with np.errstate(all="ignore"):
+            sigma = np.linalg.solve(left, np.where(good[..., None], right, np.nan)[..., None])[..., 0]
+        return sigma, largest
+
+
+@question
+def joint_equation(model: Model) -> JointEquation | None:
+    """How contacts that press on each other determine their steady normal stresses; None where none does.
+
+    Raises
+    ------
+    NotAvailable
+        If some contact is not linear in the stresses.
+    """
+    sigmas = [contact.sigma_ss for contact in model.contacts]
+    slopes = [[derivative(contact.steady_stress, sigma) for sigma in sigmas] for contact in model.contacts]
+    size = len(sigmas)
+    if all(slopes[i][j] == 0 for i in range(size) for j in range(size) if i != j):
+        return None
+    if any(slope.free_symbols & set(sigmas) for row in slopes for slope in row):
+        raise NotAvailable("contacts that press on each other must be linear in the stresses; these are not")
+    nothing = dict.fromkeys(sigmas, sp.Integer(0))
+    rest = [contact.steady_stress.xreplace(nothing) for contact in model.contacts]
+    arguments = list(model.parameters.values())
+    return JointEquation(size, array_function(arguments, [*(slope for row in slopes for slope in row), *rest]))
+
+
+def steady_stresses(model: Model, arguments: Arguments, branch: int) -> tuple[Any, ...]:
+    """σss (Pa) of every contact as arrays over the varied parameters, NaN where steady sliding does not exist."""
+    joint = joint_equation(model)
+    if joint is None:
+        return tuple(steady_stress(model, arguments, branch, place) for place in range(len(model.contacts)))
+    sigma, gain = joint.solve(arguments)
+    good = (gain < 1) & np.all(sigma > 0, axis=-1)
+    return tuple(np.where(good, sigma[..., i], np.nan)[()] for i in range(joint.size))
 
 
 def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -> Any:
@@ -89,6 +153,10 @@ def steady_stress(model: Model, arguments: Arguments, branch: int, place: int) -
 def beyond_floats(model: Model, arguments: Arguments, shape: tuple[int, ...]) -> Any:
     """Where an equation for σss leaves the range of floating point, so that nothing can be said."""
     found = np.zeros(shape, dtype=bool)
+    joint = joint_equation(model)
+    if joint is not None:
+        matrix, right = joint.arrays(arguments)
+        return found | ~(np.all(np.isfinite(matrix), axis=(-2, -1)) & np.all(np.isfinite(right), axis=-1))
     for equation in (steady_equation(model, place) for place in range(len(model.contacts))):
         if equation.parts is not None:
             found |= ~np.isfinite(sum(np.broadcast_to(part, shape) for part in equation.parts(*arguments)))

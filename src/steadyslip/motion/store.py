@@ -87,7 +87,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
     """
-    from steadyslip.files.specifications import protocol_from_text, rig_from_text
+    from steadyslip.files.specifications import protocol_from_text, slider_from_text
     from steadyslip.model import build_model
     from steadyslip.protocol import Protocol
 
@@ -95,7 +95,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     attributes = table.attributes
     _check_words(table)
     try:
-        rig = rig_from_text(attributes["rig"], str(path))
+        rig = slider_from_text(attributes["rig"], str(path))
         protocol = protocol_from_text(attributes["rig"], str(path)) or Protocol()
         units = {"t": "s"} | observable_units(build_model(rig))
     except SteadyslipError as error:

@@ -27,6 +27,7 @@ class Piece(FrozenRecord, family="protocol piece"):
     Fields may be plain numbers or 1-D arrays with one value for each lane.
     """
 
+    chosen_by: ClassVar[tuple[str, str | None]] = ("kind", None)
     channel: ClassVar[int] = LOAD_POINT
 
     def curve(self, before: Any) -> Curve | None:

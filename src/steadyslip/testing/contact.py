@@ -85,8 +85,9 @@ class _Statement:
         x, acceleration, spring, steady_spring, tau, steady_tau = sp.symbols("x a T T_ss tau tau_ss", real=True)
         v, v0 = sp.symbols("v v_0", positive=True)
         k = sp.Symbol("k", nonnegative=True)
-        self.motion = Motion(x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0)
-        self.inputs = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0)
+        apart = sp.symbols("u u_ss u_dot", real=True)
+        self.inputs = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0, *apart)
+        self.motion = Motion(*self.inputs)
         self.stress = stated(contact, "normal_stress", self.copy.normal_stress, self.motion)
         require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
 

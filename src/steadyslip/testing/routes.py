@@ -72,11 +72,11 @@ def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE)
 def round_trip(law: FrozenRecord, rig: Slider) -> None:
     """Write `rig` as text, read it back, and compare."""
     from steadyslip.core.errors import SteadyslipError
-    from steadyslip.files.specifications import rig_from_text, rig_to_text
+    from steadyslip.files.specifications import rig_to_text, slider_from_text
 
     text = rig_to_text(rig)
     try:
-        back = rig_from_text(text)
+        back = slider_from_text(text)
     except SteadyslipError as error:
         require(False, law, f"a rig file with it cannot be read back: {error}\n{text}")
     require(back == rig, law, f"a rig file changes it: wrote\n{text}\nand read back {back!r}")

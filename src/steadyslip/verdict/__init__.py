@@ -1,6 +1,7 @@
 """The verdict on one rig: gathers steady sliding, linear stability and edges, and says it in words."""
 
 from steadyslip.verdict.analyze import Analysis, analyze
+from steadyslip.verdict.machine import MachineAnalysis
 from steadyslip.verdict.tolerances import Tolerated, tolerate
 
-__all__ = ["Analysis", "Tolerated", "analyze", "tolerate"]
+__all__ = ["Analysis", "MachineAnalysis", "Tolerated", "analyze", "tolerate"]

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -17,16 +17,17 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
-from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
 from steadyslip.linear.status import decided_by_rounding, on_edge
-from steadyslip.linear.stiffness import ill_posed, set_of_one
+from steadyslip.linear.stiffness import set_of_one
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.range import characteristic, require_range
 from steadyslip.model.sliding import SteadySliding, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
 from steadyslip.verdict.export import as_dict
 from steadyslip.verdict.findings import Findings
+from steadyslip.verdict.machine import MachineAnalysis, analyze_machine
+from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.words import headline, verdict
 
 if TYPE_CHECKING:
@@ -62,13 +63,21 @@ class Analysis(Findings):  # noqa: D101 -- its base has it
         return f"<Analysis: {headline(self)}; print it for the whole verdict>"
 
 
+@overload
+def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis: ...
+
+
+@overload
+def analyze(rig: Machine, *, branch: int = 0, kick: str | Sequence[str] = ()) -> MachineAnalysis: ...
+
+
 @checked()
-def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis:
+def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str] = ()) -> Analysis | MachineAnalysis:
     """Verdict on a rig.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     branch : int
         Which steady sliding to judge where there are several, by rising normal stress.
     kick : str or sequence of str
@@ -77,31 +86,39 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
 
     Returns
     -------
-    Analysis
+    Analysis or MachineAnalysis
         With ``stable = None`` and the reason if steady sliding does not exist.
 
     Raises
     ------
     ParameterError
-        If `rig` is not a Slider.
+        If `rig` is neither a Slider nor a Machine.
     NotAvailable
-        If `branch` does not exist, or the numbers of the rig leave the range of floating point.
+        If `branch` does not exist, kicks are asked for of a machine, or the numbers of the rig leave the range of
+        floating point.
     """
+    if isinstance(rig, Machine):
+        if branch or kick:
+            raise NotAvailable("branches and kicks are not offered for a machine yet; its verdict is, without them")
+        return analyze_machine(rig)
+    if not isinstance(rig, Slider):
+        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider or a Machine, such as read_rig gives")])
+    return _analyze_slider(rig, branch, (kick,) if isinstance(kick, str) else tuple(kick))
+
+
+def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysis:
     from steadyslip import __version__
 
-    if not isinstance(rig, Slider):
-        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig gives")])
     with np.errstate(all="ignore"):
         try:
             states = steady_states(rig)
         except NoSteadySliding as error:
-            return Analysis(
-                rig, None, str(error).removeprefix("no steady sliding: "), None, margins(rig), version=__version__
-            )
+            why = str(error).removeprefix("no steady sliding: ")
+            return Analysis(rig=rig, stable=None, reason=why, margins=margins(rig), version=__version__)
         if not 0 <= branch < len(states):
             raise NotAvailable(f"branch {branch} does not exist; this rig has {len(states)} steady sliding state(s)")
         values = operating_point(rig, None, present_zeros(rig), branch)
-        numbers = linear_numbers(rig, values)
+        numbers = numbers_of(rig, values)
         on_the_edge = bool(on_edge(values)) or decided_by_rounding(values)
         distances = margins(rig, branch=branch)
         found = Analysis(
@@ -110,7 +127,7 @@ def analyze(rig: Slider, *, branch: int = 0, kick: str | Sequence[str] = ()) -> 
             reason="",
             margins=distances,
             onset=_onset(rig, distances, branch),
-            kicks=_kicks(rig, (kick,) if isinstance(kick, str) else tuple(kick), branch),
+            kicks=_kicks(rig, kicks, branch),
             on_edge=on_the_edge,
             branch=branch,
             warnings=_warnings(rig, values, states, on_the_edge),
@@ -142,29 +159,9 @@ def _kicks(rig: Slider, kinds: tuple[str, ...], branch: int) -> tuple[Threshold,
     return thresholds_shown(rig, kinds, branch=branch).found
 
 
-def linear_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
-    """Everything that follows from the characteristic polynomial."""
-    require_range(values)
-    c = characteristic(values)
-    bad = bool(ill_posed(c))
-    while len(c) > 2 and c[-1] == 0:
-        c = c[:-1]
-    eigenvalues = roots(c)
-    numbers: dict[str, Any] = {
-        "stable": bool(is_hurwitz(c)) and not bad,
-        "eigenvalues": tuple(complex(s) for s in eigenvalues),
-        "characteristic_polynomial": tuple(float(x) for x in c),
-        "routh": tuple(float(x) for x in routh_column(c)),
-    }
-    growth = math.inf if bad else float(eigenvalues[0].real)
-    numbers["growth_rate"] = growth
-    if math.isfinite(growth) and growth != 0:
-        numbers["time_to_halve" if growth < 0 else "time_to_double"] = math.log(2) / abs(growth)
-    oscillation = next((s for s in eigenvalues if s.imag != 0), None)
-    if oscillation is not None:
-        numbers["period"] = float(2 * math.pi / abs(oscillation.imag))
-        numbers["damping_ratio"] = float(-oscillation.real / abs(oscillation))
-    return numbers | _stiffness_numbers(rig, values)
+def numbers_of(rig: Slider, values: OperatingPoint) -> dict[str, Any]:
+    """Everything that follows from the characteristic polynomial, the stable set in k included."""
+    return linear_numbers(values) | _stiffness_numbers(rig, values)
 
 
 def _stiffness_numbers(rig: Slider, values: OperatingPoint) -> dict[str, Any]:

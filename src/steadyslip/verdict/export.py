@@ -10,17 +10,15 @@ from steadyslip.core.quantities import total
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
     from steadyslip.nonlinear.onset.hopf import Onset
-    from steadyslip.verdict.findings import Findings
+    from steadyslip.verdict.findings import Findings, Verdict
 
 
 def as_dict(analysis: Findings) -> dict[str, Any]:
     """SI units per unit area; numbers that do not exist, and infinite ones, are None."""
     steady = analysis.steady
+    common = common_numbers(analysis)
     data: dict[str, Any] = {
-        "version": analysis.version,
-        "stable": analysis.stable,
-        "on_edge": analysis.on_edge,
-        "reason": analysis.reason,
+        **{name: common[name] for name in ("version", "stable", "on_edge", "reason")},
         "steady": None
         if steady is None
         else {
@@ -36,22 +34,35 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
         "critical_angular_frequency": analysis.critical_angular_frequency,
         "critical_axial_stiffness": analysis.critical_axial_stiffness,
         "stable_stiffness": [[low, _finite(high)] for low, high in analysis.stable_stiffness],
-        "eigenvalues": [[s.real, s.imag] for s in analysis.eigenvalues],
-        "characteristic_polynomial": list(analysis.characteristic_polynomial),
-        "routh": list(analysis.routh),
-        "growth_rate": _finite(analysis.growth_rate),
-        "period": analysis.period,
-        "damping_ratio": analysis.damping_ratio,
-        "time_to_halve": analysis.time_to_halve,
-        "time_to_double": analysis.time_to_double,
+        **{name: value for name, value in common.items() if name not in ("boundaries", "warnings")},
         "onset": None if analysis.onset is None else _onset(analysis.onset, analysis.rig.area),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
-        "boundaries": [row for margin in analysis.margins for row in _edges(margin, analysis.rig.area)],
-        "warnings": list(analysis.warnings),
+        "boundaries": common["boundaries"],
+        "warnings": common["warnings"],
     }
     if analysis.rig.area is not None:
         data["forces"] = _forces(analysis, analysis.rig.area)
     return data
+
+
+def common_numbers(found: Verdict) -> dict[str, Any]:
+    """What sliders and machines have alike."""
+    return {
+        "version": found.version,
+        "stable": found.stable,
+        "on_edge": found.on_edge,
+        "reason": found.reason,
+        "eigenvalues": [[s.real, s.imag] for s in found.eigenvalues],
+        "characteristic_polynomial": list(found.characteristic_polynomial),
+        "routh": list(found.routh),
+        "growth_rate": _finite(found.growth_rate),
+        "period": found.period,
+        "damping_ratio": found.damping_ratio,
+        "time_to_halve": found.time_to_halve,
+        "time_to_double": found.time_to_double,
+        "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
+        "warnings": list(found.warnings),
+    }
 
 
 def _onset(onset: Onset, area: float | None) -> dict[str, Any]:

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.pages import Displayed
 from steadyslip.linear.boundary import Margin
+from steadyslip.linear.modes import Mode
 from steadyslip.linear.search import Boundary
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.model.sliding import SteadySliding
+from steadyslip.model.sliding import SteadyMachine, SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset
 
 if TYPE_CHECKING:
@@ -17,7 +20,33 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Findings(Displayed):
+class Verdict(Displayed):
+    """What is said of sliders and machines alike: whether sliding is stable, what disturbances do, where edges are."""
+
+    rig: Rig
+    stable: bool | None
+    reason: str
+    margins: tuple[Margin, ...]
+    warnings: tuple[str, ...] = ()
+    eigenvalues: tuple[complex, ...] = ()
+    characteristic_polynomial: tuple[float, ...] = ()
+    routh: tuple[float, ...] = ()
+    growth_rate: float | None = None
+    period: float | None = None
+    damping_ratio: float | None = None
+    time_to_halve: float | None = None
+    time_to_double: float | None = None
+    on_edge: bool = False
+    version: str = field(default="", repr=False)
+
+    @property
+    def boundaries(self) -> tuple[Boundary, ...]:
+        """Every edge found, parameter by parameter."""
+        return tuple(edge for margin in self.margins for edge in margin.edges)
+
+
+@dataclass(frozen=True, repr=False)
+class Findings(Verdict):
     """Verdict on one rig; printing it gives the verdict in words.
 
     Attributes
@@ -66,31 +95,43 @@ class Findings(Displayed):
     """
 
     rig: Slider
-    stable: bool | None
-    reason: str
-    steady: SteadySliding | None
-    margins: tuple[Margin, ...]
-    warnings: tuple[str, ...] = ()
+    steady: SteadySliding | None = None
     critical_stiffness: float | None = None
     critical_side: str | None = None
     critical_angular_frequency: float | None = None
     critical_axial_stiffness: float | None = None
     stable_stiffness: tuple[tuple[float, float], ...] = ()
-    eigenvalues: tuple[complex, ...] = ()
-    characteristic_polynomial: tuple[float, ...] = ()
-    routh: tuple[float, ...] = ()
-    growth_rate: float | None = None
-    period: float | None = None
-    damping_ratio: float | None = None
-    time_to_halve: float | None = None
-    time_to_double: float | None = None
-    on_edge: bool = False
     branch: int = 0
     onset: Onset | None = None
     kicks: tuple[Threshold, ...] = ()
-    version: str = field(default="", repr=False)
 
-    @property
-    def boundaries(self) -> tuple[Boundary, ...]:
-        """Every edge found, parameter by parameter."""
-        return tuple(edge for margin in self.margins for edge in margin.edges)
+
+@dataclass(frozen=True, repr=False)
+class MachineFindings(Verdict):
+    """Verdict on one machine; printing it gives the verdict in words.
+
+    Attributes
+    ----------
+    rig : Machine
+    stable : bool or None
+        Whether small disturbances of steady sliding die out; None if steady sliding does not exist.
+    reason : str
+        Why, in one sentence; without steady sliding, which contact locks up or lifts off.
+    steady : SteadyMachine or None
+    mode : Mode or None
+        How the machine moves in the mode that grows fastest, or decays slowest.
+    eigenvalues : tuple of complex
+        1/s, by falling real part.
+    characteristic_polynomial, routh : tuple of float
+        Coefficients, lowest power first; first column of the Routh array, stable if all are positive.
+    growth_rate, period, damping_ratio, time_to_halve, time_to_double : float or None
+        As for a slider.
+    on_edge : bool
+    margins : tuple of Margin
+        Distance of each parameter to its nearest edge, the most critical first.
+    warnings : tuple of str
+    """
+
+    rig: Machine
+    steady: SteadyMachine | None = None
+    mode: Mode | None = None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from steadyslip.machine.slider import Slider
     from steadyslip.nonlinear.kicks.threshold import Threshold
     from steadyslip.nonlinear.onset.hopf import Onset
-    from steadyslip.verdict.findings import Findings
+    from steadyslip.verdict.findings import Findings, Verdict
 
 NEXT_TO_IT = 1e-6  # change of a parameter that only its weak effect sets apart from the edge that the rig is on
 
@@ -28,7 +28,7 @@ _ONSETS = {
     "degenerate": "at the edge in stiffness, small oscillations neither grow nor decay to lowest order",
 }
 
-_BEYOND = {
+BEYOND = {
     "oscillatory": "an oscillation grows",
     "divergence": "a disturbance grows without oscillating",
     "ill-posed": "the equations become ill-posed",
@@ -40,11 +40,16 @@ _BEYOND = {
 
 def verdict(analysis: Findings) -> str:
     """The whole verdict as text, at most some 100 columns wide."""
+    return lines_of(analysis, facts(analysis), margin_table(analysis), meaning(analysis))
+
+
+def lines_of(analysis: Verdict, known: list[tuple[str, str]], edges: list[str], meant: list[str]) -> str:
+    """Headline, reason, facts, edges, what is meant and warnings, one below the other."""
     lines = [headline(analysis), *textwrap.wrap(analysis.reason, 98, initial_indent="  ", subsequent_indent="  "), ""]
-    for name, text in facts(analysis):
+    for name, text in known:
         lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
-    lines += _margin_table(analysis)
-    lines += ["", *meant] if (meant := meaning(analysis)) else []
+    lines += edges
+    lines += ["", *meant] if meant else []
     for text in analysis.warnings:
         lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
     return "\n".join(line for i, line in enumerate(lines) if line or (i and lines[i - 1]))
@@ -73,9 +78,10 @@ def _limited(rig: Slider) -> bool:
     return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
-def headline(analysis: Findings) -> str:
+def headline(analysis: Verdict) -> str:
     """The first line: stable, unstable, on the edge, or no steady sliding."""
-    speed = shown(analysis.rig.drive.velocity, "m/s")
+    drive = analysis.rig.parameters()["drive.velocity"]
+    speed = shown(float(drive.value or 0.0), drive.role.unit)
     if analysis.stable is None:
         return f"NO STEADY SLIDING at {speed}"
     if analysis.on_edge:
@@ -141,7 +147,7 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
             f"normal {force} {_stress(analysis, steady.normal_stress)}, "
             f"shear {force} {_stress(analysis, steady.shear_stress)}, friction {steady.friction:.4g}",
         ),
-        ("a disturbance", _disturbance(analysis)),
+        ("a disturbance", disturbance(analysis)),
         ("stable for", _stable_set(analysis)),
     ]
     beta = analysis.critical_angular_frequency
@@ -191,7 +197,8 @@ def _survived(kick: Threshold) -> str:
     return f"survives {what} {survived}; {why} from there to {amount}{edge}{reason}; {after}"
 
 
-def _disturbance(analysis: Findings) -> str:
+def disturbance(analysis: Verdict) -> str:
+    """What becomes of a small disturbance."""
     if analysis.growth_rate == math.inf:
         return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
     if analysis.on_edge:
@@ -223,13 +230,13 @@ def _stable_set(analysis: Findings) -> str:
     return ", or ".join(parts) or "no stiffness"
 
 
-def edge_rows(analysis: Findings) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
+def edge_rows(analysis: Verdict) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
     """Of every parameter with an edge: name, value, edge, change and what happens beyond; names of those without."""
     rows = [_margin_row(analysis, margin) for margin in analysis.margins if margin.edge is not None]
     return rows, [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
 
 
-def _margin_table(analysis: Findings) -> list[str]:
+def margin_table(analysis: Verdict) -> list[str]:
     """The nearest edge of each parameter, the others unchanged."""
     if not analysis.margins:
         return []
@@ -247,7 +254,7 @@ def _margin_table(analysis: Findings) -> list[str]:
     return lines
 
 
-def _margin_row(analysis: Findings, margin: Margin) -> tuple[str, str, str, str, str]:
+def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str]:
     edge = margin.edge
     if edge is None:
         raise InternalError("edge is not None")
@@ -267,18 +274,20 @@ def _margin_row(analysis: Findings, margin: Margin) -> tuple[str, str, str, str,
     elif analysis.stable is None:
         words = "slides steadily, but unstable"
     else:
-        words = _BEYOND.get(edge.kind, edge.kind)
+        words = BEYOND.get(edge.kind, edge.kind)
     return (
         _short(analysis, margin.parameter),
-        _quantity(analysis, margin.value, margin.unit),
-        _quantity(analysis, edge.value, margin.unit),
+        shown(margin.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
+        shown(edge.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
         change,
         words,
     )
 
 
-def _short(analysis: Findings, name: str) -> str:
+def _short(analysis: Verdict, name: str) -> str:
     """The dotted name without its middle: friction.alpha for friction.normal_memory.alpha."""
+    if name.startswith("contacts."):
+        return name  # of which contact matters
     first, _, last = name.partition(".")[0], ".", name.rpartition(".")[2]
     known = analysis.rig.parameters()
     try:

@@ -202,13 +202,13 @@ def _record(
 
 def _plan(table: ExpectedTable, records: tuple[Record, ...], options: dict[str, Any], weights: Any) -> Plan:
     """The plan, checked as if a user gave it."""
-    from steadyslip.files.specifications import protocol_from_text, rig_from_text
+    from steadyslip.files.specifications import protocol_from_text, slider_from_text
 
     text, source = table.attributes["rig"], str(table.path)
     free, rtol, drive = options.pop("free"), options.pop("rtol"), options.pop("drive")
     commanded = drive == "protocol"
     try:
-        rig = rig_from_text(text, source)
+        rig = slider_from_text(text, source)
         plan = make_plan(
             rig, records, free, fixed=[name for name in rig.of_kind("friction level") if name not in free],
             protocol=protocol_from_text(text, source) if commanded else None,

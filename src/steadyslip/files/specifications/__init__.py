@@ -7,7 +7,7 @@ executes code; laws are found by registered name or installed entry point.
 
 from steadyslip.files.specifications.changes import named_value
 from steadyslip.files.specifications.protocols import piece_from_text, protocol_from_text, read_protocol
-from steadyslip.files.specifications.read import read_rig, rig_from_text
+from steadyslip.files.specifications.read import read_rig, read_slider, rig_from_text, slider_from_text
 from steadyslip.files.specifications.write import rig_to_text, write_rig
 
 __all__ = [
@@ -16,7 +16,9 @@ __all__ = [
     "protocol_from_text",
     "read_protocol",
     "read_rig",
+    "read_slider",
     "rig_from_text",
     "rig_to_text",
+    "slider_from_text",
     "write_rig",
 ]

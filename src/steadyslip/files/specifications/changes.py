@@ -6,7 +6,15 @@ from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
 from steadyslip.core.records import FrozenRecord, Part, resolve
-from steadyslip.files.specifications.layout import PROTOCOL, has_choice, own_fields, sections, selector
+from steadyslip.files.specifications.layout import (
+    PROTOCOL,
+    has_choice,
+    is_machine,
+    machine_sections,
+    own_fields,
+    sections,
+    selector,
+)
 from steadyslip.files.specifications.toml import NotToml, Table, tables_of
 from steadyslip.machine.slider import Slider
 
@@ -84,16 +92,23 @@ def full_name(name: str, tables: Table) -> tuple[str, list[Problem]]:
     try:
         return resolve(name, known), []
     except UnknownNameError as error:
-        return name, [] if "." in name else [Problem(name, str(error))]
+        keyed = is_machine(tables) and any(name.startswith(f"{s.name}.") for s in machine_sections() if s.keyed)
+        return name, [] if "." in name and not keyed else [Problem(name, str(error))]
 
 
 def _known_names(tables: Table) -> list[str]:
     """Every dotted name that the laws chosen in the file know."""
     names: list[str] = []
-    for section in sections():
+    machine = is_machine(tables)
+    for section in machine_sections() if machine else sections():
         table = tables.get(section.name)
         if section.family is None:
             names += _names_of(Slider, {}, section.name + ".")
+        elif section.keyed and isinstance(table, dict):
+            below = _names_chosen if has_choice(section.family) else _names_of
+            for key, member in table.items():
+                if isinstance(member, dict):
+                    names += below(section.family, member, f"{section.name}.{key}.")
         elif isinstance(table, dict):
             names.append(f"{section.name}.{selector(section.family)[0]}")
             names += _names_chosen(section.family, table, section.name + ".")

@@ -9,9 +9,10 @@ from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.records import Declared, FrozenRecord, Part, role_of
-from steadyslip.machine.drive import Drive
+from steadyslip.files.specifications.toml import Table
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.protocol import Piece, Protocol
+from steadyslip.protocol import Protocol
 
 ENTRY_POINTS = "steadyslip.laws"
 
@@ -29,12 +30,15 @@ class Section:
         Whether a file that is read for it must have it.
     hint : str
         What to write in it, for messages.
+    keyed : bool
+        Whether it holds a table for each of some names that the user gives.
     """
 
     name: str
     family: type[FrozenRecord] | None
     required: bool = False
     hint: str = ""
+    keyed: bool = False
 
 
 PROTOCOL = Section("protocol", Protocol)
@@ -51,11 +55,20 @@ def sections() -> tuple[Section, ...]:
     return tuple(found)
 
 
+def machine_sections() -> tuple[Section, ...]:
+    """The tables of a machine, in order."""
+    found = [(item.name, role) for item in fields(Machine) if isinstance(role := role_of(item), Part)]
+    return tuple(Section(name, role.family, keyed=role.keyed) for name, role in found)
+
+
+def is_machine(tables: Table) -> bool:
+    """Whether a file describes a machine, not a slider: it has a table that only machines have."""
+    return any(section.name in tables for section in machine_sections() if section.keyed)
+
+
 def selector(family: type[FrozenRecord]) -> tuple[str, str | None]:
     """The key that names the law of a table, and the law meant when it is absent."""
-    if family is Piece:
-        return "kind", None
-    return ("control", "steady") if family is Drive else ("law", None)
+    return family.chosen_by
 
 
 def has_choice(family: type[FrozenRecord]) -> bool:

@@ -5,23 +5,43 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
+from typing import Any
 
-from steadyslip.core.errors import InternalError, ParameterError, Problem, RigFileError, came, unknown_name
+from steadyslip.core.errors import (
+    MACHINES_CAN,
+    InternalError,
+    NotAvailable,
+    ParameterError,
+    Problem,
+    RigFileError,
+    came,
+    unknown_name,
+)
 from steadyslip.core.options import checked
-from steadyslip.core.records import FrozenRecord
+from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.files.specifications.changes import apply, full_name, split
-from steadyslip.files.specifications.layout import MAP, PROTOCOL, Section, sections, selector
+from steadyslip.files.specifications.layout import (
+    MAP,
+    PROTOCOL,
+    Section,
+    is_machine,
+    machine_sections,
+    sections,
+    selector,
+)
 from steadyslip.files.specifications.lines import key_lines, line_of
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import NotToml, Table, tables_of
+from steadyslip.machine.ends import unknown_ends
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
 
 @checked()
-def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
+def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider | Machine:
     """Read a rig file.
 
     Parameters
@@ -33,7 +53,8 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
 
     Returns
     -------
-    Slider
+    Slider or Machine
+        A machine where the file has tables of bodies, links or contacts.
 
     Raises
     ------
@@ -41,6 +62,18 @@ def read_rig(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
         If the file cannot be read or anything in it is wrong; ``problems`` lists everything.
     """
     return rig_from_text(text_of(path), str(path), changes)
+
+
+@checked()
+def read_slider(path: str | PathLike[str], changes: Iterable[str] = ()) -> Slider:
+    """`read_rig` for what is offered for sliders only.
+
+    Raises
+    ------
+    NotAvailable
+        If the file describes a machine.
+    """
+    return slider_from_text(text_of(path), str(path), changes)
 
 
 def text_of(path: str | PathLike[str]) -> str:
@@ -55,8 +88,15 @@ def text_of(path: str | PathLike[str]) -> str:
 
 
 @checked()
-def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
+def rig_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider | Machine:
     """Read a rig from TOML text; see `read_rig`."""
+    found = read_specification(_not_empty(text, source), source, changes)
+    found.refuse()
+    return found.checked_rig() if found.machine is None else found.machine
+
+
+def slider_from_text(text: str, source: str = "rig", changes: Iterable[str] = ()) -> Slider:
+    """`rig_from_text` for what is offered for sliders only; NotAvailable for a machine."""
     return read_specification(_not_empty(text, source), source, changes).checked_rig()
 
 
@@ -75,6 +115,8 @@ class Specification:
     ----------
     rig : Slider or None
         None where there is none, or it is faulty.
+    machine : Machine or None
+        In place of a rig.
     protocol : Protocol or None
     further : dict of str to FrozenRecord
         What the declared further tables say; of a faulty table, what is right in it.
@@ -85,6 +127,7 @@ class Specification:
 
     source: str
     rig: Slider | None
+    machine: Machine | None
     protocol: Protocol | None
     further: dict[str, FrozenRecord]
     problems: list[Problem]
@@ -102,14 +145,22 @@ class Specification:
             found = [Problem(p.name, p.message, p.line or self.line(p.name)) for p in every]
             raise RigFileError(sorted(found, key=lambda p: (p.line is None, p.line or 0)), title=self.source)
 
+    def refuse_machine(self) -> None:
+        """Refuse a machine where only sliders are offered."""
+        if self.machine is not None:
+            raise NotAvailable(f"this is not offered for a machine yet; {MACHINES_CAN}")
+
     def checked_rig(self, *others: Problem) -> Slider:
-        """The rig of a file in which nothing is wrong.
+        """The slider of a file in which nothing is wrong.
 
         Raises
         ------
         RigFileError
             Listing everything that is.
+        NotAvailable
+            If the file describes a machine.
         """
+        self.refuse_machine()
         self.refuse(*others)
         if self.rig is None:
             raise InternalError("a rig, or problems")
@@ -163,11 +214,13 @@ def read_tables(
     for change in [change for change in every if change not in own]:
         changed.add(full_name(split(change)[0], tables)[0])
         reader.problems += apply(change, tables, lines)
-    rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
+    found_rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
     protocol = reader.protocol()
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
-    return Specification(source, rig, protocol, said, reader.problems, changed, lines)
+    rig = found_rig if isinstance(found_rig, Slider) else None
+    machine = found_rig if isinstance(found_rig, Machine) else None
+    return Specification(source, rig, machine, protocol, said, reader.problems, changed, lines)
 
 
 def _not_empty(text: str, source: str) -> str:
@@ -188,12 +241,38 @@ class _SpecificationReader(TableReader):
         super().__init__()
         self.tables = tables
 
-    def rig(self, further: Iterable[str]) -> Slider | None:
-        before = len(self.problems)
-        known = {section.name for section in (*sections(), PROTOCOL)} | {MAP, *further}
+    def rig(self, further: Iterable[str]) -> Slider | Machine | None:
+        self._unknown_tables(machine_sections() if is_machine(self.tables) else sections(), further)
+        return self._machine() if is_machine(self.tables) else self._slider()
+
+    def _unknown_tables(self, own: Iterable[Section], further: Iterable[str]) -> None:
+        known = {section.name for section in (*own, PROTOCOL)} | {MAP, *further}
         for name in self.tables:
             if name not in known:
                 self.problem(name, unknown_name("table", name, sorted(known)))
+
+    def _machine(self) -> Machine | None:
+        """A machine; with faulty tables, what the others say of bodies and links that do not exist is found too."""
+        before = len(self.problems)
+        found: dict[str, Any] = {}
+        for section in machine_sections():
+            if section.family is None:
+                raise InternalError("section.family is not None")
+            if section.name not in self.tables and section.name != "links":
+                name = f"{section.name}.NAME" if section.keyed else section.name
+                self.problem(section.name, f"missing table; write [{name}] with its parameters")
+            elif section.keyed:
+                raw = self.tables.get(section.name, {})
+                found[section.name] = self.members(Part(section.family, "", keyed=True), raw, section.name)
+            else:
+                found[section.name] = self.record(section.family, self._table(section.name), f"{section.name}.")
+        if len(self.problems) == before:
+            return self._built(Machine, found, "")  # type: ignore[return-value]
+        self.problems += list(unknown_ends(self.tables))
+        return None
+
+    def _slider(self) -> Slider | None:
+        before = len(self.problems)
         own = self._table("slider")
         self._read_area(own)
         parts = {s.name: self._section(s) for s in sections() if s.family is not None}

@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from steadyslip.core.errors import InternalError
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, is_required, key_of
 from steadyslip.core.roles import Schema
-from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
+from steadyslip.files.specifications.layout import (
+    PROTOCOL,
+    Section,
+    has_choice,
+    machine_sections,
+    own_fields,
+    sections,
+    selector,
+)
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
@@ -23,10 +32,26 @@ def rig_schema(further: Sequence[Section] = ()) -> Schema:
             properties[section.name] = _table(Slider, {}, "the block, its spring and dampers")
         else:
             properties[section.name] = _family(section.family)
+    slider = [section.name for section in sections() if section.family is not None]
+    for section in machine_sections():
+        if section.family is None:
+            raise InternalError("section.family is not None")
+        table = (
+            _by_key(section.family, section.family.family or "contacts") if section.keyed else _family(section.family)
+        )
+        both = [properties[section.name], table] if section.name in properties else None
+        properties[section.name] = table if both is None else {"anyOf": both}
     properties[PROTOCOL.name] = protocol_schema()
     properties |= further_schema(further)
-    required = [section.name for section in sections() if section.family is not None]
-    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+    machine = [section.name for section in machine_sections() if section.name != "links"]
+    either = [{"required": slider}, {"required": machine}]
+    return {"type": "object", "properties": properties, "anyOf": either, "additionalProperties": False}
+
+
+def _by_key(family: type[FrozenRecord], doc: str) -> Schema:
+    """A table for each of some names."""
+    one = _family(family) if has_choice(family) else _table(family, {}, _summary(family))
+    return {"type": "object", "description": f"{doc}, a table for each name", "additionalProperties": one}
 
 
 def protocol_schema() -> Schema:
@@ -103,6 +128,8 @@ def _by_dotted_name(role: Named, depth: int) -> Schema:
 
 
 def _part(role: Part) -> Schema:
+    if role.keyed:
+        return _by_key(role.family, role.doc)
     if role.many:
         member = _family(role.family) if has_choice(role.family) else _table(role.family, {}, _summary(role.family))
         return {"type": "array", "items": member, "description": role.doc}

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import Field, fields
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import Field, fields, replace
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, came, unknown_name
-from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
-from steadyslip.core.roles import Parameter, Value
+from steadyslip.core.quantities import is_per_area, total_unit
+from steadyslip.core.records import (
+    Declared,
+    FrozenRecord,
+    Members,
+    Named,
+    Part,
+    Settings,
+    is_required,
+    key_of,
+    role_of,
+    unfit_name,
+)
+from steadyslip.core.roles import Parameter, Value, positive
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
 from steadyslip.files.specifications.toml import Table
 
@@ -20,6 +33,7 @@ class TableReader:
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.area: float | None = None
+        self.in_totals = False
 
     def problem(self, name: str, message: str) -> None:
         self.problems.append(Problem(name, message))
@@ -42,13 +56,38 @@ class TableReader:
     def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
         """Build a record; with bad values, still find what the others contradict."""
         before = len(self.problems)
-        arguments = self._arguments(law, table, prefix)
+        with self._own_area(law, table):
+            arguments = self._arguments(law, table, prefix)
         if len(self.problems) == before:
             return self._built(law, arguments, prefix)
         if issubclass(law, Settings):
             return _stand_in(law, arguments, {})
         self.problems += [p.under(prefix.rstrip(".")) for p in _contradictions(law, arguments, set(table))]
         return None
+
+    @contextmanager
+    def _own_area(self, law: type[FrozenRecord], table: Table) -> Iterator[None]:
+        """Read what is below a contact with an area of its own, or with none, in totals."""
+        outside = self.area, self.in_totals
+        if law.in_totals:
+            self.area, self.in_totals = None, True
+            with suppress(ParameterError):  # reported when its own keys are read
+                self.area = None if "area" not in table else Parameter("m^2", positive, "area").checked(table["area"])
+        yield
+        self.area, self.in_totals = outside
+
+    def members(self, role: Part, raw: Any, name: str) -> Members | None:
+        """Tables by names that the user gives."""
+        if not isinstance(raw, dict) or not all(isinstance(member, dict) for member in raw.values()):
+            self.problem(name, f"got {came(raw)}; allowed: a table for each, [{name}.NAME]")
+            return None
+        before, found = len(self.problems), {}
+        for key, member in raw.items():
+            if wrong := unfit_name(key):
+                self.problem(f"{name}.{key}", wrong)
+            elif (one := self.record(role.family, member, f"{name}.{key}.")) is not None:
+                found[key] = one
+        return Members(found) if len(self.problems) == before else None
 
     def _law(self, family: type[FrozenRecord], name: object, where: str) -> type[FrozenRecord] | None:
         try:
@@ -125,6 +164,8 @@ class TableReader:
             return self._part(role, raw, name)
         if isinstance(role, Named):
             return self._named(role, raw, name)
+        if self.in_totals and self.area is None and isinstance(role, Parameter) and is_per_area(role.unit):
+            role = replace(role, unit=total_unit(role.unit))  # a contact without area is described in forces
         try:
             return role.read(raw, self.area)
         except ParameterError as error:
@@ -132,6 +173,8 @@ class TableReader:
             return None
 
     def _part(self, role: Part, raw: Any, name: str) -> Any:
+        if role.keyed:
+            return self.members(role, raw, name)
         if role.many:
             if not isinstance(raw, list) or not all(isinstance(member, dict) for member in raw):
                 self.problem(name, f"got {came(raw)}; allowed: a list of tables, [[{name}]]")

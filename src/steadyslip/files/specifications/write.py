@@ -12,13 +12,22 @@ from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Named, key_of
 from steadyslip.core.roles import Value
 from steadyslip.files.output import write_text
-from steadyslip.files.specifications.layout import PROTOCOL, Section, has_choice, own_fields, sections, selector
+from steadyslip.files.specifications.layout import (
+    PROTOCOL,
+    Section,
+    has_choice,
+    machine_sections,
+    own_fields,
+    sections,
+    selector,
+)
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
 
 
 @checked()
-def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None = None) -> None:
+def write_rig(rig: Slider | Machine, path: str | PathLike[str], protocol: Protocol | None = None) -> None:
     """Write a rig file, with the protocol of an experiment if one is given; see `rig_to_text`.
 
     Raises
@@ -32,7 +41,7 @@ def write_rig(rig: Slider, path: str | PathLike[str], protocol: Protocol | None 
 
 
 @checked()
-def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
+def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     """The rig as TOML, SI numbers with the unit as a comment; with an area, totals (N, N/m, kg).
 
     Raises
@@ -41,16 +50,20 @@ def rig_to_text(rig: Slider, protocol: Protocol | None = None) -> str:
         If the rig or the protocol has a law without registered name, which no file can refer to.
     """
     blocks = []
-    for section in sections():
+    area = None if isinstance(rig, Machine) else rig.area
+    for section in machine_sections() if isinstance(rig, Machine) else sections():
+        if section.keyed and section.family is not None:
+            blocks += [_members(section.family, inner, section.name)] if (inner := getattr(rig, section.name)) else []
+            continue
         record = rig if section.family is None else getattr(rig, section.name)
         first: list[str] = []
         if section.family is not None:
             key, default = selector(section.family)
             word = _law_name(record, section.name)
             first = [] if word == default else [f'{key} = "{word}"']
-        blocks.append(_table(f"[{section.name}]", record, first, section.name, rig.area))
+        blocks.append(_table(f"[{section.name}]", record, first, section.name, area))
     if protocol is not None:
-        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, rig.area))
+        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, area))
     return "\n".join(blocks)
 
 
@@ -68,6 +81,8 @@ def _law_name(record: FrozenRecord, where: str) -> str:
 
 def _table(header: str, record: FrozenRecord, first: list[str], path: str, area: float | None) -> str:
     lines = [header, *first]
+    if record.in_totals:
+        area = getattr(record, "area", None) or 1.0  # without one, in forces
     below: list[str] = []
     for item, role in own_fields(type(record)):
         value, key = getattr(record, item.name), key_of(item)
@@ -77,6 +92,8 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
             lines.append(f"{key} = {role.written(value, area)}")
         elif isinstance(role, Named):
             below.append(_named(role, value, f"{path}.{key}"))
+        elif role.keyed:
+            below.append(_members(role.family, value, f"{path}.{key}"))
         elif role.by_name:
             below += [_table(f"[{path}.{one.name}]", one, [], f"{path}.{one.name}", area) for one in value]
         elif role.many:
@@ -89,6 +106,19 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
             words = [f'law = "{_law_name(value, name)}"'] if has_choice(role.family) else []
             below.append(_table(f"[{name}]", value, words, name, area))
     return "\n".join(["\n".join(lines) + "\n", *below])
+
+
+def _members(family: type[FrozenRecord], members: Mapping[str, FrozenRecord], path: str) -> str:
+    """A table for each of some names."""
+    blocks = []
+    for name, one in members.items():
+        first = []
+        if has_choice(family):
+            key, default = selector(family)
+            word = _law_name(one, f"{path}.{name}")
+            first = [] if word == default else [f'{key} = "{word}"']
+        blocks.append(_table(f"[{path}.{name}]", one, first, f"{path}.{name}", None))
+    return "\n".join(blocks)
 
 
 def _named(role: Named, values: Mapping[str, Any], path: str) -> str:

@@ -1,6 +1,7 @@
 """Contact laws: the normal stress as a function of displacement, velocity, acceleration and forces."""
 
 from steadyslip.laws.contact.basic import Constant, Linear, Prescribed, pressed_at
+from steadyslip.laws.contact.compliant import Compliant
 from steadyslip.laws.contact.law import ContactLaw, Motion, PreloadedContact
 from steadyslip.laws.contact.mechanisms import (
     DilatingLayer,
@@ -18,6 +19,7 @@ USUAL = Constant.name
 
 __all__ = [
     "USUAL",
+    "Compliant",
     "Constant",
     "ContactLaw",
     "DilatingLayer",

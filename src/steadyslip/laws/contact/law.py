@@ -30,7 +30,10 @@ class Motion:
     stiffness
         k (Pa/m): total stiffness between block and load point, gain of a controller included.
     steady_velocity
-        v0 (m/s): velocity of the drive in steady sliding.
+        v0 (m/s): velocity of slip in steady sliding.
+    separation, steady_separation, separation_rate
+        Distance (m) of the surfaces from where they just touch, in steady sliding too, and its rate (m/s). Only bodies
+        of a machine that move away from the surface have one; a law that depends on it is `is_compliant`.
     """
 
     slip: Expression
@@ -42,6 +45,9 @@ class Motion:
     steady_friction: Expression
     stiffness: Expression
     steady_velocity: Expression
+    separation: Expression = 0
+    steady_separation: Expression = 0
+    separation_rate: Expression = 0
 
     @property
     def steady(self) -> Motion:
@@ -51,6 +57,8 @@ class Motion:
             slip=0,
             velocity=self.steady_velocity,
             acceleration=0,
+            separation=self.steady_separation,
+            separation_rate=0,
             spring=self.steady_spring,
             friction=self.steady_friction,
         )
@@ -105,6 +113,10 @@ class ContactLaw(FrozenRecord, family="contact law"):
     def is_imposed(self) -> bool:
         """Whether the normal stress is given from outside, whatever the block does."""
         return type(self).coupling is ContactLaw.coupling
+
+    def is_compliant(self) -> bool:
+        """Whether it depends on the distance of the surfaces, so that bodies must be able to move apart."""
+        return False
 
     def imposed(self, time: Expression) -> Expression:
         """Prescribed change of normal stress with time (Pa), zero on average."""

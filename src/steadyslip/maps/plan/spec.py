@@ -50,6 +50,7 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
 def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), folder: Path = Path()) -> Map:
     """Read the text of such a file; see `read_map`."""
     spec = read_specification(text, source, changes, (TABLE,))
+    spec.refuse_machine()
     settings = spec.further.get(MAP)
     plan = _Plan(spec, settings, folder) if spec.rig is not None and isinstance(settings, MapSettings) else None
     spec.refuse(*(plan.placed() if plan is not None else ()))

@@ -1,0 +1,29 @@
+"""A contact that gives: its normal stress follows from how far the surfaces are pressed together."""
+
+from __future__ import annotations
+
+from steadyslip.core.records import parameter
+from steadyslip.core.roles import nonnegative, positive
+from steadyslip.laws.contact.law import ContactLaw, Expression, Motion
+
+
+class Compliant(ContactLaw, name="compliant"):
+    """Surfaces with a normal stiffness and damping: σ = −k_n u − c_n u̇ with u their distance (theory 11).
+
+    For bodies of a machine that move away from the surface (`PlanarBody`), so that normal and tangential vibration
+    couple. What presses the surfaces together in steady sliding follows from the balance of forces.
+    """
+
+    normal_stiffness: float = parameter("Pa/m", positive, "normal stiffness k_n", kind="stiffness", letter="k_n")
+    normal_damping: float = parameter(
+        "Pa s/m", nonnegative, "normal damping c_n", default=0.0, structural=True, letter="c_n"
+    )
+
+    def load(self) -> Expression | None:
+        return 0
+
+    def coupling(self, motion: Motion) -> Expression:
+        return -self.normal_stiffness * motion.separation - self.normal_damping * motion.separation_rate
+
+    def is_compliant(self) -> bool:
+        return True

@@ -1,0 +1,182 @@
+"""How a machine moves in its modes: amplitude of every body, slip of every contact, and where the energy is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.options import checked
+from steadyslip.core.pages import Displayed
+from steadyslip.core.quantities import percent, shown
+from steadyslip.core.questions import question
+from steadyslip.laws.contact import Motion
+from steadyslip.linear.polynomials import roots
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import NORMAL, Mechanism, Touch
+from steadyslip.model import Model
+from steadyslip.model.linearisation import characteristic_rows
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import characteristic
+from steadyslip.model.sliding import explain_absence
+
+MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body judders, below the second it hardly moves
+
+
+@dataclass(frozen=True)
+class Mode(Displayed):
+    """One mode of small motion about steady sliding.
+
+    Attributes
+    ----------
+    eigenvalue : complex
+        1/s.
+    amplitudes : dict of str to complex
+        Of every coordinate, as shares of the largest; a body that moves in steady sliding is measured by how far the
+        rigid motion of the machine would take it, so that motors and tables compare. Behind ``.normal``: away from
+        the surface.
+    energy : dict of str to float
+        Shares of the energy, kinetic and elastic, over a cycle, by dotted name of bodies and links.
+    """
+
+    eigenvalue: complex
+    amplitudes: Mapping[str, complex]
+    energy: Mapping[str, float]
+
+    def words(self) -> str:
+        """The shape of the mode as a sentence."""
+        sizes = {name: abs(one) for name, one in self.amplitudes.items()}
+        leads = [name for name, size in sizes.items() if size >= MOVES]
+        rest = [name for name, size in sizes.items() if HARDLY <= size < MOVES]
+        still = [name for name, size in sizes.items() if size < HARDLY]
+        does = "judder" if self.eigenvalue.imag else "drift"
+        parts = [f"{_listed(leads)} {does if len(leads) > 1 else does + 's'}"]
+        if len(leads) == 2 and self._opposed(*leads):
+            parts[0] += " against each other"
+        if rest:
+            shares = [f"{name.replace(NORMAL, ' (normal)')} by {percent(sizes[name])} of that" for name in rest]
+            parts.append(", ".join(shares))
+        if still:
+            parts.append(f"{_listed(still)} hardly {'move' if len(still) > 1 else 'moves'}")
+        text = ", ".join(parts)
+        if self.energy:
+            most = max(self.energy, key=lambda name: self.energy[name])
+            text += f"; {percent(round(self.energy[most], 3))} of the energy is in {_plain(most)}"
+        return text
+
+    def _opposed(self, one: str, other: str) -> bool:
+        same = one.removesuffix(NORMAL) == other.removesuffix(NORMAL)
+        return not same and bool((self.amplitudes[one] * np.conj(self.amplitudes[other])).real < 0)
+
+    def __str__(self) -> str:
+        rows = [f"mode with eigenvalue {self.eigenvalue:.6g} 1/s: {self.words()}"]
+        rows += [
+            f"  {name:<20} {abs(a):.4g} at {np.degrees(np.angle(a)):.4g} deg" for name, a in self.amplitudes.items()
+        ]
+        rows += [f"  {name:<20} {percent(round(share, 3))} of the energy" for name, share in self.energy.items()]
+        if self.eigenvalue.imag:
+            rows.append(f"  period {shown(2 * np.pi / abs(self.eigenvalue.imag), 's')}")
+        return "\n".join(rows)
+
+
+def _listed(names: list[str]) -> str:
+    words = [f"the {name.replace(NORMAL, ' (normal)')}" for name in names]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _plain(name: str) -> str:
+    return f"the {name.partition('.')[2]}"
+
+
+@checked()
+def modes(rig: Machine) -> tuple[Mode, ...]:
+    """The modes of a machine, the one that grows fastest, or decays slowest, first; of a pair the one with β > 0.
+
+    Raises
+    ------
+    NoSteadySliding
+        Naming the contact that locks up or lifts off.
+    """
+    point = operating_point(rig)
+    if not point.exists:
+        raise explain_absence(rig, point)
+    found = roots(characteristic(point))
+    return tuple(mode_of(rig, point, complex(s)) for s in found if np.isfinite(s) and s.imag >= 0)
+
+
+def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
+    """The mode of an eigenvalue."""
+    model = point.model
+    size = len(characteristic_rows(model))
+    entries = np.array([float(e) for e in point.evaluate(_matrix_function(model))]).reshape(size, size, 3)
+    with np.errstate(all="ignore"):
+        matrix = entries @ np.array([1, s, s * s])
+        shape = _null_vector(matrix)
+    if not np.all(np.isfinite(shape)):
+        raise NotAvailable("the shape of this mode leaves the range of floating point")
+    places = dict(zip((one.name for one in model.coordinates), shape, strict=False))
+    speeds = [float(x) for x in point.evaluate(_speed_function(model))]
+    drive = float(point.drive)
+    scaled = {
+        one.name: places[one.name] * (drive / speed if speed else 1.0)
+        for one, speed in zip(model.coordinates, speeds, strict=True)
+    }
+    largest = max(scaled.values(), key=abs)
+    if largest == 0:  # memory alone
+        largest = 1.0
+    return Mode(s, {n: complex(a / largest) for n, a in scaled.items()}, _energies(rig, places, s))
+
+
+def _null_vector(matrix: np.ndarray) -> np.ndarray:
+    """The vector that a singular matrix takes to zero; rows and columns of very different size are balanced first."""
+    columns = np.ones(len(matrix))
+    for _ in range(3):
+        rows = np.max(np.abs(matrix * columns), axis=1, keepdims=True)
+        columns = columns / np.maximum(np.max(np.abs(matrix * columns / rows), axis=0), 1e-300)
+    scaled = matrix * columns / np.max(np.abs(matrix * columns), axis=1, keepdims=True)
+    return np.asarray(np.linalg.svd(scaled)[2][-1].conj() * columns)
+
+
+def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[str, float]:
+    """Shares of kinetic and elastic energy, averaged over a cycle."""
+    mechanism: Mechanism = rig.mechanism()
+    found: dict[str, float] = {}
+
+    def add(name: str, energy: float) -> None:
+        found[name] = found.get(name, 0.0) + energy
+
+    for one in mechanism.coordinates:
+        if one.inertia:
+            add(f"bodies.{one.name.removesuffix(NORMAL)}", float(one.inertia) * abs(s * places[one.name]) ** 2)
+    for element in mechanism.elements:
+        stretch = sum(float(c) * places[name] for name, c in element.senses.items() if name in places)
+        beside = {n: c for n, c in element.senses.items() if n in places} == dict(element.acts)
+        if element.stiffness and (element.name or beside):  # a controller that sees where it acts is a spring, too
+            add(element.name or "drive.controller", float(element.stiffness) * abs(stretch) ** 2)
+    for touch in mechanism.touches:
+        if touch.separation and touch.contact.is_compliant():
+            apart = sum(c * places[name] for name, c in touch.separation.items())
+            add(f"contacts.{touch.name}", float(touch.area) * _stiffness_of(touch) * abs(apart) ** 2)
+    total = sum(found.values())
+    return {name: value / total for name, value in found.items()} if total > 0 and np.isfinite(total) else {}
+
+
+def _stiffness_of(touch: Touch) -> float:
+    """Normal stiffness of a contact, from its law."""
+    at_rest = Motion(*(0.0 for _ in range(9)))
+    apart = replace(at_rest, separation=1.0)
+    return float(touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart))
+
+
+@question
+def _matrix_function(model: Model) -> Callable[..., list[Any]]:
+    rows = characteristic_rows(model).values()
+    return model.function(e for row in rows for entry in row for e in entry)
+
+
+@question
+def _speed_function(model: Model) -> Callable[..., list[Any]]:
+    return model.function(one.speed for one in model.coordinates)

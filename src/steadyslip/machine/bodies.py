@@ -1,0 +1,74 @@
+"""Bodies of a machine: what they weigh, and how they move."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from steadyslip.core.records import FrozenRecord, parameter
+from steadyslip.core.roles import nonnegative, real
+
+
+class Body(FrozenRecord, family="body"):
+    """Base of bodies; inertia zero, the default, is a body whose inertia does not matter."""
+
+    chosen_by: ClassVar[tuple[str, str | None]] = ("motion", "slide")
+    turns: ClassVar[bool] = False
+    lifts: ClassVar[bool] = False
+    """Whether it moves away from the surface as well."""
+
+    def inertia_of(self) -> Any:
+        """Mass (kg), or moment of inertia (kg m²)."""
+        raise NotImplementedError
+
+    def along(self) -> Any:
+        """Constant force (N), or torque (N m), in the direction of motion."""
+        return 0
+
+    def away(self) -> Any:
+        """Constant force (N) away from the surface."""
+        return 0
+
+
+class SlidingBody(Body, name="slide"):
+    """A body that moves along the slide; guides keep it at its height."""
+
+    mass: float = parameter("kg", nonnegative, "mass m", default=0.0, structural=True)
+    force: float = parameter(
+        "N",
+        real,
+        "constant force in the direction of motion (weight on a slope, process)",
+        default=0.0,
+        structural=True,
+    )
+
+    def inertia_of(self) -> Any:
+        return self.mass
+
+    def along(self) -> Any:
+        return self.force
+
+
+class PlanarBody(SlidingBody, name="plane"):
+    """A body that moves along the slide and away from the surface, on which a compliant contact carries it."""
+
+    press: float = parameter(
+        "N", real, "constant force towards the surface (weight, piston)", default=0.0, structural=True
+    )
+    lifts: ClassVar[bool] = True
+
+    def away(self) -> Any:
+        return -self.press
+
+
+class RotatingBody(Body, name="rotation"):
+    """A body that turns: motor, screw, gear wheel."""
+
+    inertia: float = parameter("kg m^2", nonnegative, "moment of inertia J", default=0.0, structural=True)
+    torque: float = parameter("N m", real, "constant torque in the direction of motion", default=0.0, structural=True)
+    turns: ClassVar[bool] = True
+
+    def inertia_of(self) -> Any:
+        return self.inertia
+
+    def along(self) -> Any:
+        return self.torque

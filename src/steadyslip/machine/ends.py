@@ -1,0 +1,36 @@
+"""Names of bodies and links that tables mention and that do not exist, told before there is a machine to ask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from steadyslip.core.errors import Problem, unknown_name
+from steadyslip.machine.mechanism import GROUND, LOAD_POINT
+
+
+def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
+    """The same as a `Machine` finds, of tables in which other things are wrong too."""
+    bodies, links, contacts = (_tables(tables.get(name)) for name in ("bodies", "links", "contacts"))
+    for name, link in links.items():
+        ends = link.get("between")
+        for end in ends if isinstance(ends, list) else ():
+            yield from _unknown(f"links.{name}.between", end, [*bodies, GROUND, LOAD_POINT])
+    for name, touch in contacts.items():
+        yield from _unknown(f"contacts.{name}.body", touch.get("body"), list(bodies))
+        yield from _unknown(f"contacts.{name}.against", touch.get("against"), [*bodies, GROUND, LOAD_POINT])
+        if isinstance(by := touch.get("loaded_by"), str) and by not in links:
+            yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", by, links))
+    drive = tables.get("drive")
+    for key in ("body", "measured", "speed_measured"):
+        if isinstance(drive, dict):
+            yield from _unknown(f"drive.{key}", drive.get(key), list(bodies))
+
+
+def _tables(raw: Any) -> dict[str, dict[str, Any]]:
+    return {key: one for key, one in raw.items() if isinstance(one, dict)} if isinstance(raw, dict) else {}
+
+
+def _unknown(where: str, name: Any, known: list[str]) -> Iterator[Problem]:
+    if isinstance(name, str) and name not in known:
+        yield Problem(where, unknown_name("body", name, known))

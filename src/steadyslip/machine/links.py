@@ -1,0 +1,129 @@
+"""Links: a spring beside a dashpot between two bodies, or between a body and the ground or the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
+
+import sympy as sp
+
+from steadyslip.core.errors import Problem
+from steadyslip.core.records import FrozenRecord, option, parameter, setting
+from steadyslip.core.roles import Names, angle, nonnegative, positive
+
+
+class Link(FrozenRecord, family="link"):
+    """Base of links. `between` names its two ends: bodies, ``ground`` or ``drive``."""
+
+    chosen_by: ClassVar[tuple[str, str | None]] = ("kind", "spring")
+    turning: ClassVar[tuple[bool | None, bool | None]] = (False, False)
+    """Whether the first and the second end turn; None for whatever the ground does."""
+
+    between: tuple[str, ...] = setting(Names("the two ends: names of bodies, ground or drive"))
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        if len(self.between) != 2:
+            yield Problem("between", f"got {len(self.between)} names; allowed: two, such as ['motor', 'table']")
+        elif self.between[0] == self.between[1]:
+            yield Problem("between", f"links {self.between[0]!r} to itself; allowed: two different ends")
+        if self.rigidity() is None and not self.is_damped():
+            yield Problem("stiffness", "missing; give stiffness, damping or both")
+
+    def rigidity(self) -> Any:
+        """Its stiffness, None where it is a dashpot alone."""
+        raise NotImplementedError
+
+    def dashpot(self) -> Any:
+        """Its damping."""
+        raise NotImplementedError
+
+    def is_damped(self) -> bool:
+        """Whether it has a dashpot."""
+        return bool(self.dashpot() != 0)
+
+    def ratio(self) -> Any:
+        """Speed of the second end for a speed of one of the first."""
+        return 1
+
+    def keeps_pace(self) -> bool:
+        """Whether both ends must move together in steady sliding."""
+        return self.rigidity() is not None
+
+    def directions(self) -> Mapping[str, Any]:
+        """Share of the stretch along the slide (``x``) and away from the surface (``y``)."""
+        return {"x": 1}
+
+
+class Spring(Link, name="spring"):
+    """A spring and a dashpot between bodies that slide; at an angle where they move in the plane."""
+
+    stiffness: float | None = parameter("N/m", positive, "stiffness k along the link", default=None, kind="stiffness")
+    damping: float = parameter("N s/m", nonnegative, "damping c along the link", default=0.0, structural=True)
+    direction: str = option("slide", "normal", doc="along the slide, or away from the surface", default="slide")
+    angle: float = parameter(
+        "rad", angle, "by which the second end lies higher, seen along the slide", default=0.0, structural=True
+    )
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        yield from super().inconsistencies()
+        if self.direction == "normal" and self.angle != 0:
+            yield Problem("angle", "given beside direction normal, which is an angle of 90 deg; give one of the two")
+
+    def rigidity(self) -> Any:
+        return self.stiffness
+
+    def dashpot(self) -> Any:
+        return self.damping
+
+    def keeps_pace(self) -> bool:
+        return self.stiffness is not None and self.direction == "slide"
+
+    def directions(self) -> Mapping[str, Any]:
+        if self.direction == "normal":
+            return {"y": 1}
+        if self.angle == 0:
+            return {"x": 1}
+        return {"x": sp.cos(self.angle), "y": sp.sin(self.angle)}
+
+
+class Screw(Link, name="screw"):
+    """A screw, rack or belt between a body that turns and one that slides: stretch x − lead · φ.
+
+    `between` names first the body that turns. Stiffness and damping are those along the slide.
+    """
+
+    turning: ClassVar[tuple[bool | None, bool | None]] = (True, False)
+
+    lead: float = parameter("m/rad", positive, "travel for one radian, such as '5 mm/rev'")
+    stiffness: float | None = parameter("N/m", positive, "stiffness k along the slide", default=None, kind="stiffness")
+    damping: float = parameter("N s/m", nonnegative, "damping c along the slide", default=0.0, structural=True)
+
+    def rigidity(self) -> Any:
+        return self.stiffness
+
+    def dashpot(self) -> Any:
+        return self.damping
+
+    def ratio(self) -> Any:
+        return self.lead
+
+
+class Shaft(Link, name="shaft"):
+    """A shaft, coupling or gear between two bodies that turn: twist φ2 − ratio · φ1, torque on the second."""
+
+    turning: ClassVar[tuple[bool | None, bool | None]] = (True, True)
+
+    gear: float | None = parameter("1", positive, "turns of the second body for one turn of the first", default=None)
+    stiffness: float | None = parameter(
+        "N m/rad", positive, "torsional stiffness at the second body", default=None, kind="stiffness"
+    )
+    damping: float = parameter("N m s/rad", nonnegative, "torsional damping there", default=0.0, structural=True)
+
+    def rigidity(self) -> Any:
+        return self.stiffness
+
+    def dashpot(self) -> Any:
+        return self.damping
+
+    def ratio(self) -> Any:
+        return 1 if self.gear is None else self.gear

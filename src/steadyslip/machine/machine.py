@@ -1,0 +1,250 @@
+"""A machine: named bodies, links, contacts and a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import Problem, unknown_name
+from steadyslip.core.records import Condition, Members, members, part
+from steadyslip.machine.bodies import Body
+from steadyslip.machine.links import Link
+from steadyslip.machine.mechanism import GROUND, LOAD_POINT, NORMAL, Coordinate, Element, Integral, Mechanism, Touch
+from steadyslip.machine.motion import Tie, rigid_motion
+from steadyslip.machine.rig import Rig
+from steadyslip.machine.servo import MachineDrive
+from steadyslip.machine.surfaces import Surface
+
+_SAME = 1e-9  # relative difference below which two speeds of one end agree
+
+
+class Machine(Rig):
+    """Bodies that slide or turn, tied to each other by links, on one contact or several (theory 11).
+
+    Forces, not stresses: masses in kg, stiffnesses in N/m. In steady sliding everything moves rigidly at what the
+    drive's velocity makes of it. Parameters have dotted names such as ``bodies.table.mass``, ``links.screw.stiffness``,
+    ``contacts.guide.friction.a``; a last part is enough where it is unique.
+    """
+
+    bodies: Any = members(Body, "bodies, by name")
+    links: Any = members(Link, "links, by name", default=Members())
+    contacts: Any = members(Surface, "contacts, by name")
+    drive: MachineDrive = part(MachineDrive, "drive")
+
+    # -- what is wrong with it
+
+    def inconsistencies(self) -> Iterator[Problem]:
+        faults = [*self._nameless(), *self._wrong_ends()]
+        yield from faults
+        if not faults:
+            yield from self._wrong_contacts()
+            yield from self._floating()
+
+    def _nameless(self) -> Iterator[Problem]:
+        for name in (GROUND, LOAD_POINT):
+            if name in self.bodies:
+                yield Problem(f"bodies.{name}", "is what links and contacts call something else; give another name")
+        for kind, what in (("bodies", self.bodies), ("contacts", self.contacts)):
+            if not what:
+                yield Problem(kind, f"there are none; a machine has one or more, [{kind}.NAME]")
+
+    def _end(self, where: str, name: str, allowed: tuple[str, ...] = (GROUND, LOAD_POINT)) -> Iterator[Problem]:
+        known = [*self.bodies, *allowed]
+        if name not in known:
+            yield Problem(where, unknown_name("body", name, known))
+
+    def _wrong_ends(self) -> Iterator[Problem]:
+        """Names of bodies that do not exist, or that move otherwise than it takes."""
+        for name, link in self.links.items():
+            for end, turning in zip(link.between, link.turning, strict=True):
+                where = f"links.{name}.between"
+                problems = list(self._end(where, end))
+                yield from problems
+                if not problems and self._turns(end) not in (turning, None):
+                    does = "slides" if turning else "turns"
+                    yield Problem(
+                        where, f"{end!r} {does}, which this end of a {link.name} does not; see the kinds of link"
+                    )
+            if {"y"} & link.directions().keys() and not any(self._lifts(end) for end in link.between):
+                yield Problem(
+                    f"links.{name}", "is at an angle, but neither end moves away from the surface; make one a body "
+                    "that moves in the plane, or give its contact the law inclined-spring",
+                )  # fmt: skip
+            if set(link.between) == {GROUND, LOAD_POINT}:
+                yield Problem(f"links.{name}.between", "links no body; allowed: a body at one end at least")
+        for name, touch in self.contacts.items():
+            yield from self._end(f"contacts.{name}.body", touch.body, ())
+            yield from self._end(f"contacts.{name}.against", touch.against)
+            if touch.body == touch.against:
+                yield Problem(f"contacts.{name}.against", f"{touch.body!r} cannot slide on itself")
+            if touch.loaded_by is not None and touch.loaded_by not in self.links:
+                yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", touch.loaded_by, self.links))
+        if self.drive.driven() is not None:
+            for key in ("body", "measured", "speed_measured"):
+                end = getattr(self.drive, key, None)
+                if end is not None:
+                    yield from self._end(f"drive.{key}", end, ())
+            body = self.bodies.get(self.drive.driven())
+            if body is not None and body.turns != self.drive.turns:
+                kind = f"rotary-{self.drive.name}" if body.turns else self.drive.name.removeprefix("rotary-")
+                does = "turns" if body.turns else "slides"
+                yield Problem(
+                    "drive.control", f"got {self.drive.name!r}, but {self.drive.driven()!r} {does}; write {kind!r}"
+                )
+
+    def _turns(self, end: str) -> bool | None:
+        if end == GROUND:
+            return None
+        return self.drive.turns if end == LOAD_POINT else bool(self.bodies[end].turns)
+
+    def _lifts(self, end: str) -> bool:
+        return end in self.bodies and bool(self.bodies[end].lifts)
+
+    def _wrong_contacts(self) -> Iterator[Problem]:
+        for name, touch in self.contacts.items():
+            where, ends = f"contacts.{name}", (touch.body, touch.against)
+            turning = [bool(self._turns(end)) for end in ends]
+            if turning[0] and touch.radius is None:
+                yield Problem(f"{where}.radius", f"missing; {touch.body!r} turns, so slip is a radius times its angle")
+            if touch.radius is not None and not turning[0]:
+                yield Problem(f"{where}.radius", f"given, but {touch.body!r} does not turn")
+            if turning[1]:
+                yield Problem(f"{where}.against", f"{touch.against!r} turns; name the body that turns as body")
+            lifting = any(map(self._lifts, ends))
+            if touch.contact.is_compliant() and not lifting:
+                yield Problem(
+                    f"{where}.contact", "a compliant contact needs a body that moves away from the surface; write "
+                    f"motion = 'plane' for {touch.body!r}",
+                )  # fmt: skip
+            link = self.links.get(touch.loaded_by)
+            if link is not None and touch.body not in link.between:
+                yield Problem(f"{where}.loaded_by", f"the link {touch.loaded_by!r} does not hold {touch.body!r}")
+        for name, body in self.bodies.items():
+            carried = any(name in (c.body, c.against) and c.contact.is_compliant() for c in self.contacts.values())
+            held = any(name in link.between and "y" in link.directions() for link in self.links.values())
+            if body.lifts and not carried and not held:
+                yield Problem(
+                    f"bodies.{name}", "nothing carries it: no compliant contact, and no link away from the surface"
+                )
+
+    def _floating(self) -> Iterator[Problem]:
+        speeds, _ = self._speeds()
+        for name in self.bodies:
+            if name not in speeds:
+                yield Problem(
+                    f"bodies.{name}", "floats: no chain of links with stiffness ties it to the drive or the ground, so "
+                    "that its speed in steady sliding is open",
+                )  # fmt: skip
+
+        for body in () if self.drive.driven() is None else dict.fromkeys(self.drive.watched()):
+            if body in speeds and not speeds[body]:
+                yield Problem("drive.measured", f"{body!r} stands still in steady sliding; measure a body that moves")
+
+    def conditions(self) -> Iterator[Condition]:
+        """Every loop of links must close, and every contact must slide forwards."""
+        speeds, closing = self._speeds()
+        for tie, speed, other in closing:
+            message = f"the links contradict each other: {tie.second} would move at {{}} and at {{}} in steady sliding"
+            same = np.abs(np.asarray(speed - other)) <= _SAME * np.abs(np.asarray(speed))
+            yield Condition("drive" if tie.name == "drive" else "links", same, message, (speed, other))
+        for name, touch in self.contacts.items():
+            slip = self._slip_rate(touch, speeds)
+            message = (
+                f"contact {name}: its slip rate in steady sliding is {{}} m/s; allowed: > 0; bodies that move together "
+                "do not slide, and where it is negative exchange body and against"
+            )
+            yield Condition("contacts", np.asarray(slip) > 0, message, (slip,))
+
+    # -- how it moves
+
+    def _ties(self) -> list[Tie]:
+        ties = [
+            Tie(name, link.between[0], link.between[1], link.ratio())
+            for name, link in self.links.items()
+            if link.keeps_pace()
+        ]
+        driven = self.drive.driven()
+        return ties if driven is None else [Tie("drive", LOAD_POINT, driven, 1), *ties]
+
+    def _speeds(self) -> tuple[dict[str, Any], list[tuple[Tie, Any, Any]]]:
+        speeds, closing = rigid_motion({LOAD_POINT: self.drive.velocity, GROUND: 0}, self._ties())
+        return {name: 0 if _is_zero(speed) else speed for name, speed in speeds.items()}, closing
+
+    def speeds(self) -> dict[str, Any]:
+        """Steady speed of every body, m/s or rad/s."""
+        speeds, _ = self._speeds()
+        return {name: speeds[name] for name in self.bodies}
+
+    def _slip_rate(self, touch: Surface, speeds: dict[str, Any]) -> Any:
+        lever = 1 if touch.radius is None else touch.radius
+        return lever * speeds[touch.body] - speeds[touch.against]
+
+    def area_of(self, name: str) -> float | None:
+        kind, _, rest = name.partition(".")
+        if kind != "contacts":
+            return None
+        area = self.contacts[rest.partition(".")[0]].area
+        return 1.0 if area is None else area
+
+    # -- how it is assembled
+
+    def mechanism(self) -> Mechanism:
+        """One coordinate for every body, and a second for bodies that move away from the surface."""
+        speeds, _ = self._speeds()
+        coordinates = []
+        for name, body in self.bodies.items():
+            unit = "rad" if body.turns else "m"
+            coordinates.append(Coordinate(name, body.inertia_of(), speeds[name], body.along(), unit))
+            if body.lifts:
+                coordinates.append(Coordinate(name + NORMAL, body.inertia_of(), 0, body.away()))
+        elements = [self._element(name, link) for name, link in self.links.items()]
+        controls, integral = self._control(speeds)
+        touches = tuple(
+            Touch(
+                name, touch.friction, touch.contact, self._row((touch.body, touch.against), touch.radius),
+                self._apart(touch), 1 if touch.area is None else touch.area,
+                "" if touch.loaded_by is None else f"links.{touch.loaded_by}",
+            )
+            for name, touch in self.contacts.items()
+        )  # fmt: skip
+        return Mechanism(tuple(coordinates), (*elements, *controls), integral, touches, self.drive.velocity)
+
+    def _row(self, ends: tuple[str, str], lever: Any = None) -> dict[str, Any]:
+        """The first end ahead of the second."""
+        row = {ends[0]: 1 if lever is None else lever, ends[1]: -1}
+        return {end: share for end, share in row.items() if end != GROUND}
+
+    def _apart(self, touch: Surface) -> dict[str, Any]:
+        row = {touch.body: 1, touch.against: -1}
+        return {end + NORMAL: share for end, share in row.items() if self._lifts(end)}
+
+    def _element(self, name: str, link: Link) -> Element:
+        shares = link.directions()
+        row: dict[str, Any] = {}
+        for end, share in zip(link.between, (-link.ratio(), 1), strict=True):
+            if end != GROUND and "x" in shares:
+                row[end] = share * shares["x"]
+            if self._lifts(end) and "y" in shares:
+                row[end + NORMAL] = share * shares["y"]
+        stiffness = 0 if link.rigidity() is None else link.rigidity()
+        return Element(f"links.{name}", row, row, stiffness, link.dashpot(), GROUND in link.between)
+
+    def _control(self, speeds: dict[str, Any]) -> tuple[tuple[Element, ...], Integral | None]:
+        """What a controller does as springs and dashpots that sense elsewhere than they act."""
+        driven = self.drive.driven()
+        if driven is None:
+            return (), None
+        place, speed = ({body: speeds[driven] / speeds[body], LOAD_POINT: -1} for body in self.drive.watched())
+        kp, kd, held, ki = self.drive.gains()
+        acts = {driven: 1}
+        elements = [Element("", acts, place, kp, kd if place == speed else 0)]
+        if place != speed or held != 0:
+            elements.append(Element("", acts, speed, held, 0 if place == speed else kd))
+        sensed = {name: share for name, share in place.items() if name != LOAD_POINT}
+        return tuple(elements), None if ki is None else Integral(acts, sensed, ki)
+
+
+def _is_zero(speed: Any) -> bool:
+    return isinstance(speed, (int, float)) and speed == 0

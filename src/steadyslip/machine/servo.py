@@ -1,0 +1,127 @@
+"""Drives of machines: a load point that moves steadily, or a position controller; linear, or of a body that turns.
+
+A controller measures the place of a body, reduced to the body on which it acts by the steady motion of both, and pushes
+that body with F = Fss − (gain) (place ahead of the reference v0 t) − (gain) (speed above v0) − (gain) ∫. What it
+measures need not be where it acts (not collocated).
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from steadyslip.core.records import FrozenRecord, parameter, setting
+from steadyslip.core.roles import Text, nonnegative, positive
+
+
+class MachineDrive(FrozenRecord, family="drive of a machine"):
+    """Base of drives. The `velocity` is that of the body on which it acts, or of the load point, ``drive`` in links."""
+
+    chosen_by: ClassVar[tuple[str, str | None]] = ("control", "steady")
+    turns: ClassVar[bool] = False
+
+    velocity: float = parameter("m/s", positive, "velocity v0 in steady sliding")
+
+    def driven(self) -> str | None:
+        """The body on which a controller acts."""
+        return None
+
+    def watched(self) -> tuple[str, str]:
+        """The bodies whose place and whose speed it measures."""
+        raise NotImplementedError
+
+    def gains(self) -> tuple[Any, Any, Any, Any]:
+        """Gains on the place of the first watched body, on speed and place of the second, on ∫ place of the first."""
+        return 0, 0, 0, None
+
+
+class Pull(MachineDrive, name="steady"):
+    """A load point that moves along the slide at constant velocity; links tie bodies to it as ``drive``."""
+
+
+class RotaryPull(MachineDrive, name="rotary-steady"):
+    """A shaft end that turns at constant speed; links tie bodies to it as ``drive``."""
+
+    turns: ClassVar[bool] = True
+    velocity: float = parameter("rad/s", positive, "speed of the load point in steady sliding")
+
+
+class _Controller(MachineDrive):
+    """A controller that acts on a body."""
+
+    body: str = setting(Text("the body on which it acts"))
+    measured: str | None = setting(
+        Text("the body whose place it measures; that on which it acts unless given"), default=None
+    )
+
+    def driven(self) -> str | None:
+        return self.body
+
+    def watched(self) -> tuple[str, str]:
+        return self.measured or self.body, self.measured or self.body
+
+
+class PositionPD(_Controller, name="pd"):
+    """A position controller with proportional and derivative gain."""
+
+    kp: float = parameter("N/m", positive, "proportional gain", kind="stiffness")
+    kd: float = parameter("N s/m", nonnegative, "derivative gain", default=0.0, structural=True)
+
+    def gains(self) -> tuple[Any, Any, Any, Any]:
+        return self.kp, self.kd, 0, None
+
+
+class PositionPID(PositionPD, name="pid"):
+    """A position controller with proportional, integral and derivative gain."""
+
+    ki: float = parameter("N/(m s)", positive, "integral gain")
+
+    def gains(self) -> tuple[Any, Any, Any, Any]:
+        return self.kp, self.kd, 0, self.ki
+
+
+class Cascade(_Controller, name="p-pi"):
+    """A position loop around a speed loop, as machine drives are tuned: F = Kp [e + ∫e dt / Tn], e = Kv x_e + v_e.
+
+    The place is that of `measured` (a scale at the table), the speed that of the body on which it acts (the encoder of
+    the motor) unless `speed_measured` names another.
+    """
+
+    speed_measured: str | None = setting(
+        Text("the body whose speed it measures; that on which it acts unless given"), default=None
+    )
+    kv: float = parameter("1/s", positive, "gain Kv of the position loop")
+    kp: float = parameter("N s/m", positive, "gain Kp of the speed loop")
+    tn: float = parameter("s", positive, "reset time Tn of the speed loop")
+
+    def watched(self) -> tuple[str, str]:
+        return self.measured or self.body, self.speed_measured or self.body
+
+    def gains(self) -> tuple[Any, Any, Any, Any]:
+        return self.kp * self.kv, self.kp, self.kp / self.tn, self.kp * self.kv / self.tn
+
+
+class RotaryPD(PositionPD, name="rotary-pd"):
+    """`PositionPD` of a body that turns."""
+
+    turns: ClassVar[bool] = True
+    velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
+    kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness")
+    kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True)
+
+
+class RotaryPID(PositionPID, name="rotary-pid"):
+    """`PositionPID` of a body that turns."""
+
+    turns: ClassVar[bool] = True
+    velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
+    kp: float = parameter("N m/rad", positive, "proportional gain", kind="stiffness")
+    kd: float = parameter("N m s/rad", nonnegative, "derivative gain", default=0.0, structural=True)
+    ki: float = parameter("N m/(rad s)", positive, "integral gain")
+
+
+class RotaryCascade(Cascade, name="rotary-p-pi"):
+    """`Cascade` of a body that turns."""
+
+    turns: ClassVar[bool] = True
+    velocity: float = parameter("rad/s", positive, "speed of the body in steady sliding")
+    kp: float = parameter("N m s/rad", positive, "gain Kp of the speed loop")

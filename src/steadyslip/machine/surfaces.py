@@ -1,0 +1,32 @@
+"""Contacts of a machine: which bodies slide on what, by which laws."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from steadyslip.core.records import FrozenRecord, parameter, part, setting
+from steadyslip.core.roles import Text, positive
+from steadyslip.laws.contact import ContactLaw
+from steadyslip.laws.friction import FrictionLaw
+from steadyslip.machine.mechanism import GROUND
+
+
+class Surface(FrozenRecord):
+    """A contact of a machine: a body that slides on another, on the ground or on what the drive moves.
+
+    The laws are in stresses over `area`; without one they are in forces. Slip is counted in the direction of motion.
+    """
+
+    in_totals: ClassVar[bool] = True
+
+    body: str = setting(Text("the body that slides"))
+    against: str = setting(Text("what it slides on: a body, ground or drive"), default=GROUND)
+    friction: FrictionLaw = part(FrictionLaw, "friction law")
+    contact: ContactLaw = part(ContactLaw, "contact law")
+    area: float | None = parameter("m^2", positive, "contact area; without one the laws are in forces", default=None)
+    radius: float | None = parameter(
+        "m", positive, "radius of the contact, of a body that turns; slip is radius times angle", default=None
+    )
+    loaded_by: str | None = setting(
+        Text("the link whose force the contact law sees as T; what pulls at the body unless given"), default=None
+    )

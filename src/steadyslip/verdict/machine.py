@@ -1,0 +1,159 @@
+"""The verdict on a machine: numbers, words, plain data."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.pictures import draw
+from steadyslip.core.quantities import shown
+from steadyslip.linear.boundary import Margin, margins
+from steadyslip.linear.modes import Mode, mode_of
+from steadyslip.linear.status import decided_by_rounding, on_edge
+from steadyslip.machine.machine import Machine
+from steadyslip.model.point import operating_point
+from steadyslip.model.sliding import SteadyMachine, steady_machine
+from steadyslip.verdict.export import common_numbers
+from steadyslip.verdict.findings import MachineFindings
+from steadyslip.verdict.numbers import linear_numbers
+from steadyslip.verdict.words import BEYOND, disturbance, headline, lines_of, margin_table
+
+
+@dataclass(frozen=True, repr=False)
+class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
+    __doc__ = MachineFindings.__doc__
+
+    def plot(self, ax: Any = None) -> Any:
+        """No figure shows a machine yet: NotAvailable."""
+        return draw(self, ax=ax)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data in SI units, as ``--json`` prints it."""
+        return as_dict(self)
+
+    def to_json(self) -> str:
+        """`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+    def __str__(self) -> str:
+        rows = [("steady sliding", _sliding(self.steady)), ("a disturbance", disturbance(self))] if self.steady else []
+        rows += [("the mode", self.mode.words())] if self.mode else []
+        return lines_of(self, rows, margin_table(self), [_MEANING] if self.stable and not self.on_edge else [])
+
+    def __repr__(self) -> str:
+        return f"<MachineAnalysis: {headline(self)}; print it for the whole verdict>"
+
+
+_MEANING = "Stable means: small disturbances die out. A large enough kick may still start an oscillation."
+
+
+def analyze_machine(machine: Machine) -> MachineAnalysis:
+    """Verdict on a machine; see `steadyslip.analyze`."""
+    from steadyslip import __version__
+
+    with np.errstate(all="ignore"):
+        distances = margins(machine)
+        try:
+            steady = steady_machine(machine)
+        except NoSteadySliding as error:
+            why = str(error).removeprefix("no steady sliding: ")
+            return MachineAnalysis(rig=machine, stable=None, reason=why, margins=distances, version=__version__)
+        point = operating_point(machine)
+        numbers = linear_numbers(point)
+        posed = numbers["growth_rate"] != math.inf
+        leading = numbers["eigenvalues"][0]
+        found = MachineAnalysis(
+            rig=machine,
+            reason="",
+            steady=steady,
+            mode=mode_of(machine, point, complex(leading.real, abs(leading.imag))) if posed else None,
+            on_edge=bool(on_edge(point)) or decided_by_rounding(point),
+            margins=distances,
+            warnings=_warnings(machine),
+            version=__version__,
+            **numbers,
+        )
+    return replace(found, reason=_reason(found))
+
+
+def _reason(found: MachineAnalysis) -> str:
+    """What grows, or how near the nearest edge is, in one sentence."""
+    if found.growth_rate == math.inf:
+        return (
+            "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls at once by "
+            "more than mass, direct effect and dampings provide, so any small lag grows at once"
+        )
+    if found.on_edge:
+        return "neither verdict should be relied on: the least change of a number decides"
+    first = next((one for one in found.margins if one.edge is not None), None)
+    if not found.stable:
+        grows = "an oscillation grows" if found.eigenvalues[0].imag else "a disturbance grows without oscillating"
+        hint = "" if first is None else f"; {_nearest(found, first)}"
+        return grows + hint
+    return "every small disturbance dies out" + ("" if first is None else f"; {_nearest(found, first)}")
+
+
+def _nearest(found: MachineAnalysis, margin: Margin) -> str:
+    """The nearest edge of all in words."""
+    edge = margin.edge
+    if edge is None:
+        return ""
+    side = "above" if edge.value > margin.value else "below"
+    value = shown(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
+    beyond = "it is stable" if edge.stable == side else BEYOND.get(edge.kind, edge.kind)
+    return f"the nearest edge is that of {margin.parameter}: {side} {value} {beyond}"
+
+
+def _sliding(steady: SteadyMachine | None) -> str:
+    if steady is None:
+        return ""
+    return "; ".join(
+        f"{name} slides at {shown(one.slip_rate, 'm/s')}, normal force {shown(one.normal_force, 'N')}, friction force "
+        f"{shown(one.friction_force, 'N')}, friction {one.friction:.4g}"
+        for name, one in steady.contacts.items()
+    )
+
+
+def _warnings(machine: Machine) -> tuple[str, ...]:
+    blind = [name for name, touch in machine.contacts.items() if not touch.friction.memory()]
+    if not blind:
+        return ()
+    which = f"contact {blind[0]} has" if len(blind) == 1 else f"contacts {', '.join(blind)} have"
+    return (
+        f"the friction law of {which} no memory of sliding, so that whether it judders at low speed is not predicted; "
+        "use a law with memory",
+    )
+
+
+def as_dict(found: MachineAnalysis) -> dict[str, Any]:
+    """SI units, forces; numbers that do not exist, and infinite ones, are None."""
+    return common_numbers(found) | {"steady": _steady(found.steady), "mode": _mode(found.mode)}
+
+
+def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:
+    if steady is None:
+        return None
+    contacts = {
+        name: {
+            "slip_rate": one.slip_rate, "normal_force": one.normal_force, "friction_force": one.friction_force,
+            "friction": one.friction, "states": one.states,
+        }
+        for name, one in steady.contacts.items()
+    }  # fmt: skip
+    return {"velocity": steady.velocity, "speeds": steady.speeds, "contacts": contacts, "links": steady.links}
+
+
+def _mode(mode: Mode | None) -> dict[str, Any] | None:
+    if mode is None:
+        return None
+    return {
+        "eigenvalue": [mode.eigenvalue.real, mode.eigenvalue.imag],
+        "amplitudes": {name: [one.real, one.imag] for name, one in mode.amplitudes.items()},
+        "energy": dict(mode.energy),
+        "words": mode.words(),
+    }

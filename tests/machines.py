@@ -81,3 +81,84 @@ def three_bodies():
         },
         drive=ss.RotaryPD(velocity=2.0, body="motor", kp=2.0, kd=0.3),
     )
+
+
+def at_random(seed):
+    """A machine of one to four bodies, and theory 11's matrix of it typed with NumPy: a function of s."""
+    random = np.random.default_rng(seed)
+
+    def size(low=-1.0, high=1.0):
+        return float(10 ** random.uniform(low, high))
+
+    count, posts = int(random.integers(1, 4)), int(random.integers(0, 2))
+    names = [f"b{i}" for i in range(count)] + ["post"] * posts
+    n = len(names)
+    mass = np.array([size() if random.random() < 0.8 else 0.0 for _ in names])
+    stiff, damp = np.zeros((n + 2, n + 2)), np.zeros((n + 2, n + 2))  # with the ground and the drive
+    links, ends = {}, {**{name: i for i, name in enumerate(names)}, "ground": n, "drive": n + 1}
+    pull = np.zeros((n, n), dtype=object)  # what pulls at each body, in the columns of all: (k, c)
+
+    def link(a, b, k, c):
+        spring = {"stiffness": k} if k else {}
+        links[f"l{len(links)}"] = ss.Spring(between=(a, b), damping=c, **spring)
+        row = np.zeros(n + 2)
+        row[ends[b]], row[ends[a]] = 1.0, -1.0
+        stiff[:], damp[:] = stiff + k * np.outer(row, row), damp + c * np.outer(row, row)
+        if "ground" not in (a, b):
+            for end in (a, b):
+                if end != "drive":
+                    pull[ends[end]] += np.array([-row[ends[end]] * row[j] * complex(k, c) for j in range(n)])
+
+    for i in range(count):
+        link("drive" if i == 0 else names[int(random.integers(0, i))], names[i], size(0, 2), size(-2, 0))
+    if count > 2:
+        link(names[0], names[count - 1], size(), 0.0)
+    if posts:
+        link("ground", "post", size(0, 2), size(-2, 0))
+    link("ground", names[int(random.integers(0, count))], 0.0, size(-2, 0))
+
+    kp, kd, seen = size(0, 2), size(-2, 0), int(random.integers(0, count))
+    controlled = random.random() < 0.5
+    drive = (
+        ss.PositionPD(velocity=1.0, body="b0", measured=names[seen], kp=kp, kd=kd)
+        if controlled
+        else ss.Pull(velocity=1.0)
+    )
+
+    touches, contacts = [], {}
+    for i in range(count):
+        if random.random() < 0.7 or (i == count - 1 and not contacts) or mass[i] == 0:
+            against = "post" if posts and random.random() < 0.5 else "ground"
+            load, f, slope, r, mu, alpha = size(), size(), -size(-2, 0), size(), 0.1 + 0.4 * random.random(), 0.0
+            further = {}
+            if random.random() < 0.5:
+                alpha = 0.5 * mu
+                further["normal_memory"] = ss.LinkerDieterich(alpha=alpha, sigma_ref=1.0)
+            tilt = random.uniform(-0.6, 0.6) if random.random() < 0.5 else 0.0
+            press = ss.InclinedSpring(steady_normal_stress=load, angle=tilt) if tilt else ss.Constant(preload=load)
+            friction = rate_state(f, slope, r, mu, load, **further)
+            contacts[f"c{i}"] = ss.Surface(body=names[i], against=against, friction=friction, contact=press)
+            touches.append((i, ends[against], f, slope, r, mu, mu - alpha, np.tan(tilt)))
+    machine = ss.Machine(
+        bodies={name: ss.SlidingBody(mass=m) for name, m in zip(names, mass, strict=True)}, links=links,
+        contacts=contacts, drive=drive,
+    )  # fmt: skip
+
+    def matrix(s):
+        whole = np.diag(mass * s * s).astype(complex) + stiff[:n, :n] + damp[:n, :n] * s
+        if controlled:
+            whole[0, seen] += kp + kd * s
+        for i, other, f, slope, r, mu, f1, tangent in touches:
+            slip = np.zeros(n)
+            slip[i] += 1.0
+            if other < n:
+                slip[other] -= 1.0
+            seen_pull = np.array([one.real + one.imag * s for one in np.asarray(pull[i], dtype=complex)])
+            if controlled and i == 0:
+                seen_pull[seen] -= kp + kd * s
+            normal = -tangent * seen_pull
+            friction = (s * (f * s + r * slope) * slip + (f1 * s + r * mu) * normal) / (s + r)
+            whole += np.outer(slip, friction)
+        return whole
+
+    return machine, matrix

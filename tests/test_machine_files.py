@@ -239,7 +239,7 @@ CALLS = [
     lambda m: ss.simulate(m, until=1.0), lambda m: ss.simulate_many(m, {}, until=1.0), lambda m: ss.hopf(m),
     lambda m: ss.cycles(m), lambda m: ss.threshold(m, kick="velocity"), lambda m: ss.critical_stiffness(m),
     lambda m: ss.stable_stiffness(m), lambda m: ss.small_signal(m), lambda m: ss.state_space(m),
-    lambda m: ss.formula(m), lambda m: ss.explore(m), lambda m: ss.report(m), lambda m: ss.safety_factor(m),
+    lambda m: ss.formula(m), lambda m: ss.explore(m), lambda m: ss.safety_factor(m),
     lambda m: ss.steady_states(m),
     lambda m: ss.analyze(m).plot(),
 ]  # fmt: skip
@@ -249,3 +249,11 @@ CALLS = [
 def test_functions_that_machines_do_not_have_yet(call):
     with pytest.raises(ss.SteadyslipError, match=r"[Mm]achine"):
         CALLS[call](two_mass())
+
+
+def test_results_of_machines_can_be_shown_in_notebooks_and_documents():
+    machine = two_mass()
+    for result in (machine, ss.analyze(machine), ss.steady_state(machine), ss.modes(machine)[0]):
+        assert "table" in result._repr_html_()
+        assert "table" in ss.report(result).html
+    assert "1 N<" in machine._repr_html_()  # a preload, not 1 Pa

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from machines import brake, coulomb, rate_state, surface, three_bodies, two_blocks, two_mass
+from machines import at_random, brake, coulomb, rate_state, surface, three_bodies, two_blocks, two_mass
 from steadyslip.linear.polynomials import roots
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients
@@ -481,3 +481,14 @@ def test_what_cancels_in_the_structure_cancels_exactly():
     coefficients = characteristic_coefficients(build_model(machine))
     assert len(coefficients) == 5
     assert len(roots(np.array(ss.analyze(machine).characteristic_polynomial))) == 4
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_eigenvalues_of_machines_at_random_make_theory_11s_matrix_singular(seed):
+    machine, matrix = at_random(seed)
+    found = ss.eigenvalues(machine)
+    assert np.all(np.isfinite(found))
+    for s in found:
+        values = np.linalg.svd(matrix(s), compute_uv=False)
+        near = np.linalg.svd(matrix(s * (1 + 1e-6)), compute_uv=False)
+        assert values[-1] < 1e-8 * values[0] or values[-1] < 1e-3 * near[-1]

@@ -11,7 +11,16 @@ from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.records import Condition, Members, members, part
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.links import Link
-from steadyslip.machine.mechanism import GROUND, LOAD_POINT, NORMAL, Coordinate, Element, Integral, Mechanism, Touch
+from steadyslip.machine.mechanism import (
+    GROUND,
+    LOAD_POINT,
+    NORMAL,
+    DegreeOfFreedom,
+    Element,
+    Integral,
+    Mechanism,
+    Touch,
+)
 from steadyslip.machine.motion import Tie, rigid_motion
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.servo import MachineDrive
@@ -196,9 +205,9 @@ class Machine(Rig):
         coordinates = []
         for name, body in self.bodies.items():
             unit = "rad" if body.turns else "m"
-            coordinates.append(Coordinate(name, body.inertia_of(), speeds[name], body.along(), unit))
+            coordinates.append(DegreeOfFreedom(name, body.inertia_of(), speeds[name], body.along(), unit))
             if body.lifts:
-                coordinates.append(Coordinate(name + NORMAL, body.inertia_of(), 0, body.away()))
+                coordinates.append(DegreeOfFreedom(name + NORMAL, body.inertia_of(), 0, body.away()))
         elements = [self._element(name, link) for name, link in self.links.items()]
         controls, integral = self._control(speeds)
         touches = tuple(

@@ -21,7 +21,7 @@ NORMAL = ".normal"
 
 
 @dataclass(frozen=True)
-class Coordinate:
+class DegreeOfFreedom:
     """One way in which a body moves: its name, inertia (kg, kg m²), steady speed, and a constant force along it."""
 
     name: str
@@ -108,7 +108,7 @@ class Mechanism:
         A slider's stiffness along the slide over that along its axis, where the latter is given; else None.
     """
 
-    coordinates: tuple[Coordinate, ...]
+    coordinates: tuple[DegreeOfFreedom, ...]
     elements: tuple[Element, ...]
     integral: Integral | None
     touches: tuple[Touch, ...]

@@ -13,7 +13,7 @@ from steadyslip.core.roles import nonnegative, positive
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
-from steadyslip.machine.mechanism import LOAD_POINT, Coordinate, Element, Integral, Mechanism, Touch
+from steadyslip.machine.mechanism import LOAD_POINT, DegreeOfFreedom, Element, Integral, Mechanism, Touch
 from steadyslip.machine.rig import Rig
 
 
@@ -88,7 +88,7 @@ class Slider(Rig, section="slider"):
         drive = self.drive
         ki = drive.integral()
         return Mechanism(
-            coordinates=(Coordinate("x", self.mass, drive.velocity),),
+            coordinates=(DegreeOfFreedom("x", self.mass, drive.velocity),),
             elements=(
                 Element("", {"x": 1}, pulled, self.stiffness, self.damping),
                 Element("", {"x": 1}, pulled, drive.proportional(), drive.derivative()),

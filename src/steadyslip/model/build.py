@@ -11,7 +11,9 @@ import sympy as sp
 
 from steadyslip.core.options import checked
 from steadyslip.core.records import Address, parameters, shape_of, twin
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
+from steadyslip.machine.slider import Slider
 from steadyslip.model.assembly import RESERVED, assemble
 from steadyslip.model.equations import Model
 
@@ -25,7 +27,7 @@ _LETTERS = {
 
 
 @checked()
-def build_model(rig: Rig, present: Iterable[str] = ()) -> Model:
+def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
     """The model of a rig.
 
     Parameters
@@ -36,6 +38,11 @@ def build_model(rig: Rig, present: Iterable[str] = ()) -> Model:
         Dotted names of parameters kept as symbols although they are zero, such as ``slider.mass`` when it
         is about to be varied.
     """
+    return model_of(rig, present)
+
+
+def model_of(rig: Rig, present: Iterable[str] = ()) -> Model:
+    """`build_model` without its checks."""
     kept = frozenset(present)
     key = (shape_of(rig), kept)
     return _build_cached(_Structure(key, rig, kept))

@@ -94,7 +94,11 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
         return stand_ins.polynomial(e) if forces[row] else stand_ins.whole(e)
 
     matrix = [[[stand_in(e, name) for e in entry] for entry in row] for name, row in rows.items()]
-    return tuple(stand_ins.back(coefficient) for coefficient in _determinant(matrix))
+    names, coefficients = _determinant(matrix)
+    if model.is_single:
+        return tuple(stand_ins.back(c.as_expr()) for c in coefficients)
+    expressions = [stand_ins.back(name) for name in names]
+    return tuple(_nested(list(c.terms()), expressions) for c in coefficients)
 
 
 @question
@@ -129,8 +133,31 @@ def characteristic_rows(model: Model) -> dict[sp.Symbol, list[tuple[sp.Expr, sp.
     return found
 
 
-def _determinant(matrix: list[list[list[sp.Expr]]]) -> list[sp.Expr]:
-    """Coefficients in s, lowest first, of a determinant, exactly: by rows, each minor of the rows below once."""
+Terms = list[tuple[tuple[int, ...], Any]]
+
+
+def _nested(terms: Terms, factors: list[sp.Expr], first: int = 0) -> sp.Expr:
+    """A polynomial with each factor taken out of the terms that have it, one after the other: thousands stay few.
+
+    Nothing is added that was not: what cancels had cancelled in `terms`.
+    """
+    if len(terms) == 1:
+        powers, number = terms[0]
+        return sp.Mul(int(number), *(factors[i] ** power for i, power in enumerate(powers) if power and i >= first))
+    while first < len(factors) and not any(powers[first] for powers, _ in terms):
+        first += 1
+    groups: dict[int, Terms] = {}
+    for term in terms:
+        groups.setdefault(term[0][first], []).append(term)
+    inner = {power: _nested(group, factors, first + 1) for power, group in groups.items()}
+    return sp.Add(*(sp.Mul(factors[first] ** power, part) for power, part in inner.items()))
+
+
+def _determinant(matrix: list[list[list[sp.Expr]]]) -> tuple[list[sp.Symbol], list[Any]]:
+    """Symbols, and the coefficients in s, lowest first, of a determinant as polynomials in them.
+
+    Exact: by rows, each minor of the rows below once.
+    """
     names = sorted({n for row in matrix for entry in row for e in entry for n in e.free_symbols}, key=str)
     ring = ZZ[(sp.Symbol("s"), *names)].ring
     s = ring.gens[0]
@@ -153,8 +180,9 @@ def _determinant(matrix: list[list[list[sp.Expr]]]) -> list[sp.Expr]:
 
     parts: dict[int, dict[tuple[int, ...], Any]] = {}
     for (power, *rest), number in minor(frozenset(range(len(table)))).terms():
-        parts.setdefault(power, {})[(0, *rest)] = number
-    return [ring.from_dict(parts.get(power, {})).as_expr() for power in range(max(parts, default=0) + 1)]
+        parts.setdefault(power, {})[tuple(rest)] = number
+    of_names = ring.drop(s)
+    return names, [of_names.from_dict(parts.get(power, {})) for power in range(max(parts, default=0) + 1)]
 
 
 @question

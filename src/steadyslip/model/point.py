@@ -19,7 +19,7 @@ from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.expressions import array_function
 from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.rig import Rig
-from steadyslip.model.build import build_model
+from steadyslip.model.build import model_of
 from steadyslip.model.equations import Model
 from steadyslip.model.steady import steady_roots, steady_stresses
 
@@ -175,13 +175,13 @@ def operating_point(
     together = _varied(rig, vary or {})
     varied = together.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
-    return _placed(build_model(rig, present=[*structural, *present]), rig, together, branch, scan)
+    return _placed(model_of(rig, present=[*structural, *present]), rig, together, branch, scan)
 
 
 @lru_cache(maxsize=256)
 def _own_point(rig: Rig, branch: int) -> OperatingPoint:
     """Of a rig as it is, with the answers that were asked of it before."""
-    return _placed(build_model(rig), rig, _varied(rig, {}), branch, False)
+    return _placed(model_of(rig), rig, _varied(rig, {}), branch, False)
 
 
 def _placed(model: Model, rig: Rig, together: Together, branch: int, scan: bool) -> OperatingPoint:

@@ -61,7 +61,7 @@ class SteadySliding(Displayed):
 
 
 @dataclass(frozen=True)
-class SteadyContact:
+class SteadyContact(Displayed):
     """A contact of a machine in steady sliding.
 
     Attributes

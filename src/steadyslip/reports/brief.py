@@ -19,6 +19,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.explorer.sketch import sketch
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.reports.drawings import drawn
@@ -26,7 +27,7 @@ from steadyslip.reports.elements import STYLE, Markup, figure, heading, letter, 
 
 _BY_UNIT = {
     "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times",
-    "m/s": "velocity v peak_velocity lowest_velocity velocities",
+    "m/s": "velocity v peak_velocity lowest_velocity velocities slip_rate",
     "m": "slip x displacement",
     "Pa": "normal_stress shear_stress spring_stress stress_drop lowest_normal_stress highest_normal_stress normal "
     "shear stress_ratio",
@@ -34,8 +35,9 @@ _BY_UNIT = {
     "Pa s/m": "f S",
     "kg/m^2": "m",
     "rad/s": "angular_frequency critical_angular_frequency",
-    "1/s": "eigenvalues growth_rate coefficient r",
+    "1/s": "eigenvalue eigenvalues growth_rate coefficient r",
     "m^2": "area",
+    "N": "normal_force friction_force",
 }
 UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
 OWN = frozenset("value error low high amount absolute values".split())  # noqa: SIM905 -- a list of words
@@ -45,7 +47,7 @@ PLAIN = frozenset(
     points outcome fold status_code kind stable exists survived is_edge doubt details criteria predicted residuals
     seen worth errors first second first_interval total_interval total missing spacing edge correlation
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
-    sides conditions""".split()  # noqa: SIM905 -- a list of words
+    sides conditions amplitudes energy speeds links""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _NOT_SHOWN = frozenset(
@@ -133,7 +135,12 @@ def _record(record: FrozenRecord) -> Iterator[str]:
     for path, one in parameters(record).items():
         if one.value is not None:
             values = np.asarray(one.value)
-            words = shown(float(values), one.role.unit, 6) if values.ndim == 0 else _array(values, one.role.unit, None)
+            area = record.area_of(path) if isinstance(record, Machine) else None
+            words = (
+                shown(float(values), one.role.unit, 6, area)
+                if values.ndim == 0
+                else _array(values, one.role.unit, None)
+            )
             rows.append((path, words, one.role.doc))
     yield table(rows, ("parameter", "value", "meaning"))
 

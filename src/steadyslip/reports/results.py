@@ -43,6 +43,7 @@ def parts_of(result: Any, **options: Any) -> Parts:
         got = ", ".join([type(result).__name__, *options])
         raise ParameterError([Problem("result", f"got {got}; allowed: a rig or a result, such as that of analyze")])
     rig = getattr(result, "rig", None)
+    rig = rig if isinstance(rig, Slider) else None  # a machine has no sketch and no page yet
     first = str(result).partition("\n")[0]
     kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr

@@ -12,6 +12,7 @@ import steadyslip as ss
 from browser import chromium, driver
 from command import run
 from rigs_of_theory import ONE_MEMORY, SIGMA, rate_state, rig
+from steadyslip.core.roles import positive
 
 pytestmark = pytest.mark.slow  # a browser works in processes of its own, whose seconds are not measured
 INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
@@ -209,6 +210,29 @@ def test_hostile_titles_are_text(browser, tmp_path):
     with Visit(browser, tmp_path / "rig.html") as visit:
         assert visit.page.inner_text(".brand b") == title.replace("\u2028", visit.page.inner_text(".brand b")[41])
         assert visit.page.locator("img").count() == 0
+
+
+HOSTILE_WORDS = "</script><script>throw 1</script><img src=x onerror=throw(1)>{{0}}&amp;\"'`${x}\\"
+
+
+@pytest.mark.parametrize("kind", ["explorer", "report"])
+def test_hostile_words_of_a_law_are_text(browser, tmp_path, kind):
+    """What a user's law calls itself and its parameters stands on the page as it is, and does nothing."""
+    known = dict(ss.ContactLaw.registry)
+
+    class Hostile(ss.PreloadedContact, name=HOSTILE_WORDS):
+        share: float = ss.parameter("1", positive, HOSTILE_WORDS)
+
+        def coupling(self, motion):
+            return self.share * motion.friction
+
+    ss.ContactLaw.registry = known
+    made = (ss.explore if kind == "explorer" else ss.report)(rig(contact=Hostile(preload=SIGMA, share=0.1)))
+    made.save(tmp_path / "page.html")
+    with Visit(browser, tmp_path / "page.html") as visit:
+        assert HOSTILE_WORDS in visit.page.locator("body").inner_text().replace("\n", " ")
+        assert visit.page.locator("img[src=x]").count() == 0
+        assert visit.page.locator(".steadyslip h1").count() == 1
 
 
 def test_a_browser_that_computes_otherwise_says_so(browser, file, tmp_path):

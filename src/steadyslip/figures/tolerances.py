@@ -36,7 +36,10 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     if len(known):
         ax.barh(0, known.max() - known.min(), 0.55, left=known.min(), color=SKY, label="all together")
     ranges = [f"{one.parameter}\n{shown_range(one.low, one.high, one.unit, one.area)}" for one in shown]
-    ax.set_yticks(range(len(shown) + 1), ["all together", *(text.replace(" um", " µm") for text in ranges)])
+    ax.set_yticks(
+        range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
+    )
+    ax.use_sticky_edges = False  # or the widest bar would touch the frame
     ax.axvline(1.0, color=BLACK, linewidth=1)
     ax.axvline(float(safety_factor(found.rig)), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")
     ax.set_xlabel("stiffness over critical stiffness (1)")

@@ -68,10 +68,15 @@ def table(rows: Iterable[Sequence[Any]], head: Sequence[str] = (), left: bool = 
     lines = []
     for row in rows:
         first, *rest = [cell if isinstance(cell, Markup) else typed(cell) for cell in row]
-        side = f"<th scope=row>{first}</th>" if left else f"<td>{first}</td>"
+        side = f"<th scope=row>{_broken(first)}</th>" if left else f"<td>{first}</td>"
         cells = (f"<td{_whole(cell)}>{cell}</td>" for cell in rest)
         lines.append(f"<tr>{side}{''.join(cells)}</tr>")
     return f'<div class="wide" tabindex="0"><table>{top}<tbody>{"".join(lines)}</tbody></table></div>' if lines else ""
+
+
+def _broken(name: str) -> str:
+    """A dotted name that may go on in the next line behind a dot or a low line."""
+    return re.sub(r"(?<=[.])(?=\w)|(?<=_)(?=\w)", "<wbr>", name) if re.fullmatch(r"[A-Za-z]\w*(\.\w+)+", name) else name
 
 
 def _whole(cell: str) -> str:

@@ -22,6 +22,9 @@ body { background: #fff; }
 .report .lead { font-size: 17px; margin: 4px 0 12px; }
 .report .sketch { width: 340px; max-width: 100%; height: auto; }
 .report + .steadyslip-root { border-top: 1px solid #cfd5dd; }
+@media (max-width: 600px) {
+  .report.steadyslip-told.steadyslip-told td, .report.steadyslip-told.steadyslip-told th { padding-right: 7px; }
+}
 @page { size: A4; margin: 16mm; }
 @media print {
   .report { padding: 0; }

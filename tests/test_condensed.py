@@ -70,3 +70,14 @@ def test_what_was_just_run_is_not_run_again():
     again[0][:] = 1.0
     for fresh, old in zip(comparison.model((z + 0.01)[None]), kept, strict=True):
         np.testing.assert_array_equal(fresh[0], old)
+
+
+def test_a_motion_that_runs_away_is_given_up_at_once():
+    """Without inertia a spring too soft lets the block reach any velocity in no time, however short the steps."""
+    comparison = make_plan(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300)).comparison()
+    soft = lab.stepped().values | {"friction.b": 0.03, "slider.stiffness": 1e9}
+    z = comparison.space.coordinates(np.array([[soft[one.name] for one in comparison.space.unknowns]]))
+    assert np.any(np.isnan(comparison.model(z)[0]))
+    accepted, rejected = comparison.parts[0].forward.steps[0]
+    assert rejected < 100
+    assert accepted < 2 * len(comparison.data)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.loading.kinks import load_course, smooth_load
 from steadyslip.experiments.loading.loading import Loading, shifted
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
+from steadyslip.experiments.loading.runs import Run, _without_returns, levelled
 
 STEPS = [(40.3, 1.0, 3.0), (80.1, 3.0, 10.0), (121.7, 10.0, 3.0), (160.2, 3.0, 1.0)]
 HOLDS = [(30.3, 1.0, 0.0), (40.3, 0.0, 1.0), (90.1, 1.0, 0.0), (120.2, 0.0, 1.0)]
@@ -233,3 +236,24 @@ def test_friction_is_asked_whether_a_step_is_a_ramp(ramp, noise, words):
     assert words in " ".join(str(fit).split())
     best = min(fit.as_ramps, key=lambda one: one.ssq)
     assert best.values["step.1.duration"] == pytest.approx(ramp, abs=0.5)
+
+
+@pytest.mark.parametrize("offset", [0.0, 2.0])
+def test_a_flank_of_a_glitch_is_no_change_of_rate(offset):
+    """Its bottom passed for a level of the sensor, its way back for a run; a brief change of rate leads elsewhere."""
+    time = np.arange(0.0, 100.0, 0.02)
+    bottom, back = (time >= 48.0) & (time < 48.4), (time >= 48.4) & (time < 49.0)
+    x = 10 * time - 3.2 * bottom - np.where(back, 3.2 * (49.0 - time) / 0.6, 0.0) + offset * (time >= 49.0)
+    x = 1e-6 * (x + 0.03 * np.random.default_rng(2).standard_normal(len(time)))
+    places = np.searchsorted(time, [0.0, 48.0, 48.4, 49.0, 100.0]).tolist()
+    pieces = list(pairwise(places))
+    runs = [levelled(Run(members), time, x) for members in (pieces[:2], pieces[2:3], pieces[3:])]
+    assert len(_without_returns(runs, time, x, 3e-8)) == (1 if offset == 0.0 else 3)
+
+
+def test_a_brief_stop_is_no_glitch():
+    time = np.arange(0.0, 100.0, 0.02)
+    for stop in (0.5, 1.0, 3.0):
+        course = load_course(time, measured(time, [(48.0, 10.0, 0.0), (48.0 + stop, 0.0, 10.0)], 0.03, 0, 0, 7))
+        assert len(course.changes) == 2, stop
+        assert course.levels[1] == 0.0

@@ -113,7 +113,40 @@ def straight_runs(time: Array, displacement: Array) -> list[Run]:
     while len(groups) < count:
         count = len(groups)
         groups = _without_wander(_without_excursions(_of_one_rate(groups, pieces), pieces), pieces)
-    return [levelled(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
+    runs = [levelled(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
+    return _without_returns(runs, time, displacement, pieces.usual)
+
+
+def _without_returns(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
+    """Runs joined across a short one after which the displacement goes on as if it had not been: a flank of a glitch.
+
+    Its bottom may have passed for a level of the sensor, so that the flank alone looked like a change of rate.
+    """
+    runs, i = list(runs), 0
+    while i < len(runs) - 2:
+        before, middle, after = runs[i : i + 3]
+        if _goes_on(before, middle, after, time, noise):
+            runs[i : i + 3] = [levelled(Run(before.members + after.members), time, displacement)]
+            i = max(i - 1, 0)
+        else:
+            i += 1
+    return runs
+
+
+def _goes_on(before: Run, middle: Run, after: Run, time: Array, noise: float) -> bool:
+    """Whether one run goes on along a line of the other, beyond a short one in between."""
+    if time[middle.last - 1] - time[middle.first] > LONGEST_GLITCH * (time[-1] - time[0]):
+        return False
+    at, errors, lines = 0.5 * (time[middle.first] + time[middle.last - 1]), [], []
+    for run in (before, after):
+        t = time[run.rows]
+        slope = noise / np.sqrt(max(float(np.sum((t - t.mean()) ** 2)), 1e-300))
+        errors.append((slope, float(np.hypot(noise / np.sqrt(len(t)), slope * (at - t.mean())))))
+        lines.append(run.levels + run.rate * (at - time[0]))
+    if not _alike((before.rate, errors[0][0]), (after.rate, errors[1][0])):
+        return False
+    known = BACK * float(np.hypot(errors[0][1], errors[1][1]))
+    return bool(np.min(np.abs(lines[0] - lines[1][0])) <= known)
 
 
 def _means(values: Array, step: int) -> Array:

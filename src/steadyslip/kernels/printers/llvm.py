@@ -99,7 +99,9 @@ class _Writer:
                 self.lines.append(f"  store {value}, {self._vector()} {address}, align 8")
         body = "\n".join(self.lines)
         array = f"{self.pointer} noalias nocapture"
-        return f"define void @{symbol}({array} %R, double %x, {array} %y) nounwind {{\nentry:\n{body}\n  ret void\n}}"
+        head = f"define void @{symbol}({array} %R, double %x, {array} %y) nounwind"
+        aligned = "" if self.width == 1 else f" alignstack({8 * VECTOR})"  # a fifth of the time
+        return f"{head}{aligned} {{\nentry:\n{body}\n  ret void\n}}"
 
     def emit(self, nodes: Sequence[Node], loop: Loop | None = None) -> None:
         """Everything that is not inside a loop, or that is inside this one."""

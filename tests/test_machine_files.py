@@ -127,7 +127,7 @@ STRUCTURE = {
         two_mass(), {"bodies": {"motor": ss.RotatingBody(), "table": ss.SlidingBody()}}, "drive.control"),
     "does not; see the kinds of link": (
         two_mass(), {"links": {"screw": ss.Screw(between=BOTH, lead=1.0, stiffness=1.0)}}, "links.screw.between"),
-    "neither end moves away": (
+    "does not move away from the surface": (
         two_mass(), {"links": {"screw": ss.Spring(between=BOTH, stiffness=1.0, angle=0.1)}}, "links.screw"),
     "unknown link 'belt'": (
         two_mass(), {"contacts": {"g": surface("table", ROCK, loaded_by="belt")}}, "contacts.g.loaded_by"),

@@ -75,6 +75,18 @@ def test_critical_stiffness_of_two_blocks(slope, coupling, critical):
     assert growth(critical * (1 - near)) > 0 > growth(critical * (1 + near))
 
 
+def test_stable_values_of_a_slider_are_its_stable_stiffness():
+    """By another route: where the polynomial is looked at, not p and q of the Model."""
+    slider, _ = pair(FRICTIONS["two states"], CONTACTS["inclined"], DRIVES["pull"], False)
+    assert ss.stable_values(slider, "stiffness") == pytest.approx(ss.stable_stiffness(slider), rel=1e-9)
+
+
+def test_friction_that_pulls_is_told():
+    machine = two_mass(friction=rate_state(0.5, -0.3, 1.0, mu=0.1)).with_values({"drive.velocity": 3.0})
+    (warning,) = ss.analyze(machine).warnings
+    assert "contact guide is not positive" in warning
+
+
 def test_coulomb_flutter_begins_where_theory_says():
     critical = 0.1 / 0.24
     assert leading(brake(coulomb(critical * (1 + 1e-8)))).real > 1e-6

@@ -76,11 +76,13 @@ class Machine(Rig):
                     yield Problem(
                         where, f"{end!r} {does}, which this end of a {link.name} does not; see the kinds of link"
                     )
-            if {"y"} & link.directions().keys() and not any(self._lifts(end) for end in link.between):
-                yield Problem(
-                    f"links.{name}", "is at an angle, but neither end moves away from the surface; make one a body "
-                    "that moves in the plane, or give its contact the law inclined-spring",
-                )  # fmt: skip
+            kept = [end for end in link.between if end in self.bodies and not self._lifts(end)]
+            if "y" in link.directions() and kept:
+                message = (
+                    f"pulls at an angle, but {kept[0]!r} does not move away from the surface, so that it is open what "
+                    "carries it; make it a body that moves in the plane, or give its contact the law inclined-spring"
+                )
+                yield Problem(f"links.{name}", message)
             if set(link.between) == {GROUND, LOAD_POINT}:
                 yield Problem(f"links.{name}.between", "links no body; allowed: a body at one end at least")
         for name, touch in self.contacts.items():

@@ -74,7 +74,7 @@ def analyze_machine(machine: Machine) -> MachineAnalysis:
             mode=mode_of(machine, point, complex(leading.real, abs(leading.imag))) if posed else None,
             on_edge=bool(on_edge(point)) or decided_by_rounding(point),
             margins=distances,
-            warnings=_warnings(machine),
+            warnings=_warnings(machine, steady),
             version=__version__,
             **numbers,
         )
@@ -119,12 +119,19 @@ def _sliding(steady: SteadyMachine | None) -> str:
     )
 
 
-def _warnings(machine: Machine) -> tuple[str, ...]:
+def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
+    """What a reader must know beside the verdict."""
+    pulled = [name for name, one in steady.contacts.items() if one.friction <= 0]
+    found = tuple(
+        f"the friction coefficient of contact {name} is not positive in steady sliding; check level and velocity"
+        for name in pulled
+    )
     blind = [name for name, touch in machine.contacts.items() if not touch.friction.memory()]
     if not blind:
-        return ()
+        return found
     which = f"contact {blind[0]} has" if len(blind) == 1 else f"contacts {', '.join(blind)} have"
     return (
+        *found,
         f"the friction law of {which} no memory of sliding, so that whether it judders at low speed is not predicted; "
         "use a law with memory",
     )

@@ -504,3 +504,22 @@ def test_eigenvalues_of_machines_at_random_make_theory_11s_matrix_singular(seed)
         values = np.linalg.svd(matrix(s), compute_uv=False)
         near = np.linalg.svd(matrix(s * (1 + 1e-6)), compute_uv=False)
         assert values[-1] < 1e-8 * values[0] or values[-1] < 1e-3 * near[-1]
+
+
+@pytest.mark.parametrize("machine", [two_mass(), three_bodies(), brake(rate_state(0.02, -0.01, 0.5))])
+def test_every_balance_is_zero_in_steady_sliding(machine):
+    """Forces of coordinates and friction of contacts, T, τ and σ as they are defined; rates too, so that it goes on."""
+    point = operating_point(machine)
+    model = point.model
+    balances = [one.balance for one in (*model.coordinates, *model.contacts)]
+    stated = [model.inlined(symbol) - model.steady[symbol] for symbol in model.definitions]
+    values = point.evaluate(
+        model.function([model.at_steady(model.inlined(e)) for e in (*balances, *stated, *model.rates)])
+    )
+    assert np.abs(np.array(values, dtype=float)) == pytest.approx(np.zeros(len(values)), abs=1e-14)
+
+
+def test_motors_and_tables_are_measured_by_the_rigid_motion():
+    """Two radians of the motor are one metre of the table: in the slow mode both go alike."""
+    slow = ss.modes(three_bodies())[0]
+    assert abs(slow.amplitudes["motor"] / slow.amplitudes["table"] - 1) < 0.1

@@ -14,7 +14,7 @@ from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge
 from steadyslip.model.point import operating_point
-from steadyslip.verdict.analyze import linear_numbers
+from steadyslip.verdict.analyze import numbers_of
 
 
 @cache
@@ -53,7 +53,7 @@ def compared(explored, rig, branch=0):
     if not point.sigma > 0 or found["status"] == ABSENT:
         return Difference((ABSENT if not point.sigma > 0 else None, found["status"]), 0.0, 0.0, 0.0)
     with np.errstate(all="ignore"):
-        analysis = SimpleNamespace(**{"critical_stiffness": None} | linear_numbers(rig, point))
+        analysis = SimpleNamespace(**{"critical_stiffness": None} | numbers_of(rig, point))
         verdicts = (STABLE if analysis.stable else UNSTABLE, bool(on_edge(point))), (found["status"], found["onEdge"])
     apart = Difference(verdicts, 0.0, 0.0, 0.0)
     ours, theirs = analysis.critical_stiffness, found["critical"]

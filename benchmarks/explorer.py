@@ -172,16 +172,18 @@ def speeds(_: int) -> None:
                     found("redraw, median", np.median(drawn))
                     found("redraw, 95 %", np.percentile(drawn, 95))
                 else:
+                    found("redraw, phone, 4 x slower, median", np.median(drawn))
                     found("redraw, phone, 4 x slower, 95 %", np.percentile(drawn, 95))
         browser.close()
     found("twenty damped cycles", _twenty_cycles())
     for what, bar in BARS.items():
         most = max(worst[what])
-        print(f"{what:<34}{most:8.1f}   bar {bar:g}{'' if most <= bar else '   MISSED'}")
+        print(f"{what:<36}{most:8.1f}   bar {bar:g}{'' if most <= bar else '   MISSED'}")
 
 
 BARS = {
-    "redraw, median": 16, "redraw, 95 %": 33, "redraw, phone, 4 x slower, 95 %": 100, "twenty damped cycles": 5,
+    "redraw, median": 16, "redraw, 95 %": 33, "redraw, phone, 4 x slower, median": 100,
+    "redraw, phone, 4 x slower, 95 %": 100, "twenty damped cycles": 5,
     "verdict after opening": 300, "verdict painted": 300, "explore cold, s": 3, "size of the page, kB": 200,
 }  # fmt: skip
 

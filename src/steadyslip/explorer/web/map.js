@@ -14,6 +14,8 @@ export class Chart {
   constructor(page, axes) {
     this.page = page;
     this.axes = axes;
+    this.rows = 0; // of the regions that are painted, and for which values
+    this.painted = "";
     this.stripes = `stripes-${Math.random().toString(36).slice(2)}`; // several pages may share a document
     const { parameters } = page.rig.data;
     this.choices = [0, 1].map((which) => {
@@ -61,10 +63,10 @@ export class Chart {
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
     this.choices.forEach((select, which) => (select.value = String(this.axes[which])));
+    const rows = (facts.affine ? ROWS : ROWS_SEARCHED) / (this.page.sliding ? 2 : 1); // finer once the hand rests
     const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
-    if (others !== this.painted) { // the point alone may move: then the regions stay
-      this.painted = others;
-      const rows = facts.affine ? ROWS : ROWS_SEARCHED;
+    if (others !== this.painted || rows > this.rows) { // the point alone may move: then the regions stay
+      [this.painted, this.rows] = [others, rows];
       const { paths, outline } = regions((a, b) => rig.status(i, x.at(a), j, y.at(b)), rows, box.width, box.height);
       this.frame(i, j, x, y);
       for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);

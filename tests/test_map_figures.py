@@ -210,3 +210,12 @@ def test_numbers_out_of_range_have_words(tmp_path):
     bare = ss.run_map(ss.Map(base, over, ["critical_stiffness"]), tmp_path / "bare.zarr", workers=1)
     (words,) = (word for word in labels(bare.plot()) if word.startswith("no critical stiffness"))
     assert "out of range" in words
+
+
+def test_the_text_of_a_map_without_status_says_where_to_look(tmp_path):
+    over = {"friction.b": ss.Grid(0.010, 0.03, 9)}
+    bare = ss.run_map(ss.Map(rig(), over, ["critical_stiffness"]), tmp_path / "bare.zarr", workers=1)
+    told = ss.run_map(ss.Map(rig(), over, ["critical_stiffness", "status"]), tmp_path / "told.zarr", workers=1)
+    hint = "compute status as well to know of the rest"
+    assert hint in str(bare)
+    assert hint not in str(told)

@@ -19,6 +19,8 @@ from steadyslip.maps.store.arrays import Store
 from steadyslip.maps.view import export
 
 BLOCK = 2**22  # points read at a time
+LINEAR = ("critical_stiffness", "safety_factor", "margin", "stable_stiffness", "growth_rate")
+"""Results that are missing where there is no steady sliding, or numbers are out of range, which `status` tells."""
 
 
 class MapResult(Displayed):
@@ -196,6 +198,8 @@ class MapResult(Displayed):
                 text += "" if found["share"] == 1 else f", for {_percent(found['share'])} of the points"
             else:
                 text = "nowhere"
+            if name in LINEAR and "status" not in self.results and found.get("share", 1) < 1:
+                text += "; compute status as well to know of the rest"
             lines.append(f"  {name:<24}{text}")
         return "\n".join(lines)
 

@@ -1,0 +1,60 @@
+"""Machines: how long verdicts and eigenvalues take, and random machines against theory 11's matrix typed with NumPy.
+
+python benchmarks/machines.py [COUNT] [--first SEED]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+import numpy as np
+
+import steadyslip as ss
+from machines import at_random, three_bodies
+
+SINGULAR = 1e-8  # smallest over largest singular value of the matrix at an eigenvalue
+
+
+def seconds(what):
+    start = time.process_time()
+    what()
+    return time.process_time() - start
+
+
+def times():
+    """CPU seconds of a verdict on three bodies with three contacts, and eigenvalues per second."""
+    machine = three_bodies()
+    print(f"analyze, three bodies: {seconds(lambda: ss.analyze(machine)):.2f} s at first", end=", ")
+    other = machine.with_values({"drive.kp": 1.9})
+    print(f"{seconds(lambda: ss.analyze(other)):.2f} s again")
+    count = 40_000
+    stiffness = {"links.screw.stiffness": np.linspace(50, 500, count)}
+    print(f"eigenvalues: {count / seconds(lambda: ss.eigenvalues(machine, stiffness)):,.0f} machines a second")
+
+
+def campaign(count, first):
+    """Eigenvalues at which the matrix is singular, and others."""
+    right = wrong = 0
+    for seed in range(first, first + count):
+        machine, matrix = at_random(seed)
+        for s in ss.eigenvalues(machine):
+            here, near = (np.linalg.svd(matrix(z), compute_uv=False) for z in (s, s * (1 + 1e-6)))
+            good = here[-1] < SINGULAR * here[0] or here[-1] < 1e-3 * near[-1]
+            right, wrong = right + good, wrong + (not good)
+            if not good:
+                print(f"seed {seed}: {s}")
+    print(f"{count} random machines: {right} eigenvalues right, {wrong} wrong")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=50)
+    parser.add_argument("--first", type=int, default=0)
+    chosen = parser.parse_args()
+    times()
+    campaign(chosen.count, chosen.first)

@@ -265,3 +265,11 @@ def test_map_is_drawn_with_units():
     assert "steady sliding is unstable" in ax.get_legend_handles_labels()[1]
     with pytest.raises(ss.ParameterError, match="two dimensions"):
         ss.figures.threshold_map(found.values)
+
+
+def test_a_block_whose_velocity_is_a_formula_has_a_threshold():
+    """Regularised PRZ without mass: nothing is left to solve for, so that motion goes on without a guess."""
+    friction = ss.RateState(a=0.0145, b=0.016, d_c=1e-6, mu_ref=0.7, v_ref=1e-6, evolution=ss.PRZ(), regularised=True)
+    rig = ss.Slider(friction=friction, contact=ss.Constant(preload=5e6), stiffness=9e9, drive=ss.Steady(1e-6))
+    found = ss.threshold(rig, precision=0.01)
+    assert found.bracket[0] > 0

@@ -211,7 +211,7 @@ def continuous_at(
         speed = np.array(velocity)
         if reduction.form == "eliminated":
             speed = np.asarray(point.drive) * np.exp(state[:, reduction.names.index("w")])
-        elif unknown is not None and not reduction.model.inertial:
+        elif unknown is not None and reduction.unknown is not None and not reduction.model.inertial:
             known = np.broadcast_to(velocity_at(reduction, point, state, unknown), speed.shape)
             speed = np.where(np.isfinite(known), known, speed)
     return np.ascontiguousarray(initial), speed

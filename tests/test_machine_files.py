@@ -241,7 +241,6 @@ CALLS = [
     lambda m: ss.stable_stiffness(m), lambda m: ss.small_signal(m), lambda m: ss.state_space(m),
     lambda m: ss.formula(m), lambda m: ss.explore(m), lambda m: ss.safety_factor(m),
     lambda m: ss.steady_states(m),
-    lambda m: ss.analyze(m).plot(),
 ]  # fmt: skip
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NoSteadySliding
-from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import Margin, margins
 from steadyslip.linear.modes import Mode, mode_of
@@ -27,10 +26,6 @@ from steadyslip.verdict.words import BEYOND, disturbance, headline, lines_of, ma
 @dataclass(frozen=True, repr=False)
 class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
     __doc__ = MachineFindings.__doc__
-
-    def plot(self, ax: Any = None) -> Any:
-        """No figure shows a machine yet: NotAvailable."""
-        return draw(self, ax=ax)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``--json`` prints it."""

@@ -1,5 +1,7 @@
 """Figures of simulated motion: read from the Axes, not from pixels."""
 
+from pathlib import Path
+
 import matplotlib
 import numpy as np
 import pytest
@@ -103,3 +105,15 @@ def test_figure_5_is_a_weak_spiral_at_the_edge():
     tops = u[1:-1][(u[1:-1] > u[:-2]) & (u[1:-1] > u[2:])]
     assert np.all(np.diff(tops) < 0)
     assert np.all(np.diff(tops) > -0.01)
+
+
+def test_every_slip_event_can_be_seen():
+    """However short it is beside the run: its band has some width on paper, and its middle in it."""
+    example = Path(__file__).parents[1] / "examples/stick-slip.toml"
+    run = ss.simulate(ss.read_rig(example), ss.read_protocol(example), until=200.0)
+    axes = run.plot()
+    bands = [patch for patch in axes[0].patches if patch.get_width() > 0]
+    assert len(bands) == len(run.slip_events) > 3
+    for band, slip in zip(bands, run.slip_events, strict=True):
+        assert band.get_width() >= 0.99 * 0.004 * 200
+        assert band.get_x() <= 0.5 * (slip.begin + slip.end) <= band.get_x() + band.get_width()

@@ -239,3 +239,37 @@ def test_verdicts_at_absurd_sizes_are_those_of_numbers_without_end():
             assert said in (known, "out of range", "on the edge to within rounding"), (stem, change)
             found[said == known] += 1
     assert found[True] > 40
+
+
+@pytest.mark.parametrize("name", ["inclined-spring", "slow-axis", "two-states"])
+@pytest.mark.parametrize("power", [-660, -500, 500, 640])
+def test_the_unit_of_stress_changes_no_verdict(name, power):
+    """Products of stresses leave the range long before stresses do; powers of two change no other digit."""
+    a_rig, unit = ss.read_rig(EXAMPLES / f"{name}.toml"), 2.0**power
+    address = a_rig.parameters()
+    stresses = [n for n, one in address.items() if one.role.unit.startswith(("Pa", "kg/m^2")) and one.value is not None]
+    scaled = a_rig.with_values({n: address[n].value * unit for n in stresses})
+    plain, found = ss.analyze(a_rig), ss.analyze(scaled)
+    assert found.stable == plain.stable
+    assert np.array(found.stable_stiffness) == pytest.approx(np.array(plain.stable_stiffness) * unit, rel=1e-9)
+    for before, after in zip(ss.boundary(a_rig, "stiffness" if a_rig.stiffness else "kp"),
+                             ss.boundary(scaled, "stiffness" if a_rig.stiffness else "kp"), strict=True):  # fmt: skip
+        assert after.value == pytest.approx(before.value * unit, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        lambda r: ss.critical_stiffness(r, {"mass": 10**400}),
+        lambda r: ss.eigenvalues(r, {"stiffness": 10**6000}),
+        lambda r: ss.boundary(r, "stiffness", between=(1, 10**400)),
+        lambda r: ss.simulate_many(r, {"stiffness": [10**400]}, until=1.0),
+        lambda r: ss.simulate(r, until=1.0, initial={"v": 10**400}),
+        lambda r: ss.simulate(r, until=1.0, initial={"v": []}),
+        lambda r: ss.simulate(r, until=1.0, initial={"v": True}),
+        lambda r: ss.critical_stiffness(r, {"mass": True}),
+    ],
+)
+def test_what_is_no_number_in_range_is_told_so(question):
+    with pytest.raises(ss.ParameterError, match=r"got .*; allowed: "):
+        question(ss.read_rig(EXAMPLES / "inclined-spring.toml"))

@@ -360,3 +360,23 @@ def test_worth_of_means_of_noise_that_lasts(memory):
     late = few.time > 100
     spread = np.std((few.friction[late] - 0.6) * np.sqrt(few.worth[late]))
     assert spread == pytest.approx(np.std(noise), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("role", "change", "told"),
+    [
+        ("time", lambda t: 0 * t + 3.0, "was the clock running"),
+        ("time", lambda t: 1e-100 * t, "was the clock running"),
+        ("normal", lambda s: 1e160 * s, "normal: line .*1e\\+167.* in SI units; allowed: sizes up to 1e\\+60"),
+        ("displacement", lambda x: 1e300 * x, "displacement: line .* in SI units"),
+    ],
+)
+def test_a_stuck_clock_and_absurd_numbers_are_told(tmp_path, role, change, told):
+    time, friction, normal, moved = columns()
+    table = {"time": time, "friction": friction, "normal": normal, "displacement": moved}
+    table[role] = change(table[role])
+    path = tmp_path / "record.txt"
+    head = "time(s) friction normal(MPa) displacement(um)"
+    np.savetxt(path, np.column_stack(list(table.values())), header=head, comments="")
+    with pytest.raises(ss.ParameterError, match=told):
+        ss.read_record(path)

@@ -158,3 +158,19 @@ def test_without_stiffness_nothing_grows_or_dies(b, mass):
     assert text.startswith("ON THE EDGE")
     assert "nothing restores the block's place" in text
     assert "stable at every stiffness" not in text
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e12])
+@pytest.mark.parametrize("stiffness", [1e3, 1e7, 1e9, 1e12, 1e14])
+def test_no_oscillation_is_said_to_grow_where_roots_are_real(stiffness, mass):
+    """(α − μ) tan ψ > 1: two roots lie on the right at every stiffness, a pair only at some."""
+    friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=2.5))
+    a_rig = rig(
+        friction=friction, contact=ss.InclinedSpring(preload=5e6, angle=np.pi / 4), stiffness=stiffness, mass=mass
+    )
+    found = ss.analyze(a_rig)
+    assert not found.stable
+    assert "a disturbance grows at every stiffness" in text_of(a_rig)
+    leading = found.eigenvalues[0]
+    assert ("without oscillating" in text_of(a_rig).split("stable for")[0]) == (leading.imag == 0)
+    assert "oscillation grows" not in found.reason

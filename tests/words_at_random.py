@@ -210,7 +210,7 @@ def _causes(rig, verdict, text):
     """Reasons, by taking away what they name."""
     if "with this mass" in text:
         light = rig.with_values({"mass": 0.0})
-        if not rig.mass or "oscillation grows at every stiffness" in why_none(ss.analyze(light)):
+        if not rig.mass or "a disturbance grows at every stiffness" in why_none(ss.analyze(light)):
             yield "with this mass: without it as well"
         if not ss.stable_stiffness(light).size or np.all(np.isnan(ss.stable_stiffness(light))):
             yield "with this mass: nor is it stable without"

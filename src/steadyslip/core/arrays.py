@@ -30,9 +30,9 @@ def checked_array(name: str, role: Parameter, value: Any) -> Any:
         except QuantityError as error:
             raise ParameterError([Problem(name, str(error))]) from error
     try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ParameterError([Problem(name, f"got {value!r}; allowed: numbers in {role.unit}")]) from error
+        array = _numbers(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ParameterError([Problem(name, f"got {brief(value)}; allowed: numbers in {role.unit}")]) from error
     if not array.size:
         raise ParameterError([Problem(name, "got an empty array; give at least one value")])
     if not (role.domain.contains(array.min()) and role.domain.contains(array.max())):
@@ -43,6 +43,22 @@ def checked_array(name: str, role: Parameter, value: Any) -> Any:
             [Problem(name, f"got {bad!r} at position {where}; allowed: {role.domain.text} in {role.unit}")]
         )
     return array if array.ndim else float(array)
+
+
+def _numbers(value: Any) -> np.ndarray:
+    array = np.asarray(value)
+    if array.dtype == bool:
+        raise TypeError("True and False are no numbers")
+    return np.asarray(value, dtype=float)
+
+
+def brief(value: Any) -> str:
+    """What came, as a message shows it."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python writes out
+        return "a number of thousands of digits"
+    return text if len(text) <= 60 else f"{text[:50]}..."
 
 
 def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _SPANS = 40  # slip events are shaded only if they are fewer than this
 _LEAST_SPAN = 2e-3  # of the size of the values: less is drawn as no change
+_LEAST_BAND = 4e-3  # share of the time shown: shorter slip events are drawn so wide, to be seen at all
 _DECADES = 12.0  # a blow-up is drawn to this many decades above the drive
 
 
@@ -70,10 +71,13 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     _keep_span(panels[2], run["normal_stress"] / stress_factor)
     slips = run.slip_events if len(run.slip_events) < _SPANS else ()
     _name_slip_events(panels[0], len(run.slip_events))
+    narrowest = _LEAST_BAND * run.end
     for panel in panels:
         panel.grid(color=GREY, linewidth=0.3)
         for slip in slips:
-            panel.axvspan(slip.begin / factor, slip.end / factor, color=ORANGE, alpha=0.15, linewidth=0)
+            wider = max(0.5 * (narrowest - (slip.end - slip.begin)), 0.0)
+            begin, end = (slip.begin - wider) / factor, (slip.end + wider) / factor
+            panel.axvspan(begin, end, color=ORANGE, alpha=0.15 if not wider else 0.4, linewidth=0)
         if run.status != "done":
             panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
     if run.status != "done":

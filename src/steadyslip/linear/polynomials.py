@@ -22,6 +22,7 @@ R = TypeVar("R")
 _NEARLY_REAL = 1e-6  # relative imaginary part below which a root in β² is tried as a boundary
 _CLOSE = 1e-3  # relative distance of two roots below which they are found again as a pair
 _ROUNDING = 16 * np.finfo(float).eps  # share of (half sum)² below which a pair's discriminant is zero to rounding
+_FAR = 1e75  # size beyond which products of four coefficients may leave the range of floating point
 _SAME = 1e-9  # relative distance below which two boundaries in k are one
 
 
@@ -273,6 +274,7 @@ def stable_set(p: Array, q: Array) -> StableSet:
     p, q = np.broadcast_arrays(p, q)
     shape, n = p.shape[:-1], p.shape[-1] - 1
     p, q = p.reshape(-1, n + 1), q.reshape(-1, n + 1)
+    (p, of_p), (q, of_q) = _near_one(p), _near_one(q)  # products of what is left stay numbers
     k, beta = _candidates(p, q)
     order = np.argsort(np.where(np.isnan(k), np.inf, k), axis=-1)
     k, beta = np.take_along_axis(k, order, -1), np.take_along_axis(beta, order, -1)
@@ -286,6 +288,7 @@ def stable_set(p: Array, q: Array) -> StableSet:
     probes = _between(k, p, q)
     stable = is_hurwitz(p[:, None, :] + probes[..., None] * q[:, None, :])
     changes = (stable[:, 1:] != stable[:, :-1]) & np.isfinite(k)
+    k = np.ldexp(k, of_p - of_q)
     intervals = _intervals(np.where(np.isnan(k), np.inf, k), stable)
     return StableSet(
         intervals.reshape(*shape, *intervals.shape[1:]),
@@ -293,6 +296,16 @@ def stable_set(p: Array, q: Array) -> StableSet:
         np.where(np.isnan(k), np.nan, beta).reshape(*shape, -1),
         changes.reshape(*shape, -1),
     )
+
+
+def _near_one(c: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Polynomials whose coefficients are all tiny or all huge over a power of two, and the exponents, (..., 1)."""
+    sizes = np.abs(c)
+    largest = np.max(sizes, axis=-1, keepdims=True)
+    least = np.min(np.where(sizes > 0, sizes, np.inf), axis=-1, keepdims=True)
+    off = np.where(largest < 1 / _FAR, largest, np.where(least > _FAR, least, 1.0))
+    exponents = np.where(np.isfinite(off) & (off > 0), np.frexp(off)[1], 0)
+    return np.ldexp(c, -exponents), exponents
 
 
 def _candidates(p: Array, q: Array) -> tuple[Array, Array]:

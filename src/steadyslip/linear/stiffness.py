@@ -29,6 +29,7 @@ from steadyslip.model.range import characteristic, in_range, require_range, stac
 from steadyslip.model.steady import steady_equation
 
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
+_LEAST = 1e-290  # size beneath which a product of numbers is looked at by the general route
 
 
 @checked()
@@ -192,7 +193,17 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
     exists, numerator, denominator, mu_b2, mu_b3, a2, a3, gain = _interval_function(point.model)(point)
     low, high = cubic.stable_interval(numerator, denominator, mu_b2, mu_b3, a2, a3)
     low, high = cubic.without_gain(low, high, gain)
-    return cubic.unless(exists, low), cubic.unless(exists, high)
+    low, high = cubic.unless(exists, low), cubic.unless(exists, high)
+    if np.any(lost := _lost(numerator)):
+        ends = general_set(point).intervals[..., 0, :]
+        low, high = np.where(lost, ends[..., 0], low), np.where(lost, ends[..., 1], high)
+    return low, high
+
+
+def _lost(product: Array) -> Any:
+    """Whether a product of numbers may have left the range of floating point, or lost digits at its lower end."""
+    size = np.abs(product)
+    return ~((size > _LEAST) & (size < 1 / _LEAST))
 
 
 @question

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import brief
 from steadyslip.core.errors import InternalError, ParameterError, Problem, unknown_name
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
@@ -108,10 +109,10 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
             continue
         try:
             array = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             array = np.array(np.nan)
-        if not np.all(np.isfinite(array)):
-            problems.append(Problem(f"initial.{name}", f"got {value!r}; allowed: finite numbers in SI units"))
+        if not array.size or not np.all(np.isfinite(array)) or np.asarray(value).dtype == bool:
+            problems.append(Problem(f"initial.{name}", f"got {brief(value)}; allowed: finite numbers in SI units"))
         found[name] = array
     if problems:
         raise ParameterError(problems)

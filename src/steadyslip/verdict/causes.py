@@ -64,7 +64,7 @@ def why_none(analysis: Findings) -> str:
         return ""  # products beyond floating point decide nothing
     if _reachable(denominator, numerator, gain):
         return ": where no oscillation grows, a disturbance grows without oscillating"
-    return f": an oscillation grows at every stiffness{_why_oscillating(known, denominator)}"
+    return f": a disturbance grows at every stiffness{_why_negative(known, denominator)}"
 
 
 def _reachable(slope: float, right: float, least: float) -> bool:
@@ -72,7 +72,7 @@ def _reachable(slope: float, right: float, least: float) -> bool:
     return slope > 0 or slope * least > right or (slope == 0 and right < 0)
 
 
-def _why_oscillating(known: Response, denominator: float) -> str:
+def _why_negative(known: Response, denominator: float) -> str:
     """Which of its terms makes D negative: D = (f + f1 B1)(1 + f1 B2) + r (μ − f1)(B0 − m B2)."""
     coupling, memory = 1 + known.f1 * known.B2, known.r * (known.mu - known.f1)
     direct = known.f + known.f1 * known.B1

@@ -20,6 +20,7 @@ from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen, 
 Array = np.ndarray
 GAP = 10.0  # times the usual spacing
 AROUND = 25  # rows before and behind, from which that is told
+HUGEST = 1e60  # of a number in SI units
 PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
 
 
@@ -217,6 +218,7 @@ def record_from_arrays(
 def _cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) -> Record:
     """Rows in order of time, each whole, with a note of every one that is not."""
     si, lines = _without_gaps_in_rows(si, lines, notes)
+    _check_sizes(si, source, lines)
     if len(lines) >= FEWEST_ROWS:
         si, lines = _in_order(si, lines, notes)
     if len(lines) < FEWEST_ROWS:
@@ -322,6 +324,22 @@ def _local_median(spacing: Array) -> Array:
     count = len(spacing) // block
     medians = np.median(spacing[: count * block].reshape(count, block), axis=1)
     return np.asarray(medians[np.minimum(np.arange(len(spacing)) // block, count - 1)])
+
+
+def _check_sizes(si: dict[str, Array], source: str, lines: Array) -> None:
+    """Refuse numbers that no experiment gives and whose squares or ratios are none, and a clock that stands still."""
+    problems = []
+    for role, values in si.items():
+        if np.any(huge := np.abs(values) > HUGEST):
+            i = int(np.argmax(huge))
+            message = f"line {lines[i]}: {values[i]:.4g} in SI units; allowed: sizes up to {HUGEST:g}"
+            problems.append(Problem(role, message))
+    time = si["time"]
+    if len(time) and not np.ptp(time) > 1 / HUGEST:
+        message = f"all {len(time)} rows lie within {1 / HUGEST:g} s of {time[0]:.4g} s; was the clock running?"
+        problems.append(Problem("time", message))
+    if problems:
+        raise ParameterError(problems, title=source)
 
 
 def _check_stress(si: dict[str, Array], source: str, lines: Array) -> None:

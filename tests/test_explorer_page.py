@@ -2,6 +2,8 @@
 
 import json
 import re
+import tempfile
+import webbrowser
 from pathlib import Path
 from urllib.parse import quote
 
@@ -511,6 +513,25 @@ def test_the_command_writes_the_page(tmp_path):
     refused = run("explore", tmp_path / "my rig.toml", "-o", tmp_path / "page.pdf")
     assert refused.returncode == 2
     assert ".html" in refused.stderr
+
+
+@pytest.mark.parametrize("command", ["explore", "report"])
+def test_where_there_is_no_browser_the_command_says_where_the_page_is(tmp_path, monkeypatch, command):
+    ss.write_rig(INCLINED, tmp_path / "rig.toml")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(webbrowser, "open", lambda address: False)
+    answered = run(command, tmp_path / "rig.toml")
+    (page,) = tmp_path.glob("steadyslip-*.html")
+    assert answered.returncode != 0
+    assert "opened" not in answered.stdout
+    assert "no browser can be started here" in answered.stderr
+    assert page.name in answered.stderr.replace("\n", "")
+    asked = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: asked.append(address) or True)
+    answered = run(command, tmp_path / "rig.toml")
+    assert answered.returncode == 0
+    assert answered.stdout.startswith("opened ")
+    assert asked[0].startswith("file://")
 
 
 def test_notebooks_show_it_in_a_frame():

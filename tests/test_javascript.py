@@ -53,6 +53,21 @@ def test_elementary_functions_are_those_of_the_kernels(runtime, name):
     assert np.all(np.abs(found - expected) <= margin)
 
 
+def test_the_exponential_is_that_of_the_kernels_to_the_last_bit(runtime):
+    x = np.random.default_rng(1).uniform(-720, 720, 4000).tolist() + [0.0, -0.0, 700.0, -700.0, 1e-300, 350.5, math.inf]
+    assert runtime("x.map(exp)", x=x) == [primitives.exp(one) for one in x]
+    assert runtime("Number.isNaN(exp(NaN))")
+
+
+def test_arrays_are_parts_of_one_block(runtime):
+    """Rows do not overlap, and none is missed."""
+    script = "(() => { const a = zeros(2, 3, 4); let n = 0; for (const b of a) for (const c of b) c.fill(n++); return [a, a.shape]; })()"
+    rows, shape = runtime(script)
+    assert shape == [2, 3, 4]
+    assert np.array_equal(rows, np.arange(6).reshape(2, 3, 1) * np.ones(4))
+    assert runtime("[zeros(0, 3), zeros(1, 0, 4), zeros(2, 0), zeros(3)]") == [[], [[]], [[], []], [0, 0, 0]]
+
+
 def test_elementary_functions_end_as_in_the_kernels(runtime):
     assert runtime("[exp(1e4), exp(-1e4), log(0), log(-1), expm1(1e4)]") == [
         pytest.approx(math.exp(700)), pytest.approx(math.exp(-700)), pytest.approx(-708.3964185322641),

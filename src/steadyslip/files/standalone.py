@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.pages import whole
 from steadyslip.files.output import write_text
 
@@ -41,13 +42,28 @@ class Standalone:
         write_text(path, self.html)
 
     def open(self) -> Path:
-        """Show it in the browser; the file it is in."""
+        """Show it in the browser; the file it is in.
+
+        Raises
+        ------
+        NotAvailable
+            If no browser can be started; the file is there all the same, and named.
+        """
         with tempfile.NamedTemporaryFile(
             "w", suffix=".html", prefix="steadyslip-", delete=False, encoding="utf-8"
         ) as to:
             to.write(self.html)
-        webbrowser.open(Path(to.name).as_uri())
-        return Path(to.name)
+        path = Path(to.name)
+        try:
+            shown = webbrowser.open(path.as_uri())
+        except webbrowser.Error:
+            shown = False
+        if not shown:
+            raise NotAvailable(
+                f"no browser can be started here; the page is in {path}: open that file in a browser, or have it "
+                'written where you want it (save("page.html"), -o page.html on the command line)'
+            )
+        return path
 
     def _repr_html_(self) -> str:
         """In a frame of its own, for notebooks."""

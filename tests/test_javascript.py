@@ -54,14 +54,15 @@ def test_elementary_functions_are_those_of_the_kernels(runtime, name):
 
 
 def test_the_exponential_is_that_of_the_kernels_to_the_last_bit(runtime):
-    x = np.random.default_rng(1).uniform(-720, 720, 4000).tolist() + [0.0, -0.0, 700.0, -700.0, 1e-300, 350.5, math.inf]
+    x = [*np.random.default_rng(1).uniform(-720, 720, 4000).tolist(), 0.0, -0.0, 700.0, -700.0, 1e-300, 350.5, math.inf]
     assert runtime("x.map(exp)", x=x) == [primitives.exp(one) for one in x]
     assert runtime("Number.isNaN(exp(NaN))")
 
 
 def test_arrays_are_parts_of_one_block(runtime):
     """Rows do not overlap, and none is missed."""
-    script = "(() => { const a = zeros(2, 3, 4); let n = 0; for (const b of a) for (const c of b) c.fill(n++); return [a, a.shape]; })()"
+    numbered = "for (const b of a) for (const c of b) c.fill(n++)"
+    script = f"(() => {{ const a = zeros(2, 3, 4); let n = 0; {numbered}; return [a, a.shape]; }})()"
     rows, shape = runtime(script)
     assert shape == [2, 3, 4]
     assert np.array_equal(rows, np.arange(6).reshape(2, 3, 1) * np.ones(4))

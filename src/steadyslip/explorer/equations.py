@@ -73,14 +73,17 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
         be solved), ``degree`` of the characteristic polynomial, ``closed`` (whether the `interval` of the closed form
         exists), ``edge`` (what rounding alone can make), ``grid`` (how many stresses steady sliding is searched on, and
         the powers of ten that it runs from and to), ``solved`` (misfit of a root as a share of the stress),
-        ``observed`` (names and units of what `observables` gives).
+        ``observed`` (names, units and meanings of what `observables` gives).
     """
     model = model_of(rig)
     equation = steady_equation(model)
     coefficients = characteristic_coefficients(model)
     without, slope = stiffness_split(model)
     names, observables = observed_in_steady_sliding(model)
-    closed = has_closed_form(model)
+    closed, meanings = (
+        has_closed_form(model),
+        {"spring_stress": "with the damping to the ground", **rig.friction.meanings()},
+    )
     programs = [
         _steady(model) if equation.affine else program(model, "residual", [_mismatch(model)]),
         program(model, "allowed", [_allowed(rig, model)]),
@@ -99,7 +102,7 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
         "solved": SOLVED,
-        "observed": [[name, model.observables[name][1]] for name in names],
+        "observed": [[name, model.observables[name][1], meanings.get(name, "")] for name in names],
     }
     text = "".join(javascript.text(one) for one in programs)
     return f"(() => {{\n{text}return {{ {', '.join(one.name for one in programs)} }};\n}})()", facts

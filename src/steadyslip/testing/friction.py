@@ -48,6 +48,8 @@ def check_names(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
             unit(text)
         except QuantityError as error:
             require(False, law, f"unit of {variable}: {error}; write an SI unit such as 'Pa', or '1' for none")
+    strange = sorted(set(law.meanings()) - set(shown_units))
+    require(not strange, law, f"meanings() tells of {', '.join(strange)}, which observables() does not give")
 
 
 def check_symbols(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:

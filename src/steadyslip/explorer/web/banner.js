@@ -1,6 +1,7 @@
 // The verdict: a sentence, why, and a bar of the stable stiffnesses.
 import { make, svg, tell } from "./dom.js";
 import { ABSENT } from "./linear.js";
+import { ticks } from "./plot.js";
 import { headline, kindOf, quantity, reason } from "./words.js";
 
 export class Banner {
@@ -38,10 +39,12 @@ export class Banner {
     const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
     const parts = intervals.map((one) => svg("rect", { class: "stable", x: x(one.low), width: x(one.high) - x(one.low), y: 0, height: 10 }));
     const drawing = svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, svg("rect", { class: "unstable", x: 0, y: 0, width: 100, height: 10 }), ...parts);
-    const within = (place) => `left: ${Math.min(82, Math.max(18, place))}%`, at = make("i", { className: "own", style: `left: ${x(own)}%` });
+    const within = (place) => `left: ${Math.min(80, Math.max(20, place))}%`, at = (k, name) => make("i", { className: name, style: `left: ${x(k)}%` });
     const begins = new Set(intervals.map((one) => one.low)), labels = ends.map((k) => make("span", { textContent: `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`, style: within(x(k)) }));
-    const now = make("span", { className: "now", textContent: `now ${stiffness(own)}`, style: within(x(own)) });
-    this.bar.replaceChildren(drawing, at, now, ...labels);
+    const now = make("span", { className: "now", textContent: `stiffness now ${stiffness(own)}`, style: within(x(own)) });
+    const per = this.data.area ?? 1, scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).filter((k) => x(k / per) > 6 && x(k / per) < 94);
+    const ruled = scale.flatMap((k) => [at(k / per, "tick"), make("span", { className: "tick", textContent: stiffness(k / per), style: `left: ${x(k / per)}%` })]);
+    this.bar.replaceChildren(drawing, ...ruled, at(own, "own"), ...ends.map((k) => at(k, "edge")), now, ...labels);
     const words = intervals.map(({ low: a, high: b }) => (b === Infinity ? `above ${stiffness(a)}` : `${stiffness(a)} to ${stiffness(b)}`));
     this.bar.setAttribute("aria-label", `stable stiffness: ${words.join(", or ") || "none"}`);
   }

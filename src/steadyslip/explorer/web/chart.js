@@ -33,7 +33,8 @@ export function regions(status, rows, width, height) {
       if (b !== c) points.push([(i + 1) / columns, upColumn(j, i + 1)]);
       if (d !== c) points.push([acrossRow(j + 1, i), (j + 1) / rows]);
       if (a !== d) points.push([i / columns, upColumn(j, i)]);
-      const ends = points.length === 3 ? [points[0], points[1], points[1], points[2]] : points;
+      const mean = (which) => points.reduce((sum, point) => sum + point[which], 0) / points.length; // where three regions meet
+      const ends = points.length === 3 ? points.flatMap((point) => [point, [mean(0), mean(1)]]) : points;
       for (let k = 0; k + 1 < ends.length; k += 2) outline += `M${left(ends[k][0])} ${top(ends[k][1])}L${left(ends[k + 1][0])} ${top(ends[k + 1][1])}`;
     }
   }

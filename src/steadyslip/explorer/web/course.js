@@ -100,8 +100,8 @@ export class Course {
       this.mover.forget();
       const asked = this.asked();
       this.halt.disabled = false;
-      this.late = setTimeout(() => (this.told.textContent = "moving …"), 100);
-      const told = (time) => (this.told.textContent = `moving … ${shown(time, "s", 3)} of ${shown(asked.until, "s", 3)}`);
+      this.late = setTimeout(() => (this.told.textContent = "Computing the motion …"), 100);
+      const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(asked.until, "s", 3)} so far; curves are those of before.`);
       const found = await this.mover.run(this.model, this.page.answer.sigma, asked, told);
       clearTimeout(this.late);
       this.course = { ...found, until: found.status === "done" ? asked.until : found.end, disturbance: asked.disturbance };

@@ -1,17 +1,30 @@
 // Steady sliding in numbers, eigenvalues with their locus, and the list of nearest edges.
-import { make, put, tell } from "./dom.js";
-import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { make, put, svg, tell } from "./dom.js";
+import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
 import { Locus } from "./locus.js";
 import { digits, shown } from "./quantities.js";
 import { inside } from "./rig.js";
 import { quantity } from "./words.js";
 
-const BECOMES = { [ABSENT]: "no steady sliding", [STABLE]: "becomes stable", [UNKNOWN]: "no rig" };
+const BECOMES = { [ABSENT]: "no steady sliding", [STABLE]: "becomes stable", [UNSTABLE]: "becomes unstable", [UNKNOWN]: "no such rig" };
+
+/** What the marks of the locus mean, beside the mark itself: its path and class. */
+const MARKS = [
+  ["M2 2l10 10m0 -10l-10 10", "own grows", "now, grows"], ["M2 2l10 10m0 -10l-10 10", "own", "now, dies out"],
+  ["M2 7l5 -5l5 5l-5 5z", "crossing", "at the edge of stability"],
+];
+const DOTS = "M2 7h0", LARGER = "M11 7h0";
 
 /** Rows of words in a list: elements are made where their number changes, and else told what is new. */
 function rewrite(list, rows, row, many) {
   if (list.children.length !== many * rows.length) list.replaceChildren(...rows.flatMap(row));
   rows.forEach((words, n) => words.forEach((text, k) => tell(many === 1 ? list.children[n].children[k] : list.children[many * n + k], text)));
+}
+
+function legend() {
+  const key = (words, ...drawn) => make("span", {}, svg("svg", { class: "locus", viewBox: "0 0 14 14", "aria-hidden": "true" }, ...drawn), words);
+  const dots = [svg("path", { class: "dot", d: DOTS, "stroke-width": 1.8 }), svg("path", { class: "dot", d: LARGER, "stroke-width": 4.2 })];
+  return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key("at other stiffnesses, the larger the stiffer", ...dots));
 }
 
 export class Facts {
@@ -22,24 +35,26 @@ export class Facts {
     this.eigenvalues = make("tbody", {});
     this.locus = new Locus();
     this.near = make("ol", { className: "edges" });
-    const head = make("thead", {}, make("tr", {}, ...["rate", "oscillation", "a disturbance"].map((text) => make("th", { textContent: text, scope: "col" }))));
+    const head = make("thead", {}, make("tr", {}, ...["growth rate", "oscillation", "size"].map((text) => make("th", { textContent: text, scope: "col" }))));
     this.box = make("section", { className: "facts", "aria-label": "details" },
       make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: "one parameter changed, the others as they are; press to go there" }), this.near),
-      make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
-      make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("table", {}, head, this.eigenvalues), this.locus.canvas,
-        make("p", { className: "hint", textContent: "crosses: these; dots: as the stiffness rises, from small to large; diamonds: where stability changes" })));
+      this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
+      this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas,
+        legend()));
   }
 
   /** Numbers. @param {any} answer */
   show(answer) {
     const { rig } = this.page, { area } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
-    const facts = [["normal stress", answer.sigma, "Pa"], ...rig.data.facts.observed.map(([name, unit]) => [name.replace(/_/g, " "), answer.observed[name], unit])];
-    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit]) => [area && unit === "Pa" ? name.replace("stress", "force") : name, quantity(value, unit, area)]),
+    this.sliding.hidden = this.swings.hidden = absent;
+    const facts = [["normal stress", answer.sigma, "Pa", ""], ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/_/g, " "), answer.observed[name], unit, meaning])];
+    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(area && unit === "Pa" ? name.replace("stress", "force") : name) + (meaning && `: ${meaning}`), quantity(value, unit, area)]),
       () => [make("dt", {}), make("dd", {})], 2);
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
-      return [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
+      const words = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
+      return words.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // a number stays with its unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
     this.locus.show(answer);
@@ -53,7 +68,7 @@ export class Facts {
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.change(page.with(edge.i, edge.landing));
       });
-      return make("li", {}, go, ` ${BECOMES[edge.beyond] ?? "unstable"}`);
+      return make("li", {}, go, ` ${BECOMES[edge.beyond]}`);
     }));
   }
 }

@@ -15,10 +15,10 @@ export function leaving(page) {
   const canvas = () => page.chart.canvas;
   return [
     ...(page.told ? [] : [button("link", "copy a link to these values", () => link(page))]),
-    button("TOML", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())),
-    button("SVG", "save the chart as a drawing", () => save("chart.svg", "image/svg+xml", drawing(canvas()))),
-    button("PNG", "save the chart as a picture", () => picture(canvas()).then((blob) => save("chart.png", "image/png", blob), () => (page.banner.notice.textContent = "This browser cannot make a picture of the chart; save the drawing (SVG)."))),
-    button("CSV", "save values and edges as a table", () => save("edges.csv", "text/csv", listed(page))),
+    button("rig file", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())),
+    button("chart SVG", "save the chart as a drawing", () => save("chart.svg", "image/svg+xml", drawing(canvas()))),
+    button("chart PNG", "save the chart as a picture", () => picture(canvas()).then((blob) => save("chart.png", "image/png", blob), () => (page.banner.notice.textContent = "This browser cannot make a picture of the chart; save the drawing (SVG)."))),
+    button("edges CSV", "save values and edges as a table", () => save("edges.csv", "text/csv", listed(page))),
   ];
 }
 

@@ -6,7 +6,7 @@ import { dampingOfPairs, isHurwitz, isIllPosed, roots, stableSet } from "./polyn
 /** @typedef {import("./polynomials.js").Interval} Interval */
 /** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
 /** @typedef {{parameters: string[], affine: boolean, degree: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
- *   observed: [string, string][]}} Facts */
+ *   observed: [string, string, string][]}} Facts */
 
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
 

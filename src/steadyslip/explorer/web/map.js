@@ -5,6 +5,7 @@ import { axis } from "./plot.js";
 import { shown } from "./quantities.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // where steady sliding has to be searched for, each point takes long
+const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
 const NUDGES = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class Chart {
@@ -37,11 +38,10 @@ export class Chart {
     this.canvas.addEventListener("pointermove", (event) => this.canvas.hasPointerCapture(event.pointerId) && this.drag(event, true));
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => page.rest());
     this.canvas.addEventListener("keydown", (event) => this.nudge(event));
-    const key = make("p", { className: "key" }, ...[["stable", "stable"], ["unstable", "unstable"], ["none", "no steady sliding"], ["unknown", "no rig"]]
-      .map(([name, words]) => make("span", {}, make("i", { className: name }), words)));
+    this.key = Object.entries(KEY).map(([name, words]) => make("span", { className: name }, make("i", { className: name }), words));
     this.box = make("section", { className: "map", "aria-label": "chart of stability" }, make("h2", { textContent: "Where is it stable?" }),
       make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys" })),
-      this.canvas, key);
+      this.canvas, make("p", { className: "key" }, ...this.key));
   }
 
   drag(event, same) {
@@ -71,6 +71,8 @@ export class Chart {
       this.frame(i, j, x, y);
       for (const [name, path] of Object.entries(paths)) put(this.regions[name], "d", path);
       put(this.hatched, "d", paths.none);
+      const seen = new Set(this.page.tracks.flatMap((track) => track.map((part) => CLASSES[part.status])));
+      for (const one of this.key) one.hidden = !paths[one.className] && !seen.has(one.className); // what is nowhere to be seen needs no words
       put(this.outline, "d", outline);
     }
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));

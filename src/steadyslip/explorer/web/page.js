@@ -91,7 +91,7 @@ export class Page {
     const { title, version, parameters } = this.rig.data;
     this.tools = make("div", { className: "tools", role: "toolbar", "aria-label": "page" }, this.undoButton, this.redoButton,
       button("reset", "back to the rig of the file", () => this.change(parameters.map((one) => one.value))));
-    return make("header", {}, make("p", { className: "brand" }, make("b", { textContent: title }), ` steadyslip ${version}`), this.tools);
+    return make("header", {}, make("p", { className: "brand" }, make("b", { textContent: title }), ` explored with steadyslip ${version}`), this.tools);
   }
 
   foot() {

@@ -36,9 +36,9 @@ export function reason(answer, data) {
   if (critical === null) return answer.intervals.length ? "Stable at every stiffness." : "No stiffness makes this sliding stable.";
   const total = answer.stiffness + gain, edge = critical + gain, what = gain ? "Stiffness and gain together, " : "The stiffness ";
   const alone = answer.intervals.length === 1 && (answer.side === "above" ? answer.intervals[0].high === Infinity : answer.intervals[0].low === 0);
-  const period = answer.frequency ? `; there it oscillates with period ${shown((2 * Math.PI) / answer.frequency, "s")}` : "";
+  const period = answer.frequency ? ` At the critical stiffness a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / answer.frequency, "s").replace(" ", "\u00a0")}.` : "";
   const along = data.axial >= 0 ? ` (${stiffness(edge / share)} along the axis)` : "";
-  const tail = alone ? `, ${answer.side} which sliding is stable${period}.` : `, the nearest edge of what is stable${period}.`;
+  const tail = alone ? `, ${answer.side} which sliding is stable.${period}` : `, the nearest edge of what is stable.${period}`;
   return `${what}${stiffness(total)}${gain ? ", are" : " is"} ${digits(total / edge, 3)} times the critical ${stiffness(edge)}${along}${tail}`;
 }
 

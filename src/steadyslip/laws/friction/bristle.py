@@ -57,6 +57,9 @@ class LuGre(CoulombStribeck, name="lugre"):
     def memory_units(self) -> tuple[str, ...]:
         return ("m",)
 
+    def meanings(self) -> dict[str, str]:
+        return {"z": "mean deflection of the bristles"}
+
     def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         (rate,) = self.rates(v, sigma, memory, tau)
         return sigma * (self.bristle_stiffness * memory[0] + self.bristle_damping * rate + self.viscous * v)

@@ -83,3 +83,7 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         return {
             name: (value, unit) for name, value, unit in zip(self.memory(), memory, self.memory_units(), strict=True)
         }
+
+    def meanings(self) -> dict[str, str]:
+        """What `observables` mean, in a few words for people who do not know the law, by name; none must be told."""
+        return {}

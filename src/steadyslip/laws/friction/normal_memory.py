@@ -32,6 +32,10 @@ class NormalMemory(FrozenRecord, family="memory of normal stress"):
         """Their SI units; stresses unless overridden."""
         return tuple("Pa" for _ in self.memory())
 
+    def meanings(self) -> dict[str, str]:
+        """What its own memory variables mean, in a few words, by name; none must be told."""
+        return {}
+
     def strength(self, sigma: Expression, own: tuple[Expression, ...]) -> Expression:
         """The stress (Pa) that friction is proportional to, from σ and its own memory variables."""
         return sigma
@@ -144,6 +148,9 @@ class PrakashClifton(NormalMemory, name="prakash-clifton"):
 
     def memory(self) -> tuple[str, ...]:
         return ("sigma_e",)
+
+    def meanings(self) -> dict[str, str]:
+        return {"sigma_e": "normal stress that friction remembers"}
 
     def strength(self, sigma: Expression, own: tuple[Expression, ...]) -> Expression:
         return self.direct_share * sigma + (1 - self.direct_share) * own[0]

@@ -190,3 +190,13 @@ class RateState(FrictionLaw, name="rate-state"):
         own = self.normal_memory
         found |= {n: (e, u) for n, e, u in zip(own.memory(), self._own(memory), own.memory_units(), strict=True)}
         return found
+
+    def meanings(self) -> dict[str, str]:
+        count = len(self._all_states())
+        found = self.normal_memory.meanings()
+        for suffix in [""] if count == 1 else [f"_{i}" for i in range(1, count + 1)]:
+            found["Theta" + suffix] = (
+                f"state of friction, of which b{suffix} times Theta{suffix} is added to the coefficient"
+            )
+            found["theta" + suffix] = "the same state, told as a time"
+        return found

@@ -83,8 +83,11 @@ def three_bodies():
     )
 
 
-def at_random(seed):
-    """A machine of one to four bodies, and theory 11's matrix of it typed with NumPy: a function of s."""
+def at_random(seed, delay=0.0):
+    """A machine of one to four bodies, and theory 11's matrix of it typed with NumPy: a function of s.
+
+    With a delay it has a controller that acts that late.
+    """
     random = np.random.default_rng(seed)
 
     def size(low=-1.0, high=1.0):
@@ -118,9 +121,9 @@ def at_random(seed):
     link("ground", names[int(random.integers(0, count))], 0.0, size(-2, 0))
 
     kp, kd, seen = size(0, 2), size(-2, 0), int(random.integers(0, count))
-    controlled = random.random() < 0.5
+    controlled = random.random() < 0.5 or delay > 0
     drive = (
-        ss.PositionPD(velocity=1.0, body="b0", measured=names[seen], kp=kp, kd=kd)
+        ss.PositionPD(velocity=1.0, body="b0", measured=names[seen], kp=kp, kd=kd, delay=delay)
         if controlled
         else ss.Pull(velocity=1.0)
     )
@@ -147,7 +150,7 @@ def at_random(seed):
     def matrix(s):
         whole = np.diag(mass * s * s).astype(complex) + stiff[:n, :n] + damp[:n, :n] * s
         if controlled:
-            whole[0, seen] += kp + kd * s
+            whole[0, seen] += (kp + kd * s) * np.exp(-s * delay)
         for i, other, f, slope, r, mu, f1, tangent in touches:
             slip = np.zeros(n)
             slip[i] += 1.0
@@ -155,7 +158,7 @@ def at_random(seed):
                 slip[other] -= 1.0
             seen_pull = np.array([one.real + one.imag * s for one in np.asarray(pull[i], dtype=complex)])
             if controlled and i == 0:
-                seen_pull[seen] -= kp + kd * s
+                seen_pull[seen] -= (kp + kd * s) * np.exp(-s * delay)
             normal = -tangent * seen_pull
             friction = (s * (f * s + r * slope) * slip + (f1 * s + r * mu) * normal) / (s + r)
             whole += np.outer(slip, friction)

@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from steadyslip.core.expressions import array_function, asinh_exp, numpy_asinh_exp
+from steadyslip.laws.friction.bristle import StribeckCurve
 from steadyslip.linear.response import response
 from steadyslip.model.linearisation import characteristic_coefficients
 from steadyslip.model.point import operating_point
@@ -63,7 +64,7 @@ LAWS = [
 @pytest.mark.parametrize("check", FRICTION_CHECKS)
 @pytest.mark.parametrize("law", LAWS, ids=repr)
 def test_contract(law, check):
-    check(law, WEAKENING if isinstance(law, ss.CoulombStribeck) else Conditions())
+    check(law, WEAKENING if isinstance(law, StribeckCurve) else Conditions())
 
 
 @pytest.mark.parametrize(
@@ -511,7 +512,7 @@ def test_regularised_memory_evolves_alike_in_reverse(evolution):
     assert forward == back != 0
 
 
-@pytest.mark.parametrize("law", [law for law in LAWS if isinstance(law, ss.CoulombStribeck)], ids=repr)
+@pytest.mark.parametrize("law", [law for law in LAWS if isinstance(law, StribeckCurve)], ids=repr)
 def test_machine_friction_is_odd(law):
     """Bristles bend the other way in reverse."""
     bent = (2e-6,) if law.memory() else ()

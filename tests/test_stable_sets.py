@@ -13,9 +13,10 @@ from steadyslip.core.quantities import unit
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.state_space import jacobian
-from steadyslip.linear.stiffness import characteristic, closed_form_interval, general_set
+from steadyslip.linear.stiffness import closed_form_interval, general_set
 from steadyslip.model import build_model
 from steadyslip.model.point import operating_point
+from steadyslip.model.range import characteristic
 
 
 @pytest.mark.parametrize("friction", ONE_MEMORY, ids=lambda law: type(getattr(law, "evolution", law)).__name__)

@@ -113,6 +113,7 @@ KINDS = {
     "stress share": "share of the response to normal stress that is not immediate",
     "normal stress": "of the contact, in steady sliding or without coupling to the motion",
     "stiffness": "of the spring, or of what acts as one",
+    "delay": "time by which something acts late",
 }
 """What a parameter can be to the stages that look for meaning, not for names."""
 

@@ -134,7 +134,9 @@ def present_zeros(rig: Rig) -> tuple[str, ...]:
     if isinstance(rig, Machine):
         return ()
     return tuple(
-        name for name, a in rig.parameters().items() if a.role.structural and a.value == 0 and not a.role.adds_state
+        name
+        for name, a in rig.parameters().items()
+        if a.role.structural and a.value == 0 and not a.role.adds_state and a.role.kind != "delay"
     )
 
 

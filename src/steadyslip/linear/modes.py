@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import checked
@@ -14,13 +15,13 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import percent, shown
 from steadyslip.core.questions import question
 from steadyslip.laws.contact import Motion
-from steadyslip.linear.polynomials import roots
+from steadyslip.linear.spectrum import spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, Mechanism, Touch
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.range import characteristic
+from steadyslip.model.range import delays_of
 from steadyslip.model.sliding import explain_absence
 
 MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body judders, below the second it hardly moves
@@ -103,7 +104,7 @@ def modes(rig: Machine) -> tuple[Mode, ...]:
     point = operating_point(rig)
     if not point.exists:
         raise explain_absence(rig, point)
-    found = roots(characteristic(point))
+    found = spectrum(point)
     return tuple(mode_of(rig, point, complex(s)) for s in found if np.isfinite(s) and s.imag >= 0)
 
 
@@ -111,9 +112,11 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     """The mode of an eigenvalue."""
     model = point.model
     size = len(characteristic_rows(model))
-    entries = np.array([float(e) for e in point.evaluate(_matrix_function(model))]).reshape(size, size, 3)
+    powers, function = _matrix_function(model)
+    entries = np.array([float(e) for e in point.evaluate(function)]).reshape(size, size, len(powers))
     with np.errstate(all="ignore"):
-        matrix = entries @ np.array([1, s, s * s])
+        late = np.exp(-s * delays_of(point))
+        matrix = entries @ np.array([s ** own[0] * np.prod(late ** np.array(own[1:])) for own in powers])
         shape = _null_vector(matrix)
     if not np.all(np.isfinite(shape)):
         raise NotAvailable("the shape of this mode leaves the range of floating point")
@@ -153,7 +156,7 @@ def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[s
             add(f"bodies.{one.name.removesuffix(NORMAL)}", float(one.inertia) * abs(s * places[one.name]) ** 2)
     for element in mechanism.elements:
         stretch = sum(float(c) * places[name] for name, c in element.senses.items() if name in places)
-        beside = {n: c for n, c in element.senses.items() if n in places} == dict(element.acts)
+        beside = not element.delay and {n: c for n, c in element.senses.items() if n in places} == dict(element.acts)
         if element.stiffness and (element.name or beside):  # a controller that sees where it acts is a spring, too
             add(element.name or "drive.controller", float(element.stiffness) * abs(stretch) ** 2)
     for touch in mechanism.touches:
@@ -172,9 +175,11 @@ def _stiffness_of(touch: Touch) -> float:
 
 
 @question
-def _matrix_function(model: Model) -> Callable[..., list[Any]]:
-    rows = characteristic_rows(model).values()
-    return model.function(e for row in rows for entry in row for e in entry)
+def _matrix_function(model: Model) -> tuple[list[tuple[int, ...]], Callable[..., list[Any]]]:
+    """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
+    entries = [entry for row in characteristic_rows(model).values() for entry in row]
+    powers = sorted({own for entry in entries for own in entry})
+    return powers, model.function(entry.get(own, sp.Integer(0)) for entry in entries for own in powers)
 
 
 @question

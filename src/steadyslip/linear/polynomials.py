@@ -317,8 +317,8 @@ def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
         no_inertia = (p[:, n] == 0) & (q[:, n] == 0)
         top = np.where(no_inertia, -p[:, n - 1] / q[:, n - 1], top)
     w = crossing_squares(p, q)
-    pe, po = _even_odd(p)
-    qe, qo = _even_odd(q)
+    pe, po = even_odd(p)
+    qe, qo = even_odd(q)
     with np.errstate(all="ignore"):
         e1, o1, e2, o2 = (evaluate(part[:, None, :], w) for part in (pe, po, qe, qo))
         oscillatory = -(e1 * e2 + w * o1 * o2) / (e2 * e2 + w * o2 * o2)
@@ -330,7 +330,7 @@ def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
     return k, beta
 
 
-def _even_odd(c: Array) -> tuple[Array, Array]:
+def even_odd(c: Array) -> tuple[Array, Array]:
     """E and O with c(iβ) = E(β²) + iβ O(β²), as polynomials in β²."""
     even, odd = c[..., 0::2].copy(), c[..., 1::2].copy()
     even[..., 1::2] *= -1
@@ -338,7 +338,8 @@ def _even_odd(c: Array) -> tuple[Array, Array]:
     return even, odd if odd.shape[-1] else np.zeros((*c.shape[:-1], 1))
 
 
-def _product(a: Array, b: Array) -> Array:
+def product(a: Array, b: Array) -> Array:
+    """Coefficients of products of polynomials."""
     out = np.zeros((*a.shape[:-1], a.shape[-1] + b.shape[-1] - 1))
     for i in range(a.shape[-1]):
         out[..., i : i + b.shape[-1]] += a[..., i : i + 1] * b
@@ -348,9 +349,9 @@ def _product(a: Array, b: Array) -> Array:
 @quietly
 def crossing_squares(p: Array, q: Array) -> Array:
     """Positive β² where p(iβ)/q(iβ) is real, NaN padded: the roots of Im[p conj q]/β."""
-    pe, po = _even_odd(p)
-    qe, qo = _even_odd(q)
-    first, second = _product(po, qe), _product(pe, qo)
+    pe, po = even_odd(p)
+    qe, qo = even_odd(q)
+    first, second = product(po, qe), product(pe, qo)
     width = max(first.shape[-1], second.shape[-1])
     difference = np.zeros((*p.shape[:-1], width))
     difference[..., : first.shape[-1]] += first

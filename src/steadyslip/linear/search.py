@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, unit
-from steadyslip.linear.polynomials import Array, StableSet, damping_measures, roots
+from steadyslip.linear.polynomials import Array, StableSet
+from steadyslip.linear.spectrum import is_ill_posed, nearness, spectrum, static_sum
 from steadyslip.linear.stable_values import linear_set
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
-from steadyslip.linear.stiffness import ill_posed, set_of_one
+from steadyslip.linear.stiffness import set_of_one
 from steadyslip.machine.rig import Rig
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.range import characteristic
 from steadyslip.model.sliding import explain_absence
 
 _PER_DECADE = 40
@@ -142,7 +142,7 @@ class Search:
 
     def measures(self, x: Array) -> Array:
         """Two functions that pass through zero at an edge: damping of pairs, and of single eigenvalues."""
-        return damping_measures(roots(characteristic(self.values(np.asarray(x, dtype=float)))))
+        return nearness(self.values(np.asarray(x, dtype=float)))
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
         grid = self.grid(between)
@@ -234,12 +234,13 @@ class Search:
             point = self.values(outside)
             reason: NoSteadySliding = explain_absence(self.rig.with_values({self.name: outside}), point)
             return reason.condition, 0.0
-        c = characteristic(self.values(np.array([low, high])))
-        if ill_posed(c)[0] != ill_posed(c)[1]:
+        both = self.values(np.array([low, high]))
+        posed, static = is_ill_posed(both), static_sum(both)
+        if posed[0] != posed[1]:
             return "ill-posed", 0.0
-        if c[0, 0] * c[1, 0] <= 0:
+        if static[0] * static[1] <= 0:
             return "divergence", 0.0
-        found = roots(c)[0]
+        found = spectrum(self.values(np.array([low])))[0]
         found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]
         if not found.size:
             return "divergence", 0.0

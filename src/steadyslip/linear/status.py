@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
-from steadyslip.linear.polynomials import damping_measures, is_hurwitz, roots
 from steadyslip.linear.response import has_closed_form, response_numbers
+from steadyslip.linear.spectrum import is_near_edge, is_stable, static_sum
 from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.linearisation import characteristic_coefficients
+from steadyslip.model.linearisation import characteristic_terms
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
-from steadyslip.model.range import characteristic, in_range
+from steadyslip.model.range import in_range
 
 ON_THE_EDGE = 1e-9  # damping ratio, and share of static stiffness in its terms, that rounding alone can make
 LAST_DIGITS = 24  # trials of other last digits
@@ -69,7 +69,7 @@ def without_edge(point: OperatingPoint) -> NDArray[np.str_]:
 def status(point: OperatingPoint) -> NDArray[np.int64]:
     """ABSENT (no steady sliding), STABLE, UNSTABLE (ill-posed too) or UNKNOWN (out of floating point, or no rig)."""
     with np.errstate(all="ignore"):
-        verdict = np.where(is_hurwitz(characteristic(point)), STABLE, UNSTABLE)
+        verdict = np.where(is_stable(point), STABLE, UNSTABLE)
         found = np.where(point.exists, verdict, ABSENT)
         return np.where(in_range(point) & point.valid, found, UNKNOWN)
 
@@ -85,14 +85,15 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
         value * (1 + np.finfo(float).eps * chance.uniform(-8.0, 8.0, LAST_DIGITS)) for value in point.arguments
     ]
     others = point.with_arguments(arguments, (LAST_DIGITS,))
-    neutral = characteristic(point)[0] == 0  # an eigenvalue of zero, of which nothing is left
+    neutral = static_sum(point) == 0  # an eigenvalue of zero, of which nothing is left
     return bool(neutral | np.any(status(others) != status(point)))
 
 
 @question
 def _static_terms(model: Model) -> Callable[..., list[Any]]:
     """What adds up to the static stiffness of a machine, a0."""
-    return model.function(sp.Add.make_args(characteristic_coefficients(model)[0]))
+    parts = (sp.Add.make_args(term.coefficients[0]) for term in characteristic_terms(model))
+    return model.function(part for own in parts for part in own)
 
 
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
@@ -101,10 +102,10 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     Without any stiffness nothing restores the place of the block: that is static stiffness zero, too.
     """
     with np.errstate(all="ignore"):
-        ratio = 0.5 * damping_measures(roots(characteristic(point)))[0]
+        undamped = is_near_edge(point, ON_THE_EDGE)
         if has_closed_form(point.model):
             part = response_numbers(point)
-            terms = [part.k * np.ones_like(ratio), part.mu * part.k * part.B2, part.mu * part.B3]
+            terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]
         elif not point.model.is_slider:
             terms = [np.broadcast_to(term, point.shape) for term in point.evaluate(_static_terms(point.model))]
         else:
@@ -112,4 +113,4 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
         largest = sum(np.abs(term) for term in terms)
         static = np.where(largest == 0, 0.0, np.abs(sum(terms)) / largest)
-        return np.asarray((np.abs(ratio) <= ON_THE_EDGE) | (static <= ON_THE_EDGE))
+        return np.asarray(undamped | (static <= ON_THE_EDGE))

@@ -18,14 +18,15 @@ from steadyslip.core.expressions import array_function
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
-from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, most_intervals, quietly, roots, stable_set
+from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, most_intervals, quietly, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
+from steadyslip.linear.spectrum import is_ill_posed, spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
-from steadyslip.model.range import characteristic, in_range, require_range, stacked, surely_in_range, warn_of_range
+from steadyslip.model.range import in_range, quasi, require_range, stacked, surely_in_range, warn_of_range
 from steadyslip.model.steady import steady_equation
 
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
@@ -131,12 +132,13 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     -------
     ndarray or xarray.DataArray, shape (..., n), complex
         1/s, sorted by falling real part; NaN where steady sliding does not exist or numbers leave the range of
-        floating point (see `stability`), and for the root that a rig lacks when its mass is zero.
+        floating point (see `stability`), and for the root that a rig lacks when its mass is zero. With a delay, which
+        makes infinitely many, the rightmost, as many as there are without it; NaN where it is ill-posed.
     """
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> ComplexArray:
-        return roots(characteristic(part))
+        return spectrum(part)
 
     return point.wrap(in_chunks(point, kernel), "eigenvalues", "1/s", ("mode",))
 
@@ -151,10 +153,10 @@ def growth_rate(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> Array:
-        c = characteristic(part)
         with np.errstate(invalid="ignore"):
-            rate = np.max(np.where(np.isnan(found := roots(c).real), -np.inf, found), axis=-1)
-        return np.where(ill_posed(c), np.inf, np.where(np.all(np.isfinite(c), axis=-1), rate, np.nan))
+            rate = np.max(np.where(np.isnan(found := spectrum(part).real), -np.inf, found), axis=-1)
+        known = np.all(np.isfinite(quasi(part)[0]), axis=(-2, -1))
+        return np.where(is_ill_posed(part), np.inf, np.where(known, rate, np.nan))
 
     return point.wrap(in_chunks(point, kernel), "growth_rate", "1/s")
 
@@ -172,11 +174,6 @@ def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
 def general_set(point: OperatingPoint) -> StableSet:
     """The stable set by the Model's characteristic polynomial, for any number of states."""
     return stable_set(*stiffness_polynomials(point))
-
-
-def ill_posed(c: Array) -> NDArray[np.bool_]:
-    """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3)."""
-    return np.asarray((c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0)))
 
 
 @question

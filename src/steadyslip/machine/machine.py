@@ -249,12 +249,12 @@ class Machine(Rig):
             return (), None
         place, speed = ({body: speeds[driven] / speeds[body], LOAD_POINT: -1} for body in self.drive.watched())
         kp, kd, held, ki = self.drive.gains()
-        acts = {driven: 1}
-        elements = [Element("", acts, place, kp, kd if place == speed else 0)]
+        acts, late = {driven: 1}, self.drive.lateness()
+        elements = [Element("", acts, place, kp, kd if place == speed else 0, delay=late)]
         if place != speed or held != 0:
-            elements.append(Element("", acts, speed, held, 0 if place == speed else kd))
+            elements.append(Element("", acts, speed, held, 0 if place == speed else kd, delay=late))
         sensed = {name: share for name, share in place.items() if name != LOAD_POINT}
-        return tuple(elements), None if ki is None else Integral(acts, sensed, ki)
+        return tuple(elements), None if ki is None else Integral(acts, sensed, ki, late)
 
 
 def _is_zero(speed: Any) -> bool:

@@ -47,6 +47,8 @@ class Element:
         Zero where there is none.
     grounded : bool
         Whether it holds a body back, rather than pulling at it: its force is no part of what a contact law sees as T.
+    delay
+        Time (s) by which it senses late.
     """
 
     name: str
@@ -55,15 +57,17 @@ class Element:
     stiffness: Any
     damping: Any
     grounded: bool = False
+    delay: Any = 0
 
 
 @dataclass(frozen=True)
 class Integral:
-    """A controller's integral action: a force −`acts`·gain · I with dI/dt = `senses`."""
+    """A controller's integral action: a force −`acts`·gain · I with dI/dt = `senses`; with a delay, I that long ago."""
 
     acts: Row
     senses: Row
     gain: Any
+    delay: Any = 0
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,10 @@ class MachineDrive(FrozenRecord, family="drive of a machine"):
         """The bodies whose place and whose speed it measures."""
         raise NotImplementedError
 
+    def lateness(self) -> Any:
+        """Time (s) between measuring and acting."""
+        return 0
+
     def gains(self) -> tuple[Any, Any, Any, Any]:
         """Gains on the place of the first watched body, on speed and place of the second, on ∫ place of the first."""
         return 0, 0, 0, None
@@ -46,12 +50,18 @@ class RotaryPull(MachineDrive, name="rotary-steady"):
 
 
 class _Controller(MachineDrive):
-    """A controller that acts on a body."""
+    """A controller that acts on a body; with a `delay`, on what it measured that long ago."""
 
     body: str = setting(Text("the body on which it acts"))
     measured: str | None = setting(
         Text("the body whose place it measures; that on which it acts unless given"), default=None
     )
+    delay: float = parameter(
+        "s", nonnegative, "dead time between measuring and acting", default=0.0, structural=True, kind="delay"
+    )
+
+    def lateness(self) -> Any:
+        return self.delay
 
     def driven(self) -> str | None:
         return self.body

@@ -61,6 +61,11 @@ class Slider(Rig, section="slider"):
                 f"the contact {self.contact.name!r} has no axis at an angle; give stiffness instead",
             )
 
+        if self.friction.lateness() != 0:
+            yield Problem(
+                "friction.lag", "friction that follows velocity late is not offered for a slider; describe it as a "
+                "machine with one body",
+            )  # fmt: skip
         if self.contact.is_compliant():
             yield Problem(
                 "contact",

@@ -83,6 +83,7 @@ class _Assembly:
         self.speeds = {c.name: sp.sympify(c.speed) for c in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
         self.places = [self._place(touch) for touch in mechanism.touches]
         self.definitions: dict[sp.Symbol, sp.Expr] = {}
+        self.late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = {}
         self._define()
 
     # -- contacts in symbols
@@ -150,11 +151,11 @@ class _Assembly:
         """Elements that act and sense alike made one: a spring and the controller beside it."""
         groups: dict[Any, list[Element]] = {}
         for one in elements:
-            groups.setdefault((tuple(one.acts.items()), tuple(one.senses.items())), []).append(one)
+            groups.setdefault((tuple(one.acts.items()), tuple(one.senses.items()), one.delay), []).append(one)
         return [
             Element(
                 "", several[0].acts, several[0].senses, sp.Add(*(sp.sympify(one.stiffness) for one in several)),
-                sp.Add(*(sp.sympify(one.damping) for one in several)), several[0].grounded,
+                sp.Add(*(sp.sympify(one.damping) for one in several)), several[0].grounded, several[0].delay,
             )
             for several in groups.values()
         ]  # fmt: skip
@@ -163,9 +164,23 @@ class _Assembly:
         """Force of elements on a coordinate, besides that of steady displacements."""
         total = sp.Integer(0)
         for one in self._grouped([one for one in elements if name in one.acts]):
-            total -= one.acts[name] * one.stiffness * row_of(one.senses, self.x)
-            total -= one.acts[name] * one.damping * row_of(one.senses, self.moving)
-        return total - self._integrated(name, INTEGRAL)
+            total -= one.acts[name] * one.stiffness * row_of(one.senses, self._before(one.delay, self.x))
+            total -= one.acts[name] * one.damping * row_of(one.senses, self._before(one.delay, self.moving))
+        late = 0 if self.mechanism.integral is None else self.mechanism.integral.delay
+        return total - self._integrated(name, self._before(late, {"": INTEGRAL})[""])
+
+    def _before(self, delay: Any, now: Mapping[str, sp.Symbol]) -> Mapping[str, sp.Symbol]:
+        """What moves as it was a delay ago, as symbols of its own; what the drive does is steady and has none."""
+        return now if delay == 0 else {n: s if s is V_LP else self._late(s, sp.sympify(delay)) for n, s in now.items()}
+
+    def _late(self, symbol: sp.Symbol, delay: sp.Expr) -> sp.Symbol:
+        for late, meant in self.late.items():
+            if meant == (symbol, delay):
+                return late
+        others = sum(base is symbol for base, _ in self.late.values())
+        late = sp.Symbol(f"{symbol}_late{others + 1 if others else ''}", real=True)
+        self.late[late] = (symbol, delay)
+        return late
 
     def _steady_pull(self, name: str, elements: list[Element]) -> sp.Expr:
         """Their force in steady sliding, dashpots that move left out: they are in `_pull`."""
@@ -276,6 +291,7 @@ class _Assembly:
             axial_share=None if share is None else sp.sympify(share),
             steady=self._steady(coordinates),
             observables=self._observables(),
+            late=self.late,
         )
 
     def _contact(self, i: int) -> Contact:
@@ -296,7 +312,7 @@ class _Assembly:
             friction=place.tau,
             normal=place.sigma,
             memory=tuple(Variable(f"{own}{n}", s, unit, "memory of friction", "memory") for n, s, unit in remembered),
-            balance=sp.sympify(friction.strength(place.velocity, place.sigma, place.memory, place.tau)) - place.tau,
+            balance=self._strength(place) - place.tau,
             unknown=own_unknown if self.single else place.tau,
             sigma_ss=place.sigma_ss,
             steady_stress=sp.sympify(contact.normal_stress(motion.steady)),
@@ -306,6 +322,15 @@ class _Assembly:
             direction=sp.sympify(friction.direction(place.velocity, place.speed)),
             area=sp.sympify(place.touch.area),
         )
+
+    def _strength(self, place: _Place) -> sp.Expr:
+        """Friction as its law states it."""
+        law, now = place.touch.friction, (place.sigma, place.memory, place.tau)
+        delay = law.lateness()
+        if delay == 0:
+            return sp.sympify(law.strength(place.velocity, *now))
+        late = row_of(place.touch.slip, self._before(delay, self.moving))
+        return sp.sympify(law.late_strength(place.velocity, late, *now))
 
     def _variables(
         self, coordinates: tuple[Coordinate, ...], contacts: tuple[Contact, ...]
@@ -344,6 +369,7 @@ class _Assembly:
             found[place.sigma] = place.sigma_ss
             memory = place.touch.friction.steady_memory(place.speed, place.sigma_ss)
             found |= dict(zip(place.memory, map(sp.sympify, memory), strict=True))
+        found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
         return found | {V_LP: sp.sympify(self.mechanism.velocity), Q: zero, P: zero}
 
     def _observables(self) -> dict[str, tuple[sp.Expr, str]]:

@@ -160,6 +160,8 @@ class Model(Keeper, Displayed):
         Steady sliding in terms of the parameters and the contacts' `sigma_ss`.
     observables : dict of str to (sympy.Expr, str)
         Named results and their SI units.
+    late : dict of sympy.Symbol to (sympy.Symbol, sympy.Expr)
+        Symbols for what a displacement, velocity or integral was some time ago, and how long ago (s).
     """
 
     variables: tuple[Variable, ...]
@@ -174,6 +176,7 @@ class Model(Keeper, Displayed):
     axial_share: sp.Expr | None
     steady: dict[sp.Symbol, sp.Expr]
     observables: dict[str, tuple[sp.Expr, str]]
+    late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = field(default_factory=dict)
 
     # -- questions
 
@@ -212,6 +215,11 @@ class Model(Keeper, Displayed):
     def inertial(self) -> bool:
         """Whether every body has a velocity of its own."""
         return all(one.inertial for one in self.coordinates)
+
+    @cached_property
+    def delays(self) -> tuple[sp.Expr, ...]:
+        """The delays (s) that are in the equations, each once."""
+        return tuple(dict.fromkeys(delay for _, delay in self.late.values()))
 
     @property
     def imposed(self) -> bool:
@@ -262,7 +270,11 @@ class Model(Keeper, Displayed):
     def equations(self) -> list[sp.Eq]:
         """The model as SymPy equations, ready for LaTeX."""
         time = self.inputs["time"]
-        found = [sp.Eq(symbol, expression, evaluate=False) for symbol, expression in self.definitions.items()]
+        found = [
+            sp.Eq(late, sp.Function(str(symbol))(time - delay), evaluate=False)
+            for late, (symbol, delay) in self.late.items()
+        ]
+        found += [sp.Eq(symbol, expression, evaluate=False) for symbol, expression in self.definitions.items()]
         balances = [one.balance for one in self.contacts] + [one.balance for one in self.coordinates]
         found += [sp.Eq(balance, 0, evaluate=False) for balance in balances if balance is not None]
         for variable, rate in zip(self.variables, self.rates, strict=True):

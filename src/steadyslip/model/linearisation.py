@@ -2,24 +2,32 @@
 
 The balances of forces, one for each contact, and the rates of the memory variables are differentiated once; the
 intermediate stresses T, τ, σ are eliminated by the chain rule, so every entry is in terms of the parameters and the
-steady normal stress. From the entries come the characteristic polynomial (any number of states), its
-split p(s) + k q(s), and state-space matrices.
+steady normal stress. From the entries come the characteristic polynomial (any number of states), with delays a sum
+of several, its split p(s) + k q(s), and state-space matrices.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
-from sympy.polys.domains import ZZ
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
+from steadyslip.model.determinant import Polynomial, determinant, expanded, machine_determinant
 from steadyslip.model.equations import Model
 from steadyslip.model.statics import StandIns
 
 Row = dict[sp.Symbol, sp.Expr]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A polynomial in s times exp(−s `delay`): its coefficients, lowest power first."""
+
+    delay: sp.Expr
+    coefficients: tuple[sp.Expr, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +39,8 @@ class Linearisation:
     columns : tuple of sympy.Symbol
         Displacements, velocities, memory variables, integral, frictions that are unknowns.
     rows : dict
-        For each column the gradient, in columns, accelerations and inputs, of its rate; for a velocity that of the
-        balance of forces, for a friction that of its law less friction.
+        For each column the gradient, in columns, accelerations, late symbols and inputs, of its rate; for a velocity
+        that of the balance of forces, for a friction that of its law less friction.
     outputs : dict
         Gradients of the observables.
     """
@@ -52,7 +60,7 @@ def linearise(model: Model) -> Linearisation:
         columns |= {item.symbol: None} | ({velocities[item.symbol]: None} if item.symbol in velocities else {})
     columns |= dict.fromkeys(contact.friction for contact in model.contacts if contact.unknown is contact.friction)
     inputs = [s for name, s in model.inputs.items() if name != "time"]
-    basis = [*columns, *(one.acceleration for one in model.coordinates), *inputs]
+    basis = [*columns, *(one.acceleration for one in model.coordinates), *model.late, *inputs]
     intermediate: dict[sp.Symbol, Row] = {}
 
     def gradient(expression: sp.Expr) -> Row:
@@ -83,36 +91,65 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
 
     The highest is m + f1 B0 times a positive factor where there is inertia; it may vanish for m = 0. What the structure
     alone makes cancel, of stiffnesses and inertias of several bodies, has cancelled exactly.
+
+    Raises
+    ------
+    NotAvailable
+        If there are delays: then it is none, but a sum of `characteristic_terms`.
     """
-    stand_ins = StandIns()
-    rows = characteristic_rows(model)
-    forces = {one.velocity: one.balance is not None for one in model.coordinates}
-
-    def stand_in(e: sp.Expr, row: sp.Symbol) -> sp.Expr:
-        if row not in forces:
-            return -stand_ins.whole(-e)  # a rate as it is
-        return stand_ins.polynomial(e) if forces[row] else stand_ins.whole(e)
-
-    matrix = [[[stand_in(e, name) for e in entry] for entry in row] for name, row in rows.items()]
-    names, coefficients = _determinant(matrix)
-    if model.is_single:
-        return tuple(stand_ins.back(c.as_expr()) for c in coefficients)
-    expressions = [stand_ins.back(name) for name in names]
-    return tuple(_nested(list(c.terms()), expressions) for c in coefficients)
+    if model.delays:
+        raise NotAvailable("this is not offered with a delay, whose characteristic equation is no polynomial")
+    return characteristic_terms(model)[0].coefficients
 
 
 @question
-def characteristic_rows(model: Model) -> dict[sp.Symbol, list[tuple[sp.Expr, sp.Expr, sp.Expr]]]:
-    """The characteristic matrix: of every entry the coefficients of 1, s and s².
+def characteristic_terms(model: Model) -> tuple[Term, ...]:
+    """The characteristic equation as a sum of polynomials in s times exp(−s delay), that without delay first.
+
+    Each delay enters once as a factor at most, for what a controller or a contact does is one force.
+    """
+    found = _single_determinant(model) if model.is_single else machine_determinant(model, characteristic_rows(model))
+    highest = max((powers[0] for powers in found), default=0)
+    nothing = (0,) * len(model.delays)
+    lates = sorted({powers[1:] for powers in found} | {nothing}, key=lambda late: (sum(late), late))
+    return tuple(
+        Term(
+            sp.Add(*(power * delay for power, delay in zip(late, model.delays, strict=True))),
+            tuple(found.get((power, *late), sp.Integer(0)) for power in range(highest + 1)),
+        )
+        for late in lates
+    )
+
+
+def _single_determinant(model: Model) -> Polynomial:
+    stand_ins = StandIns()
+    rows = characteristic_rows(model)
+    body = model.coordinates[0].velocity
+    matrix = [
+        [{power: stand_ins.whole(e) if name == body else -stand_ins.whole(-e) for power, e in entry.items()}
+         for entry in row] for name, row in rows.items()
+    ]  # fmt: skip
+    names, found = determinant(matrix)
+    return {powers: stand_ins.back(expanded(terms, names)) for powers, terms in found.items()}
+
+
+@question
+def characteristic_rows(model: Model) -> dict[sp.Symbol, list[Polynomial]]:
+    """The characteristic matrix: of every entry the coefficients, by powers of s and of exp(−s delay) of each delay.
 
     Columns are displacements, memory variables, integral, unknown frictions; rows the balances of forces, the rates
     less s times their variables, the frictions less their laws, named as the rows of `Linearisation`.
     """
     linear = linearise(model)
     bodies = {one.displacement: one for one in model.coordinates}
-    velocities = {one.velocity for one in model.coordinates}
+    places = {one.velocity: one.displacement for one in model.coordinates}
     frictions = {contact.friction for contact in model.contacts}
-    columns = [symbol for symbol in linear.columns if symbol not in velocities]
+    columns = [symbol for symbol in linear.columns if symbol not in places]
+    late = [
+        (symbol, places.get(base, base), (int(base in places), *(int(delay == own) for own in model.delays)))
+        for symbol, (base, delay) in model.late.items()
+    ]
+    nothing = (0,) * len(model.delays)
     found = {}
     for column in columns:
         row_symbol = bodies[column].velocity if column in bodies else column
@@ -122,67 +159,16 @@ def characteristic_rows(model: Model) -> dict[sp.Symbol, list[tuple[sp.Expr, sp.
         entries = []
         for other in columns:
             body = bodies.get(other)
-            entry = [row[other], sp.Integer(0), sp.Integer(0)]
+            parts = {(0, *nothing): row[other]}
             if body is not None:
-                entry[1:] = row[body.velocity], row[body.acceleration]
-            entry = [sign * e for e in entry]
+                parts |= {(1, *nothing): row[body.velocity], (2, *nothing): row[body.acceleration]}
+            parts |= {powers: row[symbol] for symbol, base, powers in late if base is other}
+            entry = {powers: sign * e for powers, e in parts.items()}
             if other is column and column not in bodies and column not in frictions:
-                entry[1] += 1
-            entries.append((entry[0], entry[1], entry[2]))
+                entry[(1, *nothing)] = entry.get((1, *nothing), sp.Integer(0)) + 1
+            entries.append({powers: e for powers, e in entry.items() if e != 0})
         found[row_symbol] = entries
     return found
-
-
-Terms = list[tuple[tuple[int, ...], Any]]
-
-
-def _nested(terms: Terms, factors: list[sp.Expr], first: int = 0) -> sp.Expr:
-    """A polynomial with each factor taken out of the terms that have it, one after the other: thousands stay few.
-
-    Nothing is added that was not: what cancels had cancelled in `terms`.
-    """
-    if len(terms) == 1:
-        powers, number = terms[0]
-        return sp.Mul(int(number), *(factors[i] ** power for i, power in enumerate(powers) if power and i >= first))
-    while first < len(factors) and not any(powers[first] for powers, _ in terms):
-        first += 1
-    groups: dict[int, Terms] = {}
-    for term in terms:
-        groups.setdefault(term[0][first], []).append(term)
-    inner = {power: _nested(group, factors, first + 1) for power, group in groups.items()}
-    return sp.Add(*(sp.Mul(factors[first] ** power, part) for power, part in inner.items()))
-
-
-def _determinant(matrix: list[list[list[sp.Expr]]]) -> tuple[list[sp.Symbol], list[Any]]:
-    """Symbols, and the coefficients in s, lowest first, of a determinant as polynomials in them.
-
-    Exact: by rows, each minor of the rows below once.
-    """
-    names = sorted({n for row in matrix for entry in row for e in entry for n in e.free_symbols}, key=str)
-    ring = ZZ[(sp.Symbol("s"), *names)].ring
-    s = ring.gens[0]
-    table = [
-        [sum((ring.from_expr(e) * s**power for power, e in enumerate(entry) if e != 0), ring.zero) for entry in row]
-        for row in matrix
-    ]
-    known = {frozenset[int](): ring.one}
-
-    def minor(columns: frozenset[int]) -> Any:
-        """Of the last rows, as many as there are columns."""
-        if columns not in known:
-            row, total, sign = table[len(table) - len(columns)], ring.zero, 1
-            for column in sorted(columns):
-                if row[column]:
-                    total += sign * row[column] * minor(columns - {column})
-                sign = -sign
-            known[columns] = total
-        return known[columns]
-
-    parts: dict[int, dict[tuple[int, ...], Any]] = {}
-    for (power, *rest), number in minor(frozenset(range(len(table)))).terms():
-        parts.setdefault(power, {})[tuple(rest)] = number
-    of_names = ring.drop(s)
-    return names, [of_names.from_dict(parts.get(power, {})) for power in range(max(parts, default=0) + 1)]
 
 
 @question

@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
+from steadyslip.core.expressions import occurrences
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
-from steadyslip.model.linearisation import characteristic_coefficients
+from steadyslip.model.linearisation import characteristic_coefficients, characteristic_terms
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.steady import beyond_floats
 
@@ -32,6 +32,40 @@ _NEARER = (0.75, 0.5, 0.25, 0.0)
 def characteristic(point: OperatingPoint) -> Array:
     """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
     return stacked(point.evaluate(_coefficient_function(point.model)), point)
+
+
+@question
+def quasi(point: OperatingPoint) -> tuple[Array, Array]:
+    """The characteristic equation with delays, a sum of polynomials in s times exp(−s delay), that without delay first.
+
+    Returns
+    -------
+    coefficients : ndarray (..., m, n+1)
+        Lowest power first; NaN without steady sliding.
+    delays : ndarray (..., m)
+        s; the first is zero.
+    """
+    if not point.model.delays:
+        return characteristic(point)[..., None, :], np.zeros((*point.shape, 1))
+    width, function, late = _term_functions(point.model)
+    c = stacked(point.evaluate(function), point)
+    delays = np.stack([np.broadcast_to(one, point.shape) for one in point.evaluate(late)], axis=-1)
+    return c.reshape(*c.shape[:-1], -1, width), np.asarray(delays, dtype=float)
+
+
+def delays_of(point: OperatingPoint) -> Array:
+    """The delays in the equations, (..., d), s."""
+    if not point.model.delays:
+        return np.zeros((*point.shape, 0))
+    found = point.evaluate(point.model.function(point.model.delays))
+    return np.stack([np.broadcast_to(np.asarray(one, dtype=float), point.shape) for one in found], axis=-1)
+
+
+@question
+def _term_functions(model: Model) -> tuple[int, Callable[..., list[Array]], Callable[..., list[Array]]]:
+    terms = characteristic_terms(model)
+    flat = [c for term in terms for c in term.coefficients]
+    return len(terms[0].coefficients), model.function(flat), model.function([term.delay for term in terms])
 
 
 def stacked(parts: list[Any], point: OperatingPoint) -> Array:
@@ -63,9 +97,10 @@ def in_range(point: OperatingPoint) -> NDArray[np.bool_]:
     Where there is no steady sliding: whether that can be said.
     """
     with np.errstate(all="ignore"):
-        c = characteristic(point)
-        top = np.where(c[..., -1] == 0, c[..., -2], c[..., -1])[..., None]
-        slopes = np.all(np.isfinite(c) & np.isfinite(c / np.where(top == 0, 1.0, top)), axis=-1)
+        c, _ = quasi(point)
+        main = c[..., 0, :]
+        top = np.where(main[..., -1] == 0, main[..., -2], main[..., -1])[..., None, None]
+        slopes = np.all(np.isfinite(c) & np.isfinite(c / np.where(top == 0, 1.0, top)), axis=(-2, -1))
         values = np.ones(point.shape, dtype=bool)
         for one in point.evaluate(_steady_function(point.model)):
             values &= np.isfinite(one)
@@ -90,7 +125,7 @@ def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
 @question
 def _is_rational(model: Model) -> bool:
     """Whether the slopes are made of sums, products and whole powers only."""
-    nodes = (node for c in characteristic_coefficients(model) for node in sp.preorder_traversal(c))
+    nodes = occurrences(c for term in characteristic_terms(model) for c in term.coefficients)
     return all(node.is_Atom or node.is_Add or node.is_Mul or (node.is_Pow and node.exp.is_Integer) for node in nodes)
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from steadyslip.core.errors import InternalError
+from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.core.expressions import asinh_exp, derivative
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model.equations import Model
@@ -222,6 +222,8 @@ def reduce_model(model: Model, eliminate: int | None = 0) -> Reduction:
         Index of the memory variable that follows from the balance, where the form *eliminated* is
         possible; None forbids that form (the variable's weight in friction is zero or tiny).
     """
+    if model.delays:
+        raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
     equations = _Equations(model)
     if model.inertial:
         return _inertial(model, equations)

@@ -121,9 +121,14 @@ class MachineFindings(Verdict):
     mode : Mode or None
         How the machine moves in the mode that grows fastest, or decays slowest.
     eigenvalues : tuple of complex
-        1/s, by falling real part.
+        1/s, by falling real part; with a delay the rightmost.
     characteristic_polynomial, routh : tuple of float
         Coefficients, lowest power first; first column of the Routh array, stable if all are positive.
+        Empty with a delay, for then it is none.
+    characteristic_terms : tuple of (float, tuple of float)
+        With a delay: delays (s) and the polynomials that stand before exp(−s delay), that without delay first.
+    unstable_roots : int or None
+        With a delay: how many of the infinitely many eigenvalues grow.
     growth_rate, period, damping_ratio, time_to_halve, time_to_double : float or None
         As for a slider.
     on_edge : bool
@@ -135,3 +140,5 @@ class MachineFindings(Verdict):
     rig: Machine
     steady: SteadyMachine | None = None
     mode: Mode | None = None
+    characteristic_terms: tuple[tuple[float, tuple[float, ...]], ...] = ()
+    unstable_roots: int | None = None

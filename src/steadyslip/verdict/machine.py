@@ -61,7 +61,7 @@ def analyze_machine(machine: Machine) -> MachineAnalysis:
         point = operating_point(machine)
         numbers = linear_numbers(point)
         posed = numbers["growth_rate"] != math.inf
-        leading = numbers["eigenvalues"][0]
+        leading = numbers["eigenvalues"][0] if posed else 0.0
         found = MachineAnalysis(
             rig=machine,
             reason="",
@@ -134,7 +134,13 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
 
 def as_dict(found: MachineAnalysis) -> dict[str, Any]:
     """SI units, forces; numbers that do not exist, and infinite ones, are None."""
-    return common_numbers(found) | {"steady": _steady(found.steady), "mode": _mode(found.mode)}
+    data = common_numbers(found) | {"steady": _steady(found.steady), "mode": _mode(found.mode)}
+    if found.characteristic_terms:
+        data["characteristic_terms"] = [
+            {"delay": delay, "coefficients": list(c)} for delay, c in found.characteristic_terms
+        ]
+        data["unstable_roots"] = found.unstable_roots
+    return data
 
 
 def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:

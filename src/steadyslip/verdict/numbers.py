@@ -5,26 +5,47 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
-from steadyslip.linear.stiffness import ill_posed
+from steadyslip.linear.quasi import INFINITE
+from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import characteristic, require_range
+from steadyslip.model.range import characteristic, quasi, require_range
+
+
+def _of_polynomial(values: OperatingPoint) -> dict[str, Any]:
+    c = characteristic(values)
+    bad = bool(ill_posed(c))
+    while len(c) > 2 and c[-1] == 0:
+        c = c[:-1]
+    return {
+        "stable": bool(is_hurwitz(c)) and not bad,
+        "eigenvalues": tuple(complex(s) for s in roots(c)),
+        "characteristic_polynomial": tuple(float(x) for x in c),
+        "routh": tuple(float(x) for x in routh_column(c)),
+    }
+
+
+def _of_sum(values: OperatingPoint) -> dict[str, Any]:
+    """With delays: no polynomial, but a sum of some."""
+    c, h = quasi(values)
+    count = int(unstable_roots(values))
+    return {
+        "stable": bool(is_stable(values)),
+        "eigenvalues": tuple(complex(s) for s in spectrum(values) if np.isfinite(s)),
+        "characteristic_terms": tuple(
+            (float(delay), tuple(float(x) for x in own)) for delay, own in zip(h, c, strict=True)
+        ),
+        "unstable_roots": None if count in (-1, INFINITE) else count,
+    }
 
 
 def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
     """Everything that follows from the characteristic polynomial."""
     require_range(values)
-    c = characteristic(values)
-    bad = bool(ill_posed(c))
-    while len(c) > 2 and c[-1] == 0:
-        c = c[:-1]
-    eigenvalues = roots(c)
-    numbers: dict[str, Any] = {
-        "stable": bool(is_hurwitz(c)) and not bad,
-        "eigenvalues": tuple(complex(s) for s in eigenvalues),
-        "characteristic_polynomial": tuple(float(x) for x in c),
-        "routh": tuple(float(x) for x in routh_column(c)),
-    }
+    numbers = _of_sum(values) if values.model.delays else _of_polynomial(values)
+    bad, eigenvalues = bool(is_ill_posed(values)), numbers["eigenvalues"]
     growth = math.inf if bad else float(eigenvalues[0].real)
     numbers["growth_rate"] = growth
     if math.isfinite(growth) and growth != 0:

@@ -12,12 +12,8 @@ REST = sp.Rational(1, 10**12)
 """Of the Stribeck velocity: below it friction no longer follows a curve whose slope at rest may be infinite."""
 
 
-class CoulombStribeck(FrictionLaw, name="coulomb-stribeck"):
-    """Friction that depends on the present velocity only.
-
-    τ = σ[g(v) + σ2 v], g = μ_C + (μ_S − μ_C) exp(−|v/v_S|^δ_S). Without a memory there is no critical
-    stiffness: where friction falls with velocity, the quasistatic problem is ill-posed and with mass no
-    stiffness stabilises. Here to show just that.
+class StribeckCurve(FrictionLaw):
+    """Base of laws with the Stribeck curve g(v) = μ_C + (μ_S − μ_C) exp(−|v/v_S|^δ_S).
 
     The exponent δ_S is 2 unless given (Gauss). Lubricated and dry pairs were measured from 0.5 to 2 and more
     (Armstrong-Hélouvry 1991): with 2 friction hardly falls far below v_S, with 1 and less it falls most at rest.
@@ -38,11 +34,34 @@ class CoulombStribeck(FrictionLaw, name="coulomb-stribeck"):
             fast = (fast + REST**2) ** (self.stribeck_exponent / 2)
         return self.mu_coulomb + (self.mu_static - self.mu_coulomb) * sp.exp(-fast)
 
+
+class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
+    """Friction that depends on velocity only, on the present one or on that of a moment ago.
+
+    τ = σ[g(v) + σ2 v], g as in `StribeckCurve`. Without a memory there is no critical stiffness: where friction falls
+    with velocity, the quasistatic problem is ill-posed and with mass no stiffness stabilises. Here to show just that.
+
+    With a `lag` δ, of machines, the curve follows velocity late, τ = σ[g(v(t − δ)) + σ2 v(t)]: the frictional memory of
+    Hess & Soom (1990) and Armstrong-Hélouvry (1991). Then stiffnesses are stable and unstable by turns.
+    """
+
+    lag: float = parameter(
+        "s", nonnegative, "time δ by which the curve follows velocity late", default=0.0, structural=True, kind="delay"
+    )
+
     def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         return sigma * (self._curve(v) * sp.sign(v) + self.viscous * v)
 
+    def lateness(self) -> Expression:
+        return self.lag
 
-class LuGre(CoulombStribeck, name="lugre"):
+    def late_strength(
+        self, v: Expression, late: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+    ) -> Expression:
+        return sigma * (self._curve(late) * sp.sign(v) + self.viscous * v)
+
+
+class LuGre(StribeckCurve, name="lugre"):
     """LuGre friction (Canudas de Wit et al. 1995), per unit normal stress.
 
     τ = σ[σ0 z + σ1 ż + σ2 v], ż = v − σ0 |v| z/g(v), with the mean bristle deflection z (m) as memory.

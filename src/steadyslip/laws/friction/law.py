@@ -56,6 +56,16 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         """Friction stress in steady sliding, τss(v, σ)."""
         return self.strength(v, sigma, self.steady_memory(v, sigma), sp.nan)
 
+    def lateness(self) -> Expression:
+        """Time (s) by which friction follows velocity late; 0 for laws whose memory fades with slip or not at all."""
+        return 0
+
+    def late_strength(
+        self, v: Expression, late: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
+    ) -> Expression:
+        """`strength` of a law with a `lateness`: `late` is the velocity that long ago."""
+        return self.strength(v, sigma, memory, tau)
+
     def direction(self, v: Expression, velocity: Expression) -> Expression:
         """What motion takes for sign(v), wherever the law says sign: a step at rest cannot be integrated.
 

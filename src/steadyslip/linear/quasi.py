@@ -1,0 +1,305 @@
+"""Quasi-polynomials Σ p_j(s) exp(−s h_j): how many roots lie right of a line, and the rightmost ones (theory 11).
+
+Coefficients are (..., m, n+1), lowest power first, delays (..., m) with h_0 = 0; the leading axes are rigs. Nothing is
+approximated by rational functions. With one delay roots are counted from where they are without it: they cross the
+imaginary axis only at the few ω with |p(iω)| = |q(iω)|, at delays (φ + 2πk)/ω, to the right at the highest of these ω
+and then by turns (Cooke & van den Driessche 1986; Walton & Marshall 1987). With several delays the argument principle
+is applied along the axis, in steps so short that the function cannot wind around zero unseen.
+
+`INFINITE` is the count where the delayed terms have as many derivatives as the undelayed and outweigh them: there are
+infinitely many roots to the right, the faster growing the shorter the delay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.linear.polynomials import (
+    Array,
+    ComplexArray,
+    evaluate,
+    even_odd,
+    product,
+    quietly,
+    roots,
+)
+
+INFINITE = 10**6
+_HALVINGS = 60  # of a bracket of a real part
+_MOST = 400_000  # places along the axis at which a function is evaluated
+_TURNS = 5000  # of the fastest crossing, after which delays are not looked at any more
+_NEAR = 1e-13  # relative length of a step along the axis that is not cut any more: a root is on it
+
+
+def value(c: Array, h: Array, s: Any) -> Any:
+    """Σ p_j(s) exp(−s h_j) of one rig, for `s` of any shape."""
+    s = np.asarray(s, dtype=complex)
+    return sum(evaluate(p, s) * np.exp(-s * delay) for p, delay in zip(c, h, strict=True))
+
+
+def _slope(c: Array, h: Array, s: Any) -> Any:
+    """Its derivative."""
+    powers = np.arange(1, c.shape[-1])
+    inner = ((evaluate(p[1:] * powers, s) - d * evaluate(p, s)) * np.exp(-s * d) for p, d in zip(c, h, strict=True))
+    return sum(inner)
+
+
+@quietly
+def shifted(c: Array, h: Array, shift: Array) -> Array:
+    """Coefficients with s + shift in place of s; `shift` (...)."""
+    out = np.array(np.broadcast_to(c, np.broadcast_shapes(c.shape, (*np.shape(shift), 1, 1))), dtype=float)
+    step = np.asarray(shift, dtype=float)[..., None]
+    n = c.shape[-1] - 1
+    for low in range(n):
+        for k in range(n - 1, low - 1, -1):
+            out[..., k] += step * out[..., k + 1]
+    moved: Array = out * np.exp(np.minimum(-h * step, 700.0))[..., None]
+    return moved
+
+
+@quietly
+def in_own_time(c: Array, h: Array) -> tuple[Array, Array, Array]:
+    """The same for time in units in which lowest and highest coefficients are alike, largest coefficient one; that
+    unit's inverse (1/s) comes last."""
+    size = np.max(np.abs(c), axis=-2)
+    present = size > 0
+    low, high = np.argmax(present, axis=-1), size.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
+    ends = [np.take_along_axis(size, place[..., None], axis=-1)[..., 0] for place in (low, high)]
+    rate = np.exp((np.log(ends[0]) - np.log(ends[1])) / np.maximum(high - low, 1))
+    rate = np.where(np.isfinite(rate) & (rate > 0), rate, 1.0)
+    logs = np.log(np.abs(c)) + np.log(rate)[..., None, None] * np.arange(c.shape[-1])
+    logs -= np.max(logs, axis=(-2, -1), keepdims=True)
+    return np.where(c == 0, 0.0, np.sign(c) * np.exp(logs)), h * rate[..., None], rate
+
+
+@quietly
+def count_right(c: Array, h: Array, shift: Any = 0.0) -> NDArray[np.int64]:
+    """How many roots have a real part above `shift`, (...); −1 where coefficients are no numbers."""
+    lead = np.broadcast_shapes(c.shape[:-2], np.shape(shift))
+    c, h, rate = in_own_time(c, h)
+    if np.any(shift):
+        c = shifted(c, h, np.asarray(shift) / rate)
+    c = np.broadcast_to(c, (*lead, *c.shape[-2:])).reshape(-1, *c.shape[-2:])
+    h = np.broadcast_to(h, (*lead, h.shape[-1])).reshape(-1, h.shape[-1])
+    found = np.full(len(c), -1, dtype=np.int64)
+    good = np.all(np.isfinite(c), axis=(-2, -1)) & np.all(np.isfinite(h), axis=-1)
+    outweighed = good & _outweighed(c) & np.any(h[:, 1:] > 0, axis=-1)
+    found[outweighed] = INFINITE
+    rows = np.flatnonzero(good & ~outweighed)
+    if c.shape[-2] <= 2 and rows.size:
+        q = c[rows, 1] if c.shape[-2] == 2 else np.zeros_like(c[rows, 0])
+        found[rows] = _count_by_crossings(c[rows, 0], q, h[rows, -1])
+    else:
+        for row in rows:
+            found[row] = _count_by_argument(c[row], h[row])
+    return found.reshape(lead)
+
+
+def _outweighed(c: Array) -> NDArray[np.bool_]:
+    """Whether the highest derivative is delayed as much as it is not, or more."""
+    present = np.any(c != 0, axis=-2)
+    top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
+    highest = np.abs(np.take_along_axis(c, top[:, None, None], axis=-1)[..., 0])
+    return np.asarray(np.sum(highest[:, 1:], axis=-1) >= highest[:, 0])
+
+
+def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Where |p(iω)| = |q(iω)|: ω rising to the last, +1 or −1 as roots cross there to the right or left, and the phase
+    φ in (0, 2π] at which they do, ω h = φ + 2πk; NaN padded, ω falling."""
+    squares = np.zeros((len(p), p.shape[-1]))
+    size = np.zeros_like(squares)
+    for polynomial, sign in ((p, 1.0), (q, -1.0)):
+        even, odd = even_odd(polynomial)
+        for part, first in ((product(even, even), 0), (product(odd, odd), 1)):
+            width = min(part.shape[-1], squares.shape[-1] - first)
+            squares[:, first : first + width] += sign * part[:, :width]
+            size[:, first : first + width] += np.abs(part[:, :width])
+    squares[np.abs(squares) < 8 * np.finfo(float).eps * size] = 0.0
+    w = roots(squares)
+    usable = (w.imag == 0) & (w.real > 0)
+    w = -np.sort(np.where(usable, -w.real, np.nan), axis=-1)  # falling, NaN last
+    omega = np.sqrt(w)
+    above, below = evaluate(q[:, None, :], 1j * omega), evaluate(p[:, None, :], 1j * omega)
+    phase = np.mod(np.angle(-above / below), 2 * np.pi)
+    direction = np.where(np.arange(w.shape[-1]) % 2 == 0, 1.0, -1.0) * np.ones(w.shape)
+    return np.asarray(omega), direction, np.asarray(np.where(phase == 0, 2 * np.pi, phase))
+
+
+def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
+    """Of p + q exp(−sh): roots to the right without the delay, and what crosses as it grows to h."""
+    start = np.sum(roots(p + q).real > 0, axis=-1)
+    omega, direction, phase = crossings(p, q)
+    times = np.maximum(np.ceil((omega * h[:, None] - phase) / (2 * np.pi)), 0.0)
+    crossed = np.nansum(np.where(np.isnan(omega), 0.0, 2 * direction * times), axis=-1)
+    return np.asarray(start + crossed, dtype=np.int64)
+
+
+def _bound(c: Array) -> float:
+    """A size that no root to the right of the imaginary axis has (Fujiwara), delayed terms at their largest."""
+    size = np.abs(c)
+    top = int(np.flatnonzero(np.any(size > 0, axis=0))[-1])
+    if top == 0:
+        return 1.0
+    left = size[0, top] - np.sum(size[1:, top])
+    total = np.sum(size[:, :top], axis=0)
+    powers = 1.0 / (top - np.arange(top))
+    return 2.0 * float(np.max((total / left) ** powers)) or 1.0
+
+
+def _along(c: Array, h: Array, most: float) -> tuple[Array, ComplexArray]:
+    """Places ω from 0 to `most` and the values at iω, so dense that between two the function cannot wind around zero.
+
+    Its length between two places is at most their distance times the largest slope; where that is less than the sum of
+    the sizes at both, the chord and the function go around zero on the same side.
+    """
+    sizes, powers = np.abs(c), np.arange(c.shape[-1])
+    slopes = np.sum(sizes[:, 1:] * powers[1:], axis=0), np.sum(sizes * h[:, None], axis=0)
+    omega = np.concatenate([[0.0], most * np.geomspace(1e-9, 1.0, 200)])
+    found = value(c, h, 1j * omega)
+    while len(omega) < _MOST:
+        low, high = omega[:-1], omega[1:]
+        steepest = evaluate(slopes[0], high) + evaluate(slopes[1], high)
+        coarse = steepest * (high - low) >= 0.99 * (np.abs(found[:-1]) + np.abs(found[1:]))
+        at = np.flatnonzero(coarse & (high - low > _NEAR * high))
+        if not at.size:
+            break
+        middle = 0.5 * (low[at] + high[at])
+        omega = np.insert(omega, at + 1, middle)
+        found = np.insert(found, at + 1, value(c, h, 1j * middle))
+    return omega, found
+
+
+def _count_by_argument(c: Array, h: Array) -> int:
+    """Roots to the right by the argument principle: n/2 less the turns of the function along the positive axis."""
+    top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
+    _, found = _along(c, h, _bound(c))
+    turned = float(np.sum(np.angle(found[1:] / found[:-1])))
+    turned += float(np.angle(1j**top * c[0, top] / found[-1]))  # beyond, the highest power leads by less than π/2
+    return round(top / 2 - turned / np.pi)
+
+
+@quietly
+def rightmost(c: Array, h: Array, count: int) -> ComplexArray:
+    """The rightmost roots, (..., count), sorted by falling real part; NaN where there are infinitely many to the right.
+
+    A line is moved, by halves, until as many roots lie right of it; Newton's method on the function itself follows.
+    """
+    flat = c.reshape(-1, *c.shape[-2:])
+    delays = np.broadcast_to(h, (*c.shape[:-2], h.shape[-1])).reshape(-1, h.shape[-1])
+    found = np.full((len(flat), count), np.nan + 0j, dtype=complex)
+    scaled, own, rate = in_own_time(flat, delays)
+    good = (count_right(scaled, own) < INFINITE) & np.all(np.isfinite(scaled), axis=(-2, -1))
+    for row in np.flatnonzero(good):
+        found[row] = rate[row] * _rightmost_of_one(scaled[row], own[row], count)
+    return found.reshape(*c.shape[:-2], count)
+
+
+def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
+    if not np.any(c[1:]):  # no delayed term is left: a polynomial
+        exact = roots(np.sum(c, axis=0))
+        return np.append(exact, np.full(count, np.nan + 0j))[:count]
+    numbers = np.arange(1, count + 1)
+    high = np.full(count, 1.01 * _bound(c))
+    low = -np.ones(count)
+    for _ in range(60):
+        short = count_right(c, h, low) < numbers
+        if not np.any(short):
+            break
+        high = np.where(short, low, high)
+        low = np.where(short, 2 * low, low)
+    for _ in range(_HALVINGS):
+        if np.all(high - low < 1e-9 * (np.abs(low) + np.abs(high)) + 1e-12):
+            break
+        middle = 0.5 * (low + high)
+        many = count_right(c, h, middle) >= numbers
+        low, high = np.where(many, middle, low), np.where(many, high, middle)
+    found: list[complex] = []
+    for real in 0.5 * (low + high):
+        if found and abs(found[-1].real - real) < 1e-6 * (abs(real) + 1e-3) and found[-1].imag > 0:
+            found.append(found[-1].conjugate())
+        else:
+            found.append(_root_on(c, h, float(real)))
+    return np.array(found)
+
+
+def _root_on(c: Array, h: Array, real: float) -> complex:
+    """The root with imaginary part zero or positive that lies on a line, found again by Newton's method."""
+    moved = shifted(c, h, np.asarray(real))
+    starts = real + 1j * np.array([0.0, *_near_axis(moved, h)])
+    s = starts.astype(complex)
+    for _ in range(30):
+        step = value(c, h, s) / _slope(c, h, s)
+        s = np.where(np.isfinite(step), s - step, s)
+    s = np.where(np.abs(s.imag) < 1e-12 * np.abs(s), s.real + 0j, s)
+    far = np.abs(s.real - real) + np.abs(value(c, h, s)) / _size(c, h, s)
+    best = complex(s[int(np.argmin(np.where(np.isfinite(far), far, np.inf)))])
+    return complex(best.real, abs(best.imag))
+
+
+def _size(c: Array, h: Array, s: Any) -> Any:
+    """The sum of the sizes of all terms."""
+    return sum(evaluate(np.abs(p), np.abs(s)) * np.exp(-s.real * d) for p, d in zip(c, h, strict=True)) + 1e-300
+
+
+def _near_axis(c: Array, h: Array) -> Iterator[float]:
+    """Frequencies at which a root may be on the imaginary axis."""
+    if len(c) == 2:
+        yield from (float(one) for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one))
+        return
+    omega, found = _along(c, h, _bound(c))
+    size = np.abs(found) / _size(c, h, 1j * omega)
+    dips = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
+    yield from omega[dips[np.argsort(size[dips])[:20]]]
+
+
+@quietly
+def nearness(c: Array, h: Array) -> Array:
+    """Two functions of rigs (..., ) that pass through zero where a root crosses the axis, (2, ...); with one delay.
+
+    The phase by which the delay misses the nearest crossing, and H(0) as a share of its terms. NaN where there is none.
+    """
+    static = np.sum(c[..., 0], axis=-1) / np.sum(np.abs(c[..., 0]), axis=-1)
+    if c.shape[-2] != 2:
+        return np.stack([np.full(c.shape[:-2], np.nan), static])
+    scaled, own, _ = in_own_time(c, h)
+    p, q, late = scaled[..., 0, :].reshape(-1, c.shape[-1]), scaled[..., 1, :].reshape(-1, c.shape[-1]), own[..., 1]
+    good = np.all(np.isfinite(p), axis=-1) & np.all(np.isfinite(q), axis=-1)
+    phase = np.full(len(p), np.nan)
+    if np.any(good):
+        omega, _, at = crossings(p[good], q[good])
+        missed = np.angle(np.exp(1j * (omega * np.ravel(late)[good][:, None] - at)))
+        nearest = np.argmin(np.where(np.isnan(missed), np.inf, np.abs(missed)), axis=-1)
+        phase[good] = np.take_along_axis(missed, nearest[:, None], axis=-1)[:, 0]
+    return np.stack([phase.reshape(c.shape[:-2]), static])
+
+
+@quietly
+def crossing_delays(p: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Every delay (s) at which a root of p + q exp(−sh) crosses the axis before it is unstable for good, rising, the
+    frequencies, and +1 where it crosses to the right, −1 to the left; of one rig.
+
+    Crossings to the right have the higher frequencies and so come more often: beyond some delay they are always ahead.
+    Where two frequencies nearly agree, that is far off, and delays of more than `_TURNS` oscillations are left out.
+    """
+    (scaled,), _, (rate,) = in_own_time(np.stack([p, q])[None], np.zeros((1, 2)))
+    omega, direction, phase = (one[0] for one in crossings(scaled[:1], scaled[1:]))
+    known = np.isfinite(omega)
+    omega, direction, phase = omega[known], direction[known], phase[known]
+    if not omega.size:
+        return np.empty(0), np.empty(0), np.empty(0, dtype=int)
+    ahead = float(np.sum(direction * omega))  # > 0
+    longest = min(2 * math.pi * (len(omega) + 1) / ahead if ahead > 0 else math.inf, _TURNS * 2 * math.pi / omega[0])
+    delays, at, way = [], [], []
+    for w, angle, sign in zip(omega, phase, direction, strict=True):
+        times = np.arange(int(np.ceil(w * longest / (2 * math.pi))) + 1)
+        delays.append((angle + 2 * math.pi * times) / w)
+        at.append(np.full(len(times), w))
+        way.append(np.full(len(times), int(sign)))
+    every = np.concatenate(delays)
+    order = np.argsort(every)
+    return every[order] / rate, np.concatenate(at)[order] * rate, np.concatenate(way)[order]

@@ -1,0 +1,72 @@
+"""Eigenvalues and stability of operating points, whether their equation is a polynomial or, with delays, a sum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from steadyslip.linear import quasi as sums
+from steadyslip.linear.polynomials import Array, ComplexArray, damping_measures, is_hurwitz, roots
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.range import characteristic, quasi
+
+_ONE_CROSSING = 2  # roots that lie right of the axis just beyond an edge, at most
+
+
+def spectrum(point: OperatingPoint) -> ComplexArray:
+    """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost, n that without."""
+    if not point.model.delays:
+        return roots(characteristic(point))
+    c, h = quasi(point)
+    return sums.rightmost(c, h, c.shape[-1] - 1)
+
+
+def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
+    """Whether all roots lie left of the axis and the equations are well posed."""
+    if not point.model.delays:
+        return is_hurwitz(characteristic(point))
+    c, h = quasi(point)
+    return np.asarray((sums.count_right(c, h) == 0) & (np.sum(c[..., 0], axis=-1) != 0) & ~is_ill_posed(point))
+
+
+def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
+    """How many roots lie right of the axis, of points with delays; `quasi.INFINITE` of them, or −1 where unknown."""
+    return sums.count_right(*quasi(point))
+
+
+def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
+    """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0 (theory 3).
+
+    With delays also where what is delayed outweighs what acts at once, in the highest derivative: then disturbances
+    grow the faster, the shorter the delay.
+    """
+    if not point.model.delays:
+        return ill_posed(characteristic(point))
+    c, h = quasi(point)
+    return np.asarray(ill_posed(c[..., 0, :]) | (sums.count_right(c, h) == sums.INFINITE))
+
+
+def ill_posed(c: Array) -> NDArray[np.bool_]:
+    """The same of polynomials (..., n+1)."""
+    return np.asarray((c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0)))
+
+
+def static_sum(point: OperatingPoint) -> Array:
+    """The static stiffness: the value of the characteristic function at s = 0."""
+    return characteristic(point)[..., 0] if not point.model.delays else np.sum(quasi(point)[0][..., 0], axis=-1)
+
+
+def nearness(point: OperatingPoint) -> Array:
+    """Two functions of rigs, (2, ...), that pass through zero where a root crosses the axis, in pairs or alone."""
+    if not point.model.delays:
+        return damping_measures(spectrum(point))
+    return sums.nearness(*quasi(point))
+
+
+def is_near_edge(point: OperatingPoint, share: float) -> Any:
+    """Whether an oscillation is undamped to within a share, of the leading roots."""
+    if not point.model.delays:
+        return np.abs(0.5 * nearness(point)[0]) <= share
+    return (np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING)

@@ -1,0 +1,309 @@
+"""Delay in controllers and friction: closed forms, a discretised delay equation, windings of a matrix typed by hand."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import lambertw
+
+import steadyslip as ss
+from command import run
+from machines import at_random, coulomb, rate_state, surface, two_mass
+from steadyslip.linear import quasi
+from steadyslip.linear.spectrum import unstable_roots
+from steadyslip.linear.windows import delay_set, linear_windows
+from steadyslip.model import build_model, operating_point
+from steadyslip.model.reduction import reduce_model
+
+
+def servo(gain, delay, mass=0.0):
+    """x' = −gain x(t − delay): a body without mass in oil, held by a controller that acts late."""
+    return ss.Machine(
+        bodies={"block": ss.SlidingBody(mass=mass)},
+        links={"oil": ss.Spring(between=("ground", "block"), damping=1.0)},
+        contacts={"guide": surface("block", coulomb(0.3))},
+        drive=ss.PositionPD(velocity=1.0, body="block", kp=gain, delay=delay),
+    )
+
+
+def lagging(k, damping=0.05, slope=0.1, lag=1.0):
+    """theory 10's lag check: m s² + (c + S exp(−sδ)) s + k with m = 1, S and δ = `slope` and `lag` of the friction."""
+    difference = slope / (-2 * np.exp(-1.0))
+    friction = ss.CoulombStribeck(mu_coulomb=0.6, mu_static=0.6 + difference, v_stribeck=1.0, lag=lag)
+    return ss.Machine(
+        bodies={"block": ss.SlidingBody(mass=1.0)},
+        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
+        contacts={"guide": surface("block", friction)},
+        drive=ss.Pull(velocity=1.0),
+    )
+
+
+def spectral(c, h, nodes=40):
+    """Rightmost eigenvalues of Σ c_j(d/dt) x(t − h_j) = 0, c_0 the highest, by collocation at Chebyshev's points."""
+    n, longest = len(c[0]) - 1, max(h)
+    i = np.arange(nodes + 1)
+    x = np.cos(np.pi * i / nodes)
+    weights = np.where((i == 0) | (i == nodes), 0.5, 1.0) * (-1.0) ** i
+    difference = x[:, None] - x[None, :] + np.eye(nodes + 1)
+    slopes = weights[None, :] / weights[:, None] / difference
+    slopes -= np.diag(slopes.sum(axis=1))
+    whole = np.kron(slopes * 2 / longest, np.eye(n)).astype(float)
+    whole[:n] = 0.0
+    whole[: n - 1, 1:n] = np.eye(n - 1)
+    for row, delay in zip(c, h, strict=True):
+        at = 1 - 2 * delay / longest
+        near = np.abs(at - x) < 1e-14
+        share = near.astype(float) if near.any() else weights / (at - x) / np.sum(weights / (at - x))
+        for k in range(n):
+            whole[n - 1, k::n] -= share * row[k] / c[0][n]
+    found = np.linalg.eigvals(whole)
+    return found[np.argsort(-found.real)]
+
+
+def some(seed, terms=2):
+    """A quasi-polynomial of degree 1 to 6 at random, its delays up to a few turns of its roots."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(1, 7))
+    c = random.normal(size=(terms, n + 1))
+    c[1:, n] = 0.0
+    c[0, n] = 1.0
+    return c, np.concatenate([[0.0], 10 ** random.uniform(-1, 0.6, terms - 1)])
+
+
+# --- closed forms -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gain", [0.3, 1.0, 20.0])
+def test_a_first_order_loop_bears_a_quarter_of_its_turn(gain):
+    """x' = −a x(t − τ): stable for a τ < π/2, eigenvalues W_k(−a τ)/τ."""
+    ((low, high),) = ss.stable_values(servo(gain, 0.0), "drive.delay")
+    assert (low, gain * high) == (0.0, pytest.approx(np.pi / 2, rel=1e-14))
+    ((low, high),) = ss.stable_values(servo(gain, 0.7), "drive.kp")
+    assert 0.7 * high == pytest.approx(np.pi / 2, rel=1e-13)
+    tau = 0.8 / gain
+    found = ss.eigenvalues(servo(gain, tau, mass=0.0))
+    assert found[0] == pytest.approx(lambertw(-gain * tau, 0) / tau, rel=1e-12)
+    several = quasi.rightmost(np.array([[0.0, 1.0], [gain, 0.0]]), np.array([0.0, tau]), 7)
+    expected = [lambertw(-gain * tau, k) / tau for k in range(-4, 4)]
+    for one in several:
+        assert np.min(np.abs(one - expected)) < 1e-10 * abs(one)
+    assert several.real == pytest.approx(np.sort(np.real(expected))[::-1][:7], rel=1e-9)
+
+
+def test_stiffnesses_of_lagging_friction_are_stable_by_turns():
+    """theory 10: cos βδ = −c/S, k = mβ² − Sβ sin βδ; 4.2051, 17.9087, 69.4583, 110.569 and so on."""
+    edges = ss.boundary(lagging(10.0), "links.spring.stiffness", between=(1.0, 1000.0))
+    first = np.arccos(-0.5)
+    beta = np.sort(np.concatenate([first + 2 * np.pi * np.arange(5), 2 * np.pi * np.arange(1, 6) - first]))
+    k = beta**2 - 0.1 * beta * np.sin(beta)
+    assert [edge.value for edge in edges] == pytest.approx(k[k < 1000], rel=1e-12)
+    assert [edge.value for edge in edges][:4] == pytest.approx([4.2051, 17.9087, 69.4583, 110.569], rel=1e-5)
+    assert [edge.angular_frequency for edge in edges] == pytest.approx(beta[k < 1000], rel=1e-12)
+    assert [edge.stable for edge in edges][:4] == ["below", "above", "below", "above"]
+    intervals = ss.stable_values(lagging(10.0), "links.spring.stiffness")
+    assert intervals[:2] == pytest.approx(np.array([[0.0, k[0]], [k[1], k[2]]]), rel=1e-12)
+    inside = ss.stability(lagging(10.0), {"links.spring.stiffness": np.sqrt(intervals[1:8, 0] * intervals[1:8, 1])})
+    assert set(inside.tolist()) == {"stable"}
+
+
+def test_without_its_delay_a_machine_is_as_it_was():
+    """The leading eigenvalue moves by the delay, order one; at none at all it is the same to rounding."""
+    axis = two_mass(kp=4.0, kd=3.0)
+    exact = ss.eigenvalues(axis)[0]
+    delays = np.array([1e-2, 1e-3, 1e-4, 1e-5])
+    moved = np.abs(ss.eigenvalues(axis, {"drive.delay": delays})[:, 0] - exact)
+    assert np.diff(np.log10(moved)) == pytest.approx(-np.ones(3), abs=0.01)
+    assert ss.eigenvalues(axis, {"drive.delay": [0.0]})[0] == pytest.approx(ss.eigenvalues(axis), rel=1e-12)
+
+
+# --- other routes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("terms", [2, 3])
+def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms):
+    for seed in range(40 if terms == 2 else 8):
+        c, h = some(seed, terms)
+        found = spectral(c, h)
+        if np.min(np.abs(found.real[:12])) < 1e-6:
+            continue
+        assert int(quasi.count_right(c, h)) == np.sum(found.real > 0), seed
+        assert int(quasi._count_by_argument(c, h)) == np.sum(found.real > 0), seed
+        for one in quasi.rightmost(c, h, 3):
+            assert np.min(np.abs(found - one)) < 1e-6 * max(1.0, abs(one)), seed
+
+
+def test_edges_of_delays_are_those_of_the_discretised_equation():
+    seen = 0
+    for seed in range(40):
+        c, _ = some(seed)
+        c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 2.0  # so that it is often stable
+        c[1] *= 4.0
+        edges = delay_set(c[0], c[1])
+        ends = edges.edges[edges.edges < 5.0]
+        if not len(ends):
+            continue
+        seen += 1
+        probes = np.concatenate([[0.5 * ends[0]], 0.5 * (ends[1:] + ends[:-1])])
+        inside = np.any((edges.intervals[:, :1] < probes) & (probes < edges.intervals[:, 1:]), axis=0)
+        for probe, stable in zip(probes, inside, strict=True):
+            assert (spectral(c, [0.0, probe], 60)[0].real < 0) == stable, seed
+        for edge, frequency in zip(ends, edges.frequencies, strict=False):
+            assert abs(quasi.value(c, np.array([0.0, edge]), 1j * frequency)) < 1e-9
+    assert seen > 5
+
+
+def test_windows_of_what_enters_linearly_are_those_of_counting():
+    """On a grid of θ, for random P + θ Q with one delay and with two."""
+    both = 0
+    for seed in range(30):
+        c, h = some(seed, 2 + seed % 2)
+        q, _ = some(seed + 500, 2 + seed % 2)
+        q = q[:, : c.shape[1]] if q.shape[1] >= c.shape[1] else np.pad(q, ((0, 0), (0, c.shape[1] - q.shape[1])))
+        q[:, -1] = 0.0
+        c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 3.0
+        found = linear_windows(c, q, h, 1e-3, 1e3)
+        theta = np.geomspace(2e-3, 5e2, 60)
+        stable = quasi.count_right(c + theta[:, None, None] * q, h) == 0
+        if found is None:
+            continue
+        inside = np.any((found.intervals[:, :1] < theta) & (theta < found.intervals[:, 1:]), axis=0)
+        known = theta < (found.intervals[-1, 1] if stable[-1] and len(found.intervals) else np.inf)
+        assert np.array_equal(inside[known], stable[known]), seed
+        both += 0 < stable.sum() < len(stable)
+    assert both > 10
+
+
+def winding(matrix, fast):
+    """Zeros to the right of the axis of a determinant without poles there, by how it turns from 0 to beyond `fast`."""
+    omega = np.concatenate([np.geomspace(1e-5, 1.0, 1000), np.geomspace(1.0, fast, 4000)[1:]])
+    turns = np.unwrap([np.angle(np.linalg.det(matrix(1j * w))) for w in omega])
+    far = [np.log(abs(np.linalg.det(matrix(1j * w)))) for w in (fast, 2 * fast)]
+    degree = round((far[1] - far[0]) / np.log(2))
+    return round((degree * np.pi / 2 - (turns[-1] - turns[0])) / np.pi)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_late_machines_at_random_have_the_roots_of_theory_11s_matrix(seed):
+    machine, matrix = at_random(seed, delay=0.05 * (1 + seed))
+    found = ss.eigenvalues(machine)
+    if np.isnan(found).all():
+        assert ss.growth_rate(machine) == np.inf
+        return
+    for s in found:
+        values, near = (np.linalg.svd(matrix(z), compute_uv=False) for z in (s, s * (1 + 1e-6)))
+        assert values[-1] < 1e-8 * values[0] or values[-1] < 1e-3 * near[-1]
+    assert int(unstable_roots(operating_point(machine))) == winding(matrix, 300.0)
+
+
+# --- what people see --------------------------------------------------------------------------------
+
+
+def late_axis(delay="0 s"):
+    return replace(two_mass(kp=4.0, kd=3.0), drive=ss.PositionPD(velocity=1.0, body="motor", kp=4, kd=3, delay=delay))
+
+
+def test_a_verdict_with_delay():
+    stable, unstable = ss.analyze(late_axis("0.1 s")), ss.analyze(late_axis("0.3 s"))
+    assert (stable.stable, stable.unstable_roots) == (True, 0)
+    assert (unstable.stable, unstable.unstable_roots) == (False, 2)
+    edges = {m.parameter: m.edge for m in unstable.margins if m.edge is not None}
+    assert edges["drive.delay"].value == pytest.approx(ss.stable_values(late_axis(), "drive.delay")[0, 1], rel=1e-13)
+    assert "drive.delay" in str(unstable)
+    assert "195.1 ms" in str(unstable)
+    assert "unstable roots" not in str(stable)
+    data = json.loads(unstable.to_json())
+    assert (data["unstable_roots"], data["characteristic_polynomial"], data["routh"]) == (2, [], [])
+    first, late = data["characteristic_terms"]
+    assert (first["delay"], late["delay"]) == (0.0, 0.3)
+    s = complex(*data["eigenvalues"][0])
+    total = sum(np.polyval(t["coefficients"][::-1], s) * np.exp(-s * t["delay"]) for t in (first, late))
+    assert abs(total) < 1e-9
+    assert ss.modes(late_axis("0.3 s"))[0].eigenvalue == unstable.eigenvalues[0]
+
+
+@pytest.mark.parametrize("name", ["links.screw.stiffness", "bodies.table.mass", "drive.velocity", "friction.a"])
+def test_edges_of_other_parameters_are_on_the_axis(name):
+    machine = late_axis("0.3 s")
+    edges = ss.boundary(machine, name)
+    assert edges
+    for edge in edges[:4]:
+        leading = ss.eigenvalues(machine.with_values({name: edge.value}))
+        assert np.min(np.abs(leading.real)) < 1e-8 * np.max(np.abs(leading))
+        sides = ss.stability(machine, {name: [edge.value * (1 - 1e-6), edge.value * (1 + 1e-6)]}).tolist()
+        assert sorted(sides) == ["stable", "unstable"]
+
+
+def test_a_late_controller_and_late_friction_together():
+    """Products of both delays: counted by the argument principle; each delay alone is the edge without the other."""
+    machine = replace(
+        lagging(10.0), drive=ss.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.Spring(between=("ground", "block"), damping=0.4)},
+    )  # fmt: skip
+    point = operating_point(machine)
+    assert len(point.model.delays) == 2
+    found = ss.eigenvalues(machine)
+
+    def whole(s):
+        return s**2 + 0.4 * s + 0.1 * s * np.exp(-s) + (2.0 + 0.5 * s) * np.exp(-0.2 * s)
+
+    assert np.abs(whole(found)) == pytest.approx(np.zeros(len(found)), abs=1e-10)
+    (edge, *_) = ss.boundary(machine, "drive.delay", between=(0.05, 2.0))
+    on = machine.with_values({"drive.delay": edge.value})
+    assert abs(ss.eigenvalues(on)[0].real) < 1e-8
+    (edge, *_) = ss.boundary(machine, "drive.kp", between=(0.5, 50.0))
+    assert abs(ss.eigenvalues(machine.with_values({"drive.kp": edge.value}))[0].real) < 1e-8
+
+
+def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
+    """Without mass, c s + Kd s exp(−sτ): from Kd = c on there are infinitely many growing roots."""
+    base = servo(1.0, 0.1)
+    for gain, posed in ((0.9, True), (1.1, False)):
+        machine = replace(base, drive=replace(base.drive, kd=gain))
+        assert np.isfinite(ss.growth_rate(machine)) == posed
+        found = ss.analyze(machine)
+        assert found.reason.startswith("the equations are ill-posed") != posed
+        json.loads(found.to_json())
+    (edge,) = ss.boundary(replace(base, drive=replace(base.drive, kd=0.9)), "drive.kd", between=(0.5, 3.0))
+    assert (edge.kind, edge.value) == ("ill-posed", pytest.approx(1.0, rel=1e-12))
+
+
+def test_all_that_a_controller_does_is_late():
+    """A cascade: place of the table, speed of the motor and integral, all one delay ago."""
+    drive = ss.Cascade(velocity=1.0, body="motor", measured="table", kv=0.8, kp=3.0, tn=2.5, delay=0.05)
+    found = ss.eigenvalues(replace(two_mass(), drive=drive))
+    friction = rate_state(0.5, -0.3, 1.0)
+
+    def matrix(s):
+        late = np.exp(-0.05 * s)
+        screw = 100 + 0.5 * s
+        rubbing = s * (friction.a * s + (friction.a - friction.b)) / (s + 1)
+        place, speed = 3.0 * 0.8 + 3.0 * 0.8 / 2.5 / s, 3.0 * s + 3.0 / 2.5
+        return np.array(
+            [[2 * s**2 + screw + speed * late, -screw + place * late], [-screw, 5 * s**2 + screw + rubbing]]
+        )
+
+    for s in found:
+        values = np.linalg.svd(matrix(s), compute_uv=False)
+        assert values[-1] < 1e-9 * values[0]
+
+
+def test_what_is_not_offered_with_delay_says_so(tmp_path):
+    text = ss.rig_to_text(late_axis("0.1 s"))
+    assert ss.rig_from_text(text) == late_axis("0.1 s")
+    path = tmp_path / "late.toml"
+    path.write_text(text)
+    done = run("simulate", str(path), "--until", "1 s")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert re.search("delay|machine", done.stderr)
+    with pytest.raises(ss.NotAvailable, match="motion with a delay is not offered"):
+        reduce_model(build_model(late_axis("0.1 s")))
+    with pytest.raises(ss.ParameterError, match="describe it as a machine"):
+        ss.Slider(
+            friction=lagging(1.0).contacts["guide"].friction, contact=ss.Constant(preload=1.0), stiffness=1.0,
+            drive=ss.Steady(1.0),
+        )  # fmt: skip
+    with pytest.raises(ss.ParameterError, match="delay"):
+        ss.PositionPD(velocity=1.0, body="motor", kp=1.0, delay=-0.1)

@@ -9,6 +9,7 @@ import pytest
 
 import lab_records as lab
 import steadyslip as ss
+from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.plan import make_plan
@@ -158,7 +159,7 @@ def test_every_law_contact_and_regime(name, monkeypatch):
     free = [n for n in make_plan(rig, _bare(run), protocol=pieces).free if n in rig.parameters()]
     if name in ("inclined", "triaxial"):
         free.append("contact.angle")
-    forward = Forward(rig, free, rtol=1e-8, threads=1)
+    forward = Forward(rig, free, rtol=1e-8, effort=Effort(threads=1))
     reduction = reduce_model(forward.model, None)
     forward.program = ExperimentProgram(reduction, forward.size, forward.program.method, plain=True)
     inputs = make_plan(rig, _bare(run), free=free, protocol=pieces).comparison().parts[0].inputs

@@ -13,6 +13,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.condensed import condensed
+from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
@@ -130,7 +131,7 @@ def profile(fit: Fit, name: str, *, reach: float = 4.0, count: int = 33, threads
     z = np.clip(z, low, high)
     held = np.zeros_like(z, dtype=bool)
     held[:, i] = True
-    few = condensed(fit.plan, fit.plan.comparison(threads), np.stack([fit.coordinates, z[0], z[-1]]))
+    few = condensed(fit.plan, fit.plan.comparison(Effort(threads)), np.stack([fit.coordinates, z[0], z[-1]]))
     found = minimise(lambda x, _: few.residuals(x), z, low, high, held=held)
     least = float(np.sum(few.residuals(fit.coordinates[None])[0] ** 2))
     rise = (found.ssq - least) / _unit_of_rise(fit, i)

@@ -13,6 +13,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.inference import inference_data
+from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 from steadyslip.experiments.numerics.sampling import walked
@@ -154,7 +155,7 @@ def bootstrap(
     if not (isinstance(count, int) and count >= 2):
         raise ParameterError([Problem("count", f"got {count!r}; allowed: a whole number >= 2")])
     generator = np.random.default_rng(seed)
-    comparison = fit.plan.comparison(threads)
+    comparison = fit.plan.comparison(Effort(threads))
     lengths = [block_length(fit, i, kind, block) for i in range(len(comparison.parts))]
     ends, converged, done = [], [], 0
 
@@ -225,7 +226,7 @@ def posterior(fit: Fit, steps: int = 2000, *, walkers: int = 64, seed: int = 0, 
     NotAvailable
         If emcee is not installed.
     """
-    comparison = fit.plan.comparison(threads)
+    comparison = fit.plan.comparison(Effort(threads))
     low, high = fit.bounds
     stretch = _stretch(fit)
     variance = fit.ssq / max(fit.degrees, 1)

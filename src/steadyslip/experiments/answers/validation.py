@@ -10,6 +10,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked, whole
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.uncertainty import block_length
+from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
@@ -85,7 +86,7 @@ def cross_validate(
     most = fit.samples // folds
     if block is not None and not (isinstance(block, int) and not isinstance(block, bool) and 1 <= block <= most):
         raise ParameterError([Problem("block", f"got {block!r}; allowed: a whole number from 1 to {most}")])
-    comparison = fit.plan.comparison(threads)
+    comparison = fit.plan.comparison(Effort(threads))
     length = block or min(max(block_length(fit, i) for i in range(len(comparison.parts))), most)
     fold = np.arange(fit.samples) // length % folds
     seen = (fold != np.arange(folds)[:, None]).astype(float)

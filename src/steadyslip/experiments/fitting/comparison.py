@@ -64,7 +64,7 @@ class RecordPart:
     def plain(self) -> Forward:
         """The same without derivatives, several times as fast."""
         own = self.forward
-        return Forward(own.rig, own.names, own.rtol, own.shifts, own.threads, sensitive=False)
+        return Forward(own.rig, own.names, own.rtol, own.shifts, sensitive=False, effort=own.effort)
 
 
 class Comparison:

@@ -53,9 +53,9 @@ class Condensed:
         ]
         self.size = sum(len(piece.rows) for piece in self.pieces)
         records = tuple(r.taken(p.rows, "thinned") for r, p in zip(plan.records, self.pieces, strict=True))
-        patience = whole.parts[0].forward.patience * whole.size // self.size  # motions are as long as before
-        threads = whole.parts[0].forward.threads
-        self.few = replace(plan, records=records, weights=None).comparison(threads, patience)
+        effort = whole.parts[0].forward.effort
+        longer = replace(effort, patience=effort.patience * whole.size // self.size)  # motions are as long as before
+        self.few = replace(plan, records=records, weights=None).comparison(longer)
         self.data, constant = [], 0.0
         for piece, where in zip(self.pieces, whole.slices, strict=True):
             piece.weigh(whole.weights[where])

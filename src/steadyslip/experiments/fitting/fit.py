@@ -10,6 +10,7 @@ import numpy as np
 
 from steadyslip.core.options import checked
 from steadyslip.experiments.fitting.comparison import Comparison
+from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan, check_friction, check_width, make_plan
@@ -45,6 +46,7 @@ def fit(
     weights: Any = None,
     errors: str = "auto",
     starts: int = STARTS,
+    effort: float = 1.0,
     threads: int | None = None,
     progress: Told | None = None,
 ) -> Fit:
@@ -96,6 +98,9 @@ def fit(
         ``independent``: never.
     starts : int, optional
         Points to start from.
+    effort : float, optional
+        How long the search may last, as a multiple of what nearly always suffices. It is counted in steps of the model,
+        so that it ends alike on every machine; the fit says if it ended so (``fit.search.cut``).
     threads : int, optional
         All cores unless given.
     progress : callable, optional
@@ -116,13 +121,15 @@ def fit(
     plan = make_plan(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
         trend_axis=trend_axis, offset=offset, lag=lag, loss=loss, width=width, weights=weights, errors=errors,
-        starts=starts,
+        starts=starts, effort=effort,
     )  # fmt: skip
     check_friction(plan.records)
+    size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
+    allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
     if plan.loss != "linear" and plan.width is None:
-        first = searched(replace(plan, loss="linear"), starts, threads, progress)
+        first = searched(replace(plan, loss="linear"), starts, allowed, progress)
         plan = check_width(plan, first.comparison.residuals(first.coordinates[None])[0][0])
-    found = searched(plan, starts, threads, progress)
+    found = searched(plan, starts, allowed, progress)
     return finished(plan, found.comparison, found.coordinates, found.story, errors, found.bounds)
 
 
@@ -137,9 +144,12 @@ def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
     begin = begin.reshape(-1, len(own))
     if not len(begin):
         return result
-    comparison = plan.comparison()
+    budget = Budget.of_fit(result.samples, len(space))
+    comparison = plan.comparison(Effort(budget=budget))
     z = space.coordinates(np.clip(begin, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
-    ends = minimise(lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST).sorted()
+    ends = minimise(
+        lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST, enough=budget.part(np.inf)
+    ).sorted()
     if not ends.ssq[0] < result.ssq * (1 - BETTER):
         return result
     found = ordered(ends.coordinates, space)[0]

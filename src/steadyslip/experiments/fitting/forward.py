@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.kernels.experiment import LANES, experiment_program
 from steadyslip.kernels.layout import Setting
 from steadyslip.machine.slider import Slider
@@ -18,8 +19,8 @@ from steadyslip.motion.jobs import automatic_method
 
 Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
-MOST_STEPS = 40  # per row of the table and lane, on average, before a motion is given up
 SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
+RICHER = 0.025  # more patience for each parameter: what a simpler model can follow, a richer one can
 _STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
 
 
@@ -86,19 +87,18 @@ class Forward:
         Error allowed per step.
     shifts : int
         How many free times of the table there are besides.
-    threads : int, optional
     sensitive : bool
         Whether derivatives are wanted.
-    patience : int
-        Steps per row of the table and lane, on average, before a trial is given up.
+    effort : Effort, optional
+        What running may cost.
     """
 
     def __init__(
-        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, threads: int | None = None,
-        sensitive: bool = True, patience: int = MOST_STEPS,
+        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0,
+        sensitive: bool = True, effort: Effort | None = None,
     ) -> None:  # fmt: skip
-        self.rig, self.names, self.rtol, self.shifts, self.threads = rig, tuple(names), rtol, shifts, threads
-        self.patience = patience
+        self.rig, self.names, self.rtol, self.shifts = rig, tuple(names), rtol, shifts
+        self.effort = effort or Effort()
         own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
         self._base = operating_point(rig, own)
         self.model = self._base.model
@@ -188,8 +188,9 @@ class Forward:
 
         if len(found) <= LANES:
             work(0, len(found), threading.Event())
-        elif not run_many(work, len(found), self.threads, LANES, lanes=LANES):
+        elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
             raise KeyboardInterrupt  # half of the runs would pass for runs that failed
+        self.effort.budget.spend(np.sum(taken, axis=1), 1 + chain.shape[1])
         if found is not seen:
             seen[good] = found
         return seen
@@ -202,7 +203,8 @@ class Forward:
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
-        settings[:, Setting.MOST_STEPS] = self.patience * table.samples.shape[1] + 1000
+        richer = 1 + RICHER * (len(self.names) + self.shifts)
+        settings[:, Setting.MOST_STEPS] = int(self.effort.patience * richer * table.samples.shape[1]) + 1000
         settings[:, Setting.FIRST_STEP] = np.inf
         for i, name in enumerate(reduction.names):
             settings[:, Setting.ATOL + i] = self.rtol * scales[name]

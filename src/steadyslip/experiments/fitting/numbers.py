@@ -91,6 +91,8 @@ class SearchStory:
         Of the last stage.
     converged : bool
         Whether the sum of squares is within 1e-7 of where it ends.
+    cut : bool
+        Whether the search ended because the work that it may be was done.
     """
 
     starts: int
@@ -98,6 +100,7 @@ class SearchStory:
     others: tuple[float, ...]
     iterations: int
     converged: bool
+    cut: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,8 @@ from steadyslip.experiments.fitting.comparison import (
     trend_rows,
     trend_unknowns,
 )
-from steadyslip.experiments.fitting.forward import MOST_STEPS, Forward
+from steadyslip.experiments.fitting.effort import Effort
+from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
@@ -129,13 +130,13 @@ class Plan:
             return unknown(address, record, scale=0.01 * float(np.ptp(self.records[record or 0].time)))
         return unknown(self.rig.parameters()[name], record)
 
-    def comparison(self, threads: int | None = None, patience: int = MOST_STEPS) -> Comparison:
-        """Records against the model, given up after `patience` steps of it per sample on average."""
-        space = self.space()
-        parts = tuple(self._part(i, record, space, threads, patience) for i, record in enumerate(self.records))
+    def comparison(self, effort: Effort | None = None) -> Comparison:
+        """Records against the model."""
+        space, effort = self.space(), effort or Effort()
+        parts = tuple(self._part(i, record, space, effort) for i, record in enumerate(self.records))
         return Comparison(parts, space, self.loss, self.width or 1.0)
 
-    def _part(self, i: int, record: Record, space: Space, threads: int | None, patience: int) -> RecordPart:
+    def _part(self, i: int, record: Record, space: Space, effort: Effort) -> RecordPart:
         rig, pressed = self.driven(record, i)
         places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
         for place, one in enumerate(space.unknowns):
@@ -145,7 +146,7 @@ class Plan:
                 places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
-        forward = Forward(rig, names, self.rtol, shifts=len(times), threads=threads, patience=patience)
+        forward = Forward(rig, names, self.rtol, shifts=len(times), effort=effort)
         inputs: Any
         moved: Array | None = None
         if self.follows:
@@ -216,7 +217,7 @@ def make_plan(
     names = [name for name in dict.fromkeys(names) if name not in held]
     apart = _resolved("separate", separate, dict.fromkeys(names), problems)
     problems += faults({name: value for name, value in options.items() if name != "weights"})
-    for name in ("errors", "starts"):  # of the search, not of what is compared
+    for name in ("errors", "starts", "effort"):  # of the search, not of what is compared
         options.pop(name, None)
     if not names and not problems:
         problems.append(Problem("free", f"nothing is free; name parameters such as {', '.join(list(known)[:3])}"))

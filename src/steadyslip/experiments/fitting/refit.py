@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from steadyslip.experiments.fitting.effort import Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
-from steadyslip.experiments.numerics.least_squares import minimise
+from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
+Array = np.ndarray
 SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # of the longest that a ramp may be: durations that are tried
 
 
@@ -54,11 +57,18 @@ def driven_as_measured(
     space = plan.space()
     z = space.coordinates(np.array([values.get(u.name, 0.5 * (u.low + u.high)) for u in space.unknowns]))
     low, high = (np.array([bounds.get(u.name, u.bounds)[side] for u in space.unknowns]) for side in (0, 1))
-    comparison = plan.comparison()
-    found = minimise(lambda x, _: comparison.residuals(x), z[None], low, high, most=30, tolerance=1e-4)
+    found = _minimised(plan, z[None], low, high, most=30, tolerance=1e-4)
     if not np.isfinite(found.ssq[0]):
         return None
     return dict(zip((u.name for u in space.unknowns), map(float, space.values(found.coordinates[0])), strict=True))
+
+
+def _minimised(plan: Plan, z: Array, low: Array, high: Array, **options: Any) -> Minima:
+    """Where the search ends from z, (m, p), if it is no more work than that of a fit."""
+    samples = sum(len(record) for record in plan.records)
+    enough = (budget := Budget()).part(work_of_search(samples, z.shape[1]))
+    comparison = plan.comparison(Effort(budget=budget))
+    return minimise(lambda x, _: comparison.residuals(x), z, low, high, enough=enough, **options)
 
 
 def may_be_ramp(channel: str, change: Change) -> bool:
@@ -91,8 +101,7 @@ def with_ramps(
     held[:, lengths] = True
     z = space.coordinates(begin)
     lows[:, lengths], highs[:, lengths] = z[:, lengths], z[:, lengths]
-    comparison = plan.comparison()
-    found = minimise(lambda x, _: comparison.residuals(x), z, lows, highs, most=40, held=held, tolerance=1e-8)
+    found = _minimised(plan, z, lows, highs, most=40, held=held, tolerance=1e-8)
     names, own = [u.name for u in space.unknowns], space.values(found.coordinates)
     return tuple(
         Ramped(share, float(ssq), dict(zip(names, map(float, row), strict=True)))

@@ -10,6 +10,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
+from steadyslip.experiments.fitting.effort import Effort, work_of_search
 from steadyslip.experiments.fitting.nested import Simpler, simpler
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
@@ -29,6 +30,8 @@ ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 FEW = 8  # starts of a simpler model, to see whether it comes near
 NEAREST = 3  # of the ends on few numbers that go on with all samples
+STARTING, REFINING = 0.5, 0.8  # of the work of a search: what may be done by the ends of its first two stages
+BESIDES = 0.2  # of it: what may be done with each simpler model, besides its own search
 SURPASSED = 1e-8  # of the sum of squares: by so much less on few numbers, an end is worth a look on all samples
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
 
@@ -63,45 +66,49 @@ Known = dict[tuple[tuple[str, ...], int, bool], Found | None]
 """Fits of simpler models that are there already, by what is free."""
 
 
-def _tried(plan: Plan, starts: int, threads: int | None, progress: Told | None, known: Known) -> Found | None:
+def _tried(plan: Plan, starts: int, effort: Effort, progress: Told | None, known: Known) -> Found | None:
     """The best minimum of a simpler model, if it has any."""
     try:
-        return searched(plan, starts, threads, progress, known)
+        return searched(plan, starts, effort, progress, known)
     except NotAvailable:
         return None
 
 
-def searched(plan: Plan, starts: int, threads: int | None, progress: Told | None, known: Known | None = None) -> Found:
+def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, known: Known | None = None) -> Found:
     """The best minimum, and how it was found.
 
     A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
     then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
-    from where these end.
+    from where these end. When the work that its own search may be is done, it goes on with the best that it has; what
+    a simpler model may be is what it may be alone, so that it ends at the same place.
 
     Raises
     ------
     NotAvailable
         If the model cannot follow the records from any start.
     """
-    search = _Search(plan, starts, threads, progress)
+    search = _Search(plan, starts, effort, progress)
     for upto in dict.fromkeys((-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts)):
         search.try_starts(upto)
-        if not np.any(np.isfinite(search.rough.ssq)):
+        last = search.enough.was_met
+        if not search.any_followed:
+            if last:
+                break
             continue
         search.promising()
         if search.arrived < ENOUGH and upto >= starts:
-            search.quick = search.thin.comparison(threads)  # with all the patience there is
-        if search.arrived < ENOUGH or (upto < starts and search.arrived < upto / 3):
+            search.quick = search.thin.comparison(effort)  # with all the patience there is
+        if not last and (search.arrived < ENOUGH or (upto < starts and search.arrived < upto / 3)):
             continue
         found = search.polished()
-        if upto >= starts or not _leaves_structure(search.whole, found.coordinates[0]):
+        if last or upto >= starts or not _leaves_structure(search.whole, found.coordinates[0]):
             break
     else:
-        if not np.any(np.isfinite(search.rough.ssq)):
-            raise NotAvailable(
-                "the model cannot follow these records from any start; are law and drive those of the experiment?"
-            )
         found = search.polished()
+    if not search.any_followed:
+        raise NotAvailable(
+            "the model cannot follow these records from any start; are law and drive those of the experiment?"
+        )
     found = search.nested(found, {} if known is None else known)
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
@@ -117,7 +124,8 @@ class _Search:
     plan : Plan
     starts : int
         As the user has them, for simpler models.
-    threads : int or None
+    effort : Effort
+        Its budget that of the fit.
     progress : callable or None
 
     Attributes
@@ -130,18 +138,35 @@ class _Search:
         The finalists, whose motion goes through all samples.
     arrived : int
         How many starts lead to the best minimum.
+    stages : list of Allowance
+        Of work: for starts, for the promising, for the end on all samples, then for each simpler model.
+    enough : Allowance
+        That of the stage that it is in.
     """
 
-    def __init__(self, plan: Plan, starts: int, threads: int | None, progress: Told | None) -> None:
-        self.plan, self.starts, self.threads, self.progress = plan, starts, threads, progress
-        self.whole = plan.comparison(threads)
+    def __init__(self, plan: Plan, starts: int, effort: Effort, progress: Told | None) -> None:
+        self.plan, self.starts, self.effort, self.progress = plan, starts, effort, progress
+        self.whole = plan.comparison(effort)
         self.thin = replace(_thinned(plan), rtol=1e-5)
-        self.quick = self.thin.comparison(threads, HASTY)
+        self.quick = self.thin.comparison(replace(effort, patience=HASTY))
         self.low, self.high = search_bounds(self.whole.parts, self.whole.space)
         self.rough = self.best = Minima.none(len(self.whole.space))
         self.few: Comparison | Condensed = self.whole
         self.followed = self.best.coordinates
         self.arrived = 0
+        self.work = work_of_search(self.whole.size, len(self.whole.space)) * effort.budget.scale
+        self.stages = [effort.budget.part(share * self.work) for share in (STARTING, REFINING, 1.0)]
+        self.enough = self.stages[0]
+
+    @property
+    def any_followed(self) -> bool:
+        """Whether the model could follow the records from any start."""
+        return bool(np.any(np.isfinite(self.rough.ssq)))
+
+    @property
+    def cut(self) -> bool:
+        """Whether something was left undone because the work for it was done."""
+        return any(stage.was_met for stage in self.stages)
 
     def told(self, what: str, among: Comparison) -> Callable[[Minima], None]:
         def tell(ends: Minima) -> None:
@@ -155,13 +180,15 @@ class _Search:
         """Starts up to a number of them, on few samples."""
         already = len(self.rough.ssq)
         begin = starting_points(self.whole.parts, self.whole.space, upto - already, already)
+        self.enough = self.stages[0]
         self.rough = self.rough + minimise(
             lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH, tolerance=1e-4,
-            race=ENOUGH, told=self.told("searching", self.quick),
+            race=ENOUGH, told=self.told("searching", self.quick), enough=self.enough,
         )  # fmt: skip
 
     def promising(self) -> None:
         """The most promising ends: on what stands for all samples, where anything does, and how many starts agree."""
+        self.enough = self.stages[1]
         begin, counts = self.rough.distinct(FINALISTS)
         if len(self.best.ssq):  # where earlier starts have led
             begin = np.concatenate([begin, self.best.sorted().coordinates[:1]])
@@ -175,7 +202,7 @@ class _Search:
             return
         self.best = minimise(
             lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=ENOUGH,
-            told=self.told("refining", self.whole),
+            told=self.told("refining", self.whole), enough=self.enough,
         )  # fmt: skip
         self.arrived = int(np.sum(counts[self.best.ssq <= np.min(self.best.ssq) * (1 + SAME)]))
 
@@ -193,12 +220,13 @@ class _Search:
                 return points[good], own[good], seen[good], slopes[good]
             first += len(points)
             every, numbers = self.rough.distinct(len(self.rough.ssq), hope=np.inf)
-            if len(every) > first:
+            if len(every) > first and not self.enough():
                 waiting = [(every[first : first + FINALISTS], numbers[first : first + FINALISTS])]
         return begin, counts, np.empty((0, self.whole.size)), np.empty((0, begin.shape[1], self.whole.size))
 
     def polished(self) -> Minima:
         """The best of the promising brought to their end on all samples, the best first."""
+        self.enough = self.stages[2]
         begin = self.best.coordinates if self.few is self.whole else self.best.distinct(NEAREST)[0]
         found = self._on_all(begin)
         if not len(begin) or not np.isfinite(found.ssq[0]):  # few numbers have led astray
@@ -209,13 +237,15 @@ class _Search:
     def nested(self, found: Minima, known: Known) -> Minima:
         """The same, or better ones where simpler models inside this one lead."""
         for model in simpler(self.plan):
-            if not self._near(model):
+            if not self.cut and not self._near(model):
                 continue
             key = model.plan.free, model.plan.trend, model.plan.offset
             if key not in known:
-                known[key] = _tried(model.plan, self.starts, self.threads, self.progress, known)
+                known[key] = _tried(model.plan, self.starts, self.effort, self.progress, known)
             if (other := known[key]) is None:
                 continue
+            self.enough = self.effort.budget.part(BESIDES * self.work)
+            self.stages.append(self.enough)
             begin = model.within(self.whole.space, other.coordinates, self.low, self.high)
             better = other.ssq < found.ssq[0] * (1 - SURPASSED)
             found = (found + (self._on_all(begin) if better else self._refined(begin))).sorted()
@@ -231,6 +261,7 @@ class _Search:
         ends = minimise(
             lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH,
             held=np.tile(held, (len(begin), 1)), tolerance=1e-4, race=3, told=self.told("refining", self.quick),
+            enough=self.effort.budget.part(BESIDES * self.work),
         )  # fmt: skip
         return bool(np.min(ends.ssq, initial=np.inf) <= HOPE * np.min(self.rough.ssq))
 
@@ -240,7 +271,7 @@ class _Search:
             known = float(np.min(self.best.ssq))
             ends = minimise(
                 lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=1,
-                known=known, told=self.told("refining", self.whole),
+                known=known, told=self.told("refining", self.whole), enough=self.enough,
             )  # fmt: skip
             begin = ends.distinct(NEAREST)[0] if np.any(ends.ssq < known * (1 - SURPASSED)) else begin[:0]
         return self._on_all(begin)
@@ -251,8 +282,9 @@ class _Search:
         def ends(start: Array, most: int) -> Minima:
             told = self.told("refining", self.whole)
             return minimise(
-                lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, told=told
-            ).sorted()
+                lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, told=told,
+                enough=self.enough,
+            ).sorted()  # fmt: skip
 
         if self.few is self.whole:
             return ends(begin, MOST)
@@ -269,7 +301,8 @@ class _Search:
             others.append(done / np.min(ends.ssq) if len(done) else done)
         ratios = {float(f"{x:.3g}") for x in np.concatenate(others) if np.isfinite(x) and x > 1 + SAME}
         last = int(found.iterations[0])
-        return SearchStory(len(self.rough.ssq), self.arrived, tuple(sorted(ratios)), last, bool(found.converged[0]))
+        ended = bool(found.converged[0])
+        return SearchStory(len(self.rough.ssq), self.arrived, tuple(sorted(ratios)), last, ended, self.cut)
 
 
 def _released(space: Space, coordinates: Array, low: Array, high: Array) -> Array:

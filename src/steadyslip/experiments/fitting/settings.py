@@ -13,8 +13,10 @@ from steadyslip.core.roles import Domain, Names, Series, Text, Whole
 STARTS = 48
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")
 MOST_STARTS = 10**6
+MOST_EFFORT = 1e6
 MOST_TREND = 6
 MOST_STATES = 100
+_effort = Domain(0, MOST_EFFORT, False, True, "a number above 0, up to a million")
 _width = Domain(0, math.inf, False, False, "a finite number above 0, in units of what is fitted")
 
 
@@ -48,6 +50,9 @@ class FitSettings(Settings):
         "auto", "correlated", "independent", doc="whether residuals remember each other", default="auto"
     )
     starts: int = setting(Whole("points that the search may start from", 1, MOST_STARTS), default=STARTS)
+    effort: float = parameter(
+        "1", _effort, "how long the search may last, as a multiple of what nearly always suffices", default=1.0
+    )
     windows: bool = option(False, True, doc="every step of a record becomes a record of its own", default=False)
     compare: tuple[str, ...] = setting(
         Names("laws to compare: `slip`, `aging`, `prz`, each also with `, two states`"), default=()

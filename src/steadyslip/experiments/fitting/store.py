@@ -20,7 +20,7 @@ from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 4, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 5, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 _ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
     "loading": str, "steadyslip": str,
@@ -32,7 +32,7 @@ _OPTIONS = {
 _COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int)
 _FORMS = {
     "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
-    "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool},
+    "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
     "unidentified": [{"weights": {str: float}, "deviation": float}],
     "noise": [(float, bool, float)],
     "records": [(str, [str], bool)],

@@ -85,7 +85,9 @@ def _quality(fit: FitNumbers) -> list[str]:
 def warnings(fit: FitNumbers) -> list[str]:
     """What a reader must know before using the numbers."""
     found = [str(one) for one in fit.unidentified]
-    if not fit.search.converged:
+    if fit.search.cut:
+        found.append(_cut_off(fit))
+    elif not fit.search.converged:
         found.append("the search had not come to its end; treat the numbers as a rough fit")
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
@@ -94,6 +96,15 @@ def warnings(fit: FitNumbers) -> list[str]:
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
+
+
+def _cut_off(fit: FitNumbers) -> str:
+    """Of a search that was too much work: as happens where the model cannot follow the records well."""
+    rough = "" if fit.search.converged else ", not even at its minimum"
+    return (
+        f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
+        "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
+    )
 
 
 def _vague_jumps(fit: FitNumbers) -> list[str]:
@@ -260,6 +271,7 @@ def as_dict(fit: FitNumbers) -> dict[str, Any]:
             "other_minima": list(fit.search.others),
             "iterations": fit.search.iterations,
             "converged": fit.search.converged,
+            "cut": fit.search.cut,
         },
         "unidentified": [
             {"weights": one.weights, "deviation": one.deviation if np.isfinite(one.deviation) else None}

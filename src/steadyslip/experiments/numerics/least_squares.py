@@ -90,6 +90,7 @@ class Minima:
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
     tolerance: float = CONVERGED, race: int = 0, known: float = np.inf, told: Callable[[Minima], None] | None = None,
+    enough: Callable[[], bool] | None = None,
 ) -> Minima:  # fmt: skip
     """Minimise the sum of squares of every problem.
 
@@ -112,6 +113,8 @@ def minimise(
         Sum of squares that this one problem is known to reach from elsewhere.
     told : callable, optional
         Called after every iteration with what is known by then.
+    enough : callable, optional
+        Asked before every iteration whether to end where the problems are.
     """
     count, size = start.shape
     if not count:
@@ -133,7 +136,7 @@ def minimise(
     keep = np.isfinite(ssq)
     normal, gradient = normal[keep], gradient[keep]
     for iteration in range(1, most + 1):
-        if not len(active):
+        if not len(active) or (enough is not None and enough()):
             break
         z = found.coordinates[active]
         diagonal = np.einsum("mii->mi", normal)

@@ -5,6 +5,7 @@ import hashlib
 import inspect
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +16,13 @@ from command import run
 from fuzz_rigs import DRIVES, FRICTION
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
+from steadyslip.files.standalone import write_page
 from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
 from steadyslip.reports.elements import math, table, typed
+from steadyslip.reports.results import LISTED, _told_apart
 
+MACHINES = Path(__file__).parents[1] / "examples" / "machines"
 VOID = {"br", "img", "meta", "hr", "input", "link"}
 OWN_RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
 
@@ -178,6 +182,47 @@ def test_a_report_says_everything_about_a_rig():
     assert found.html.count("<math") > 10
     assert found.html.count('class="steadyslip-root"') == 1
     assert len(found.html.encode()) <= 500_000
+
+
+def test_a_machine_has_a_report():
+    machine = ss.read_rig(MACHINES / "two-surfaces.toml")
+    analysis = ss.analyze(machine)
+    text = words(ss.report(machine).html)
+    for part in ("Will this machine slide steadily", "normal force", "The verdict", "How far is the edge?",
+                 ss.__version__,
+                 hashlib.sha256(ss.rig_to_text(machine).encode()).hexdigest(), *machine.contacts):  # fmt: skip
+        assert part in text, part
+    assert text.count(" 1/s ") == sum(s.imag >= 0 for s in analysis.eigenvalues)
+    assert "Explorer" not in text
+    assert words(ss.report(analysis).html).replace(" ", "").startswith(text.replace(" ", "")[:400])
+    with pytest.raises(ss.NotAvailable, match="takes no branch, fit or tolerances"):
+        ss.report(machine, tolerances={"drive.velocity": "5 %"})
+
+
+def test_the_command_reports_on_machines_and_explores_sliders_only(tmp_path):
+    answered = run("report", MACHINES / "brake-pad.toml", "-o", tmp_path / "report.html")
+    assert answered.returncode == 0, answered.stderr
+    assert "brake-pad" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    refused = run("explore", MACHINES / "brake-pad.toml", "-o", tmp_path / "page.html")
+    assert refused.returncode == 2
+    assert "machine" in refused.stderr
+
+
+def test_documents_are_called_by_their_kind_and_file(results, tmp_path):
+    for name, title in (("run", "Run"), ("press 4", "Run: press 4")):
+        write_page(results["history"], tmp_path / f"{name}.html", "Run", explorer=False)
+        assert f"<title>{title} – steadyslip</title>" in (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+
+
+def test_lists_of_cycles_leave_out_what_reads_the_same():
+    rows = [("25 GPa/m", "17 s", "1 um/s", f"{i} Pa", "") for i in range(9)] + [
+        (f"{i} GPa/m", "", "", "", "") for i in range(60)
+    ]
+    found = _told_apart(rows)
+    assert len(found) <= LISTED
+    assert found[-1] == rows[-1]
+    assert sum(row[0] == "25 GPa/m" and row[1] == "17 s" for row in found) <= 1
+    assert _told_apart(rows[:1]) == rows[:1]
 
 
 def test_runs_have_documents(results):

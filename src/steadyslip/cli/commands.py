@@ -248,7 +248,7 @@ def report(
 ) -> None:
     """A printable document about a rig: verdict, edges, charts, formula, provenance, the explorer at its end."""
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications import named_value, read_slider
+    from steadyslip.files.specifications import named_value, read_rig
     from steadyslip.reports import report as run
 
     if output is not None:
@@ -259,7 +259,7 @@ def report(
         from steadyslip.experiments import load_fit
 
         options["fit"] = load_fit(fitted)
-    found = run(read_slider(rig, changes or ()), title=rig.stem, source=rig, **options)
+    found = run(read_rig(rig, changes or ()), title=rig.stem, source=rig, **options)
     if output is None:
         say(f"opened {found.open()}")
         return

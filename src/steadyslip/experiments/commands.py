@@ -48,7 +48,7 @@ def write_fit(fit: Fit, comparison: LawComparison | None, path: Path, draws: Dra
         write_text(target, json.dumps(as_json(fit, comparison), indent=2, allow_nan=False) + "\n")
 
     def as_page(target: Path) -> None:
-        write_page(fit, target, title=f"Fit of {path.stem}", comparison=comparison, draws=draws)
+        write_page(fit, target, "Fit", comparison=comparison, draws=draws)
 
     write_by_ending(path, {".nc": fit.save, ".html": as_page, ".json": as_text}, fit.plot)
 
@@ -66,7 +66,7 @@ def write_population(found: Population, path: Path) -> None:
         target.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
     def as_page(target: Path) -> None:
-        write_page(found, target, title=f"Population of {path.stem}")
+        write_page(found, target, "Population")
 
     def as_draws(target: Path) -> None:
         found.to_arviz().to_netcdf(str(target))

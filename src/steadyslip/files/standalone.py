@@ -70,12 +70,13 @@ class Standalone:
         return f'<iframe title="{html.escape(self.title)}" {FRAME} srcdoc="{html.escape(self.html)}"></iframe>'
 
 
-def write_page(result: Any, path: Path, title: str, **options: Any) -> None:
-    """Write the document of a result.
+def write_page(result: Any, path: Path, kind: str, **options: Any) -> None:
+    """Write the document of a result, called by its kind (``Run``) and the name of the file where that says more.
 
     Raises
     ------
     NotAvailable
         If it cannot be written.
     """
+    title = kind if path.stem.lower() == kind.lower() else f"{kind}: {path.stem}"
     Standalone(whole(result, title=title, **options), title).save(path)

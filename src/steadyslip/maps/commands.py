@@ -78,7 +78,7 @@ def write_map(found: MapResult, path: Path, options: Mapping[str, Any], edge: Re
     """
     writers: dict[str, Any] = {".nc": found.to_netcdf, ".parquet": found.to_parquet}
     if edge is None:
-        writers[".html"] = lambda p: write_page(found, p, title=f"Map of {path.stem}")
+        writers[".html"] = lambda p: write_page(found, p, "Map")
     if edge is not None:
         writers[".csv"] = edge.to_csv
     write_by_ending(path, writers, lambda: found.plot(**options) if edge is None else edge.plot())
@@ -113,7 +113,7 @@ def write_sensitivity(found: Sensitivity, path: Path) -> None:
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".html": lambda p: write_page(found, p, title=f"Sensitivity of {path.stem}")}
+    writers = {".html": lambda p: write_page(found, p, "Sensitivity")}
     write_by_ending(path, writers, found.plot)
 
 

@@ -117,6 +117,6 @@ def write_history(history: History, path: Path, kind: str = "history") -> None:
     writers = {
         ".nc": history.save,
         ".csv": history.to_csv,
-        ".html": lambda p: write_page(history, p, title=f"Run of {path.stem}"),
+        ".html": lambda p: write_page(history, p, "Run"),
     }
     write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind), dtype=object)))

@@ -51,7 +51,7 @@ def write_branch(branch: CycleBranch, path: Path) -> None:
     writers = {
         ".nc": lambda p: write_dataset(branch.to_xarray(), p),
         ".csv": branch.to_csv,
-        ".html": lambda p: write_page(branch, p, title=f"Cycles of {path.stem}"),
+        ".html": lambda p: write_page(branch, p, "Cycles"),
     }
     write_by_ending(path, writers, branch.plot)
 
@@ -117,6 +117,6 @@ def write_thresholds(thresholds: Thresholds, path: Path) -> bool:
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".html": lambda p: write_page(thresholds, p, title=f"Kicks of {path.stem}")}
+    writers = {".html": lambda p: write_page(thresholds, p, "Kicks")}
     write_by_ending(path, writers, lambda: thresholds.basin.plot())
     return path.suffix.lower() != ".html" and thresholds.basin.interrupted

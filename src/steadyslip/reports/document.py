@@ -28,6 +28,8 @@ body { background: #fff; }
 @page { size: A4; margin: 16mm; }
 @media print {
   .report { padding: 0; }
+  .report figure svg, .report figure img { max-height: 150mm; }
+  .report pre { font-size: 11px !important; }
   .steadyslip-root, .on-screen { display: none !important; }
 }
 """

@@ -38,7 +38,7 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
         fitted = drawn(lambda i=i: figures.fit(result, record=i), "record and fit", 7.0)  # type: ignore[misc]
         steps = drawn(lambda i=i: figures.steps(result, record=i), "steps of the record", 7.0)  # type: ignore[misc]
         body += [figure(fitted, f"{name}: record and fit."), figure(steps, "Its steps.")]
-    corner = drawn(lambda: figures.corner(result), "uncertainty", 6.5)
+    corner = drawn(lambda: figures.corner(result), "uncertainty", max(6.5, 1.3 * len(rows)))
     body += [figure(corner, "What the records leave open."), heading("Details"), lines(result)]
     for record in result.plan.records:
         body += [heading(f"Record {Path(record.source).name}", 3), lines(record)]
@@ -62,7 +62,10 @@ def _drawn(result: Draws) -> list[str]:
     ]
     if result.interrupted:
         body.append(paragraph("It was stopped before all draws were done.", "warning"))
-    return [*body, figure(drawn(result.plot, "draws", 6.5), "The draws, parameter against parameter.")]
+    return [
+        *body,
+        figure(drawn(result.plot, "draws", max(6.5, 1.3 * len(rows))), "The draws, parameter against parameter."),
+    ]
 
 
 @parts_of.register

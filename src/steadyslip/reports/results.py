@@ -3,31 +3,34 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import singledispatch
 from typing import Any
 
 import numpy as np
 
 from steadyslip import figures
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, shown_range
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.commands import Thresholds
-from steadyslip.reports import rig as of_rig
+from steadyslip.reports import machine as of_machine, rig as of_rig
 from steadyslip.reports.brief import inside, rows_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, listing, paragraph, table
-from steadyslip.verdict import Analysis, Tolerated, analyze, tolerate
+from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
 
 LISTED = 24
+FACETS = 6
+PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
 
 
 @singledispatch
@@ -43,7 +46,7 @@ def parts_of(result: Any, **options: Any) -> Parts:
         got = ", ".join([type(result).__name__, *options])
         raise ParameterError([Problem("result", f"got {got}; allowed: a rig or a result, such as that of analyze")])
     rig = getattr(result, "rig", None)
-    rig = rig if isinstance(rig, Slider) else None  # a machine has no sketch and no page yet
+    rig = rig if isinstance(rig, Slider) else None  # a machine has no page yet
     first = str(result).partition("\n")[0]
     kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr
@@ -145,6 +148,20 @@ def _rig(
 
 
 @parts_of.register
+def _machine(
+    result: Machine, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None
+) -> Parts:  # fmt: skip
+    if branch or fit is not None or tolerances:
+        raise NotAvailable("a report of a machine takes no branch, fit or tolerances yet; leave them out")
+    return of_machine.about(analyze(result))
+
+
+@parts_of.register
+def _machine_analysis(result: MachineAnalysis) -> Parts:
+    return of_machine.about(result)
+
+
+@parts_of.register
 def _tolerated(result: Tolerated) -> Parts:
     return of_rig.about(analyze(result.rig), None, result)
 
@@ -162,7 +179,7 @@ def _history(result: History) -> Parts:
         heading("What was done to it"), listing(text.partition("[protocol]")[2].strip()),
         heading("What it did"), *_words(result.summary()),
         figure(drawn(lambda: figures.history(result), "history", 7.0), "Velocity, friction, normal stress."),
-        figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), "Friction over velocity."),
+        figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), PLANE),
         *_slips(result),
     ]  # fmt: skip
     slips = len(result.slip_events)
@@ -191,12 +208,12 @@ def _slips(result: History) -> Iterator[str]:
 def _branch(result: CycleBranch) -> Parts:
     along, unit, area = result.along, result.unit, result.rig.area
     first, _, rest = str(result).partition("\n")
-    step = max(1, len(result.cycles) // LISTED)
     rows = [
         (shown(one.value, unit, area=area), shown(one.period, "s"), shown(one.peak_velocity, "m/s"),
          shown(one.stress_drop, "Pa", area=area), "attracts" if one.stable else "unstable")
-        for one in result.cycles[::step]
+        for one in result.cycles
     ]  # fmt: skip
+    listed = _told_apart(rows)
     special = [
         (one.kind, shown(one.cycle.value, unit, area=area), shown(one.cycle.period, "s")) for one in result.special
     ]
@@ -205,7 +222,8 @@ def _branch(result: CycleBranch) -> Parts:
         heading("The cycles"), *_words(rest),
         figure(drawn(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
         table(special, ("special", along, "period")),
-        table(rows, (along, "period", "peak velocity", "stress drop", ""), left=False),
+        table(listed, (along, "period", "peak velocity", "stress drop", ""), left=False),
+        *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
     question = f"Which stick-slip cycles does this rig have as {along} varies?"
     return Parts(
@@ -218,16 +236,35 @@ def _branch(result: CycleBranch) -> Parts:
     )
 
 
+def _told_apart(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Rows whose first cells differ from those of the row before; evenly taken from them where they are many."""
+    apart = [row for i, row in enumerate(rows) if i == 0 or row[:3] != rows[i - 1][:3]]
+    step = max(1, -(-len(apart) // LISTED))
+    return apart[::-step][::-1]
+
+
 @parts_of.register
 def _map(result: MapResult) -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
     body = [
         *about_rig(rig),
         heading("The map"), *_words(rest),
-        figure(drawn(lambda: result.plot(), "map", 6.5)),
+        *_pictures(result),
     ]  # fmt: skip
     question = "How does the answer depend on the numbers that vary here?"
-    return Parts(sentence(first).rstrip("."), "", question, body, rig, of_rig.as_file(rig))
+    head = sentence(first).rstrip(".").replace(" x ", " × ")
+    return Parts(head, "", question, body, rig, of_rig.as_file(rig))
+
+
+def _pictures(result: MapResult) -> Iterator[str]:
+    """Over the first two parameters: for each of a few values of a third, else at the values of the rig."""
+    others = [name for name in result.dims if name != "sample"][2:]
+    if len(others) == 1 and len(result.read(others[0])) <= FACETS:
+        words = f"One picture for each value of {others[0]}."
+        yield figure(drawn(lambda: result.plot(facet=others[0]), words), words)
+        return
+    held = f"At the rig's own {', '.join(others)}, or next to it." if others else ""
+    yield figure(drawn(lambda: result.plot(), "map", 6.5), held)
 
 
 def sentence(text: str) -> str:

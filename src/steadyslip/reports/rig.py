@@ -10,6 +10,7 @@ from steadyslip.core.quantities import shown
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications import rig_to_text
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.protocol import Protocol
@@ -18,6 +19,7 @@ from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import Markup, figure, heading, letter, math, paragraph, table
 from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.words import edge_rows, facts, headline, meaning
 
 SMALL = (
@@ -34,16 +36,16 @@ def about(analysis: Analysis, prediction: Prediction | None = None, tolerated: T
         heading("The rig"), figure(sketch(rig)), inputs(rig),
         heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
         *_confidence(prediction), *_tolerances(tolerated),
-        heading("How far is the edge?"), *_edges(analysis), *_charts(analysis),
+        heading("How far is the edge?"), *edges(analysis), *_charts(analysis),
         heading("The formulas"), *formulas(analysis),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings), paragraph(SMALL),
     ]  # fmt: skip
     question = f"Will this rig slide steadily at {speed}, what would make it, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
-    return Parts(_sentence(headline(analysis)), lead, question, body, rig, as_file(rig), analysis.branch)
+    return Parts(in_a_sentence(analysis), lead, question, body, rig, as_file(rig), analysis.branch)
 
 
-def as_file(rig: Slider, protocol: Protocol | None = None) -> str:
+def as_file(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
     """A rig as the text of its file; one with a law that no file can name as Python writes it."""
     try:
         return rig_to_text(rig, protocol)
@@ -51,8 +53,9 @@ def as_file(rig: Slider, protocol: Protocol | None = None) -> str:
         return f"{rig!r}\n[protocol]\n{protocol!r}" if protocol is not None else repr(rig)
 
 
-def _sentence(line: str) -> str:
-    """A headline that is not shouted."""
+def in_a_sentence(analysis: Verdict) -> str:
+    """The headline, not shouted."""
+    line = headline(analysis)
     loud, colon, rest = line.partition(": ")
     return (
         f"{loud.capitalize() if loud.isupper() else loud}{colon}{rest}"
@@ -73,7 +76,8 @@ def inputs(rig: Slider) -> str:
     return table(rows, ("parameter", "letter", "value", "meaning"))
 
 
-def _edges(analysis: Analysis) -> Iterator[str]:
+def edges(analysis: Verdict) -> Iterator[str]:
+    """The nearest edge of every parameter, and those that have none."""
     rows, without = edge_rows(analysis)
     if rows:
         head = ("parameter", "now", "edge", "change", "beyond it")

@@ -188,7 +188,7 @@ class MapResult(Displayed):
         (done, count), area = self.finished, self.area
         lines = [self._store.layout.title]
         state = "complete" if done == count else f"{done} of {count} chunks; run it again for the rest"
-        lines.append(f"  {'in ' + str(self.path):<24}{state}")
+        lines.append(f"  {'in ' + str(self.path):<22}  {state}")
         for name, found in self.statistics().items():
             if self.words(name):
                 text = ", ".join(f"{word} {_percent(share)}" for word, share in found.items())

@@ -1,0 +1,58 @@
+"""What a document says of a machine: question, inputs, verdict, how it moves, edges, caveats."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from steadyslip.core.quantities import shown
+from steadyslip.reports import rig as of_rig
+from steadyslip.reports.brief import inside
+from steadyslip.reports.document import Parts
+from steadyslip.reports.elements import heading, paragraph, table
+from steadyslip.verdict import MachineAnalysis
+from steadyslip.verdict.words import disturbance
+
+
+def about(analysis: MachineAnalysis) -> Parts:
+    """The document of a verdict on a machine."""
+    machine = analysis.rig
+    drive = machine.parameters()["drive.velocity"]
+    speed = shown(float(drive.value or 0.0), drive.role.unit)
+    body = [
+        heading("The machine"), inside(machine),
+        heading("The verdict"), *_verdict(analysis),
+        heading("How far is the edge?"), *of_rig.edges(analysis),
+        heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
+        paragraph(of_rig.SMALL),
+    ]  # fmt: skip
+    question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
+    lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
+    return Parts(of_rig.in_a_sentence(analysis), lead, question, body, None, of_rig.as_file(machine))
+
+
+def _verdict(analysis: MachineAnalysis) -> Iterator[str]:
+    """Steady sliding of every contact, what disturbances do, and the eigenvalues."""
+    if analysis.steady is None:
+        return
+    rows = [("a disturbance", disturbance(analysis))]
+    if analysis.mode is not None:
+        rows.append(("the mode", analysis.mode.words()))
+    yield table(rows)
+    contacts = [
+        (name, shown(one.slip_rate, "m/s"), shown(one.normal_force, "N"), shown(one.friction_force, "N"),
+         f"{one.friction:.4g}")
+        for name, one in analysis.steady.contacts.items()
+    ]  # fmt: skip
+    yield heading("Steady sliding", 3)
+    yield table(contacts, ("contact", "slides at", "normal force", "friction force", "friction"))
+    yield heading("Eigenvalues", 3)
+    yield table(map(_eigenvalue, (s for s in analysis.eigenvalues if s.imag >= 0)), ("rate", "period", "size"))
+
+
+def _eigenvalue(s: complex) -> tuple[str, str, str]:
+    from math import log, pi
+
+    period = shown(2 * pi / s.imag, "s") if s.imag else "none"
+    if s.real == 0:
+        return "0 1/s", period, "stays"
+    return f"{s.real:.4g} 1/s", period, f"{'doubles' if s.real > 0 else 'halves'} in {shown(log(2) / abs(s.real), 's')}"

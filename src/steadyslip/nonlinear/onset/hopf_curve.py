@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.arrays import checked_array
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
@@ -273,7 +273,7 @@ def _followed(curve: Track, start: Point, plane: _Plane, spacing: float) -> tupl
                 return found, "too many points; give ranges with between="
     except Failure as failure:
         return found, str(failure)
-    raise AssertionError("unreachable")
+    raise InternalError("a curve ended without a reason")
 
 
 def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) -> list[Point]:

@@ -19,7 +19,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from test_motion import test_small_kicks_grow_as_the_eigenvalues_say as kicked
-from test_motion_oracle import half, test_kernels_follow_the_model as integrated
+from test_motion_oracle import quarter, test_kernels_follow_the_model as integrated
 
 
 def main() -> None:
@@ -27,7 +27,7 @@ def main() -> None:
     options.add_argument("--only", default="")
     only = options.parse_args().only
     counts = {"right": 0, "left out": 0, "wrong": 0}
-    for case in (case for case in half(0) + half(1) if only in case.id):
+    for case in (case for case in quarter(0) + quarter(1) + quarter(2) + quarter(3) if only in case.id):
         for check in (integrated, kicked):
             try:
                 check(*case.values)

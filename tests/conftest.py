@@ -43,6 +43,13 @@ def pytest_collection_finish():
     gc.set_threshold(100_000, 20, 20)
 
 
+def pytest_sessionfinish():
+    """Pytest looks for garbage five times at the end: once is enough to find what was left open."""
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_configure(config):
     if config.getoption("--measure"):
         config.pluginmanager.register(_Measured(), "measured")

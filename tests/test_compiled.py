@@ -473,8 +473,8 @@ def test_concurrent_writers(folder):
         done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
         return done.stdout.strip(), done.stderr
 
-    with ThreadPoolExecutor(4) as pool:
-        results = list(pool.map(process, range(4)))
+    with ThreadPoolExecutor(3) as pool:
+        results = list(pool.map(process, range(3)))
     assert all(out == "11.0 12.0" for out, _ in results), results
     assert len(list(folder.iterdir())) == 4
     assert ask(11) == 11

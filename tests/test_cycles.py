@@ -554,11 +554,12 @@ def test_work_is_bounded_and_what_it_found_is_kept(monkeypatch):
     np.testing.assert_array_equal(part["period"], whole["period"][: len(part)])
 
 
-def test_cycles_end_where_no_velocity_balances_the_forces():
+def test_cycles_end_where_no_velocity_balances_the_forces(monkeypatch):
     """A pad that lifts with velocity, without mass: forces fold, and what lies beyond has no velocity to tell.
 
     The cycle comes as close to the fold as steps allow, which takes ever more of them, but not minutes.
     """
+    monkeypatch.setattr(tracer_module, "MOST_STEPS", 500_000)
     friction = rate_state(evolution=ss.PRZ(), regularised=True)
     lift = next(contact for contact in CONTACTS if contact.name == "lift")
     branch = ss.cycles(

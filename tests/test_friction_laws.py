@@ -34,13 +34,18 @@ WEAKENING = Conditions(instant_weakening=True)
 
 
 def combinations():
-    """Every rate-and-state law that is allowed; nagata has one state and no prakash-clifton."""
-    for evolution, memory, states, regularised in itertools.product(
-        EVOLUTIONS, MEMORIES, (ONE, TWO, THREE), (False, True)
-    ):
+    """Every second rate-and-state law that is allowed, so that any two parts meet, and the third in one of its kinds.
+
+    Nagata's law has one state and no prakash-clifton.
+    """
+    for place in itertools.product(*map(range, (len(EVOLUTIONS), len(MEMORIES), 3, 2))):
+        i, j, k, regularised = place
+        evolution, memory, states = EVOLUTIONS[i], MEMORIES[j], (ONE, TWO, THREE)[k]
+        if sum(place) % 2:
+            continue
         if isinstance(evolution, ss.Nagata) and (states is not ONE or isinstance(memory, ss.PrakashClifton)):
             continue
-        yield ss.RateState(**ROCK, **states, evolution=evolution, normal_memory=memory, regularised=regularised)
+        yield ss.RateState(**ROCK, **states, evolution=evolution, normal_memory=memory, regularised=bool(regularised))
 
 
 LAWS = [

@@ -495,7 +495,7 @@ def test_what_cancels_in_the_structure_cancels_exactly():
     assert len(roots(np.array(ss.analyze(machine).characteristic_polynomial))) == 4
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_eigenvalues_of_machines_at_random_make_theory_11s_matrix_singular(seed):
     machine, matrix = at_random(seed)
     found = ss.eigenvalues(machine)

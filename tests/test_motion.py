@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import SLIP_EVENT, Sampled
 from steadyslip.kernels.runner import Runner
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
-from test_motion_oracle import LAWS, half
+from test_motion_oracle import LAWS, quarter
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -193,7 +193,7 @@ def test_error_of_default_settings():
 # -- small motions
 
 
-@pytest.mark.parametrize(("law", "contact", "mass"), half(1))
+@pytest.mark.parametrize(("law", "contact", "mass"), quarter(1))
 def test_small_kicks_grow_as_the_eigenvalues_say(law, contact, mass):
     """A small kick is a sum of exponentials with the rates that linear stability gives, and nothing else is left.
 

@@ -242,7 +242,7 @@ def test_verdicts_at_absurd_sizes_are_those_of_numbers_without_end():
 
 
 @pytest.mark.parametrize("name", ["inclined-spring", "slow-axis", "two-states"])
-@pytest.mark.parametrize("power", [-660, -500, 500, 640])
+@pytest.mark.parametrize("power", [-660, 640])
 def test_the_unit_of_stress_changes_no_verdict(name, power):
     """Products of stresses leave the range long before stresses do; powers of two change no other digit."""
     a_rig, unit = ss.read_rig(EXAMPLES / f"{name}.toml"), 2.0**power

@@ -83,7 +83,7 @@ def judged(text: str) -> None:
 
 
 @given(st.data())
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_value_anywhere(data):
     lines = TEXT.splitlines()
     keys = [i for i, line in enumerate(lines) if re.match(r"\w+ =", line)]
@@ -93,7 +93,7 @@ def test_any_value_anywhere(data):
 
 
 @given(st.data())
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_any_value_anywhere_in_a_protocol(data):
     """A protocol that can be cut into segments of finite numbers, or one message."""
     lines = EXPERIMENT.splitlines()
@@ -108,7 +108,7 @@ def test_any_value_anywhere_in_a_protocol(data):
 
 
 @given(st.data())
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_any_damage_to_the_text(data):
     text = TEXT + EXPERIMENT
     for _ in range(data.draw(st.integers(1, 4))):

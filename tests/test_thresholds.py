@@ -141,7 +141,7 @@ def test_unstable_sliding_survives_nothing():
     assert "unstable" in str(found)
 
 
-@pytest.mark.parametrize("above", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("above", [1e-3, 1e-5])
 def test_close_to_a_subcritical_edge_the_unstable_cycle_is_the_limit(above):
     """A displacement kick leaves normal stress as it is: it fails where it starts outside the small unstable cycle."""
     a_rig = inclined(30, 1 + above)

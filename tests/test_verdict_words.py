@@ -12,7 +12,7 @@ from steadyslip.linear.polynomials import roots
 from words_at_random import false_sentences, some_rig
 
 
-@pytest.mark.parametrize("number", range(16))
+@pytest.mark.parametrize("number", range(8))
 def test_every_sentence_about_random_rigs_is_true(number):
     """By eigenvalues of the rig with one number changed; ``python tests/words_at_random.py 1000`` tries more."""
     for retry in range(20):
@@ -161,7 +161,7 @@ def test_without_stiffness_nothing_grows_or_dies(b, mass):
 
 
 @pytest.mark.parametrize("mass", [0.0, 1e12])
-@pytest.mark.parametrize("stiffness", [1e3, 1e7, 1e9, 1e12, 1e14])
+@pytest.mark.parametrize("stiffness", [1e3, 1e9, 1e14])
 def test_no_oscillation_is_said_to_grow_where_roots_are_real(stiffness, mass):
     """(α − μ) tan ψ > 1: two roots lie on the right at every stiffness, a pair only at some."""
     friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=2.5))

@@ -94,12 +94,10 @@ def test_aging_with_mass_changes_kind_where_theory_says(lam):
 @pytest.mark.parametrize(
     "a_rig",
     [
-        unit_rig("slip", 0.5, 0.4, damping=0.1),
         unit_rig("aging", 0.5, 0.4, damping=0.2),
         unit_rig("slip", 0.5, 0.4, mass=0.1),
-        unit_rig("aging", 0.5, 0.4, mass=0.5),
     ],
-    ids=["slip+damping", "aging+damping", "slip+mass", "aging+mass"],
+    ids=["aging+damping", "slip+mass"],
 )
 def test_predicted_amplitude_is_that_of_simulated_motion(a_rig):
     """At 1 % from the edge the lowest order is right to a few per cent, and the error shrinks with distance."""

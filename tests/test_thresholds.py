@@ -107,7 +107,7 @@ def test_motion_on_both_sides(kick, direction, near):
 def test_impulse_with_mass():
     """A blow throws the block of the aging law over its unstable cycle; the peak of that cycle bounds it."""
     a_rig = unit_rig("aging", 0.5, 0.525 * 1.003, mass=0.05)
-    found = ss.threshold(a_rig, "impulse", precision=1e-3)
+    found = ss.threshold(a_rig, "impulse", precision=5e-3)
     assert found.outcome == "oscillation"
     for factor, survives in ((0.99, True), (1.01, False)):
         v = 1 + found.size * factor
@@ -146,7 +146,7 @@ def test_close_to_a_subcritical_edge_the_unstable_cycle_is_the_limit(above):
     """A displacement kick leaves normal stress as it is: it fails where it starts outside the small unstable cycle."""
     a_rig = inclined(30, 1 + above)
     (cycle,) = ss.cycles(a_rig).at(a_rig.stiffness)
-    found = ss.threshold(a_rig, "displacement", precision=1e-3)
+    found = ss.threshold(a_rig, "displacement", precision=5e-3)
     assert found.outcome in ("oscillation", "blow-up")
     around = ss.orbit(a_rig, cycle)
     assert found.amount > 0

@@ -16,6 +16,7 @@ from command import run
 from rigs_of_theory import ONE_MEMORY, SIGMA, rate_state, rig
 from steadyslip.core.roles import positive
 from steadyslip.reports import Report
+from unpainted import unpainted  # noqa: F401 -- a fixture
 
 pytestmark = pytest.mark.slow  # a browser works in processes of its own, whose seconds are not measured
 INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
@@ -253,6 +254,7 @@ def test_hostile_titles_are_text(browser, tmp_path):
 HOSTILE_WORDS = "</script><script>throw 1</script><img src=x onerror=throw(1)>{{0}}&amp;\"'`${x}\\"
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_hostile_words_of_a_law_are_text(browser, tmp_path):
     """What a user's law calls itself and its parameters stands on the page as it is, and does nothing."""
     known = dict(ss.ContactLaw.registry)

@@ -21,6 +21,7 @@ from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
 from steadyslip.reports.elements import math, table, typed
 from steadyslip.reports.results import LISTED, _told_apart
+from unpainted import unpainted  # noqa: F401 -- a fixture
 
 MACHINES = Path(__file__).parents[1] / "examples" / "machines"
 VOID = {"br", "img", "meta", "hr", "input", "link"}
@@ -184,6 +185,7 @@ def test_a_report_says_everything_about_a_rig():
     assert len(found.html.encode()) <= 500_000
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_machine_has_a_report():
     machine = ss.read_rig(MACHINES / "two-surfaces.toml")
     analysis = ss.analyze(machine)
@@ -208,6 +210,7 @@ def test_the_command_reports_on_machines_and_explores_sliders_only(tmp_path):
     assert "machine" in refused.stderr
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_documents_are_called_by_their_kind_and_file(results, tmp_path):
     for name, title in (("run", "Run"), ("press 4", "Run: press 4")):
         write_page(results["history"], tmp_path / f"{name}.html", "Run", explorer=False)
@@ -243,6 +246,7 @@ def test_what_is_no_result_has_no_document():
         ss.report(ss.hopf(OWN_RIG), fit=3)
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("name", ["steady", "margin", "onset", "response", "event", "ensemble"])
 def test_results_without_a_document_of_their_own_show_what_notebooks_show(results, name):
     document = ss.report(results[name], explorer=False).html
@@ -258,6 +262,7 @@ def kicked():
     return own, found
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_thresholds_have_documents(kicked):
     own, found = kicked
     text = words(ss.report(Thresholds(own, tuple(found)), explorer=False).html)
@@ -268,6 +273,7 @@ def test_thresholds_have_documents(kicked):
     assert "displacement kick" not in single
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_threshold_says_in_its_headline_that_all_or_nothing_is_survived(kicked):
     own, found = kicked
     none = ss.threshold(own.with_values({"stiffness": 1e9}), "velocity")
@@ -276,6 +282,7 @@ def test_a_threshold_says_in_its_headline_that_all_or_nothing_is_survived(kicked
     assert "Every kick that was tried is survived" in words(ss.report(every, explorer=False).html)
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_basins_have_documents(kicked):
     found = ss.basin(kicked[0], x=np.linspace(-1e-6, 1e-6, 5), v=np.geomspace(3e-7, 3e-6, 5), along="stiffness")
     document = ss.report(found, explorer=False).html
@@ -283,6 +290,7 @@ def test_basins_have_documents(kicked):
     assert document.count("<figure>") == 2
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_sensitivities_have_documents():
     ranges = {"friction.a": (0.005, 0.009), "slider.stiffness": (1e9, 1e11)}
     found = ss.sensitivity(OWN_RIG, ranges, "critical_stiffness", points=256)
@@ -314,7 +322,9 @@ LAB = {
 
 
 @pytest.mark.parametrize("name", LAB)
-def test_answers_of_records_have_documents(lab_results, name):
+def test_answers_of_records_have_documents(lab_results, name, request):
+    if name != "fit":  # whose pictures are the largest
+        request.getfixturevalue("unpainted")
     options = {"draws": lab_results["draws"]} if name == "fit" else {}
     document = ss.report(lab_results[name], explorer=False, **options).html
     text = words(document)
@@ -327,7 +337,9 @@ def test_answers_of_records_have_documents(lab_results, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(0, len(FRICTION) * len(CONTACTS), 37))
-def test_reports_of_all_kinds_of_rigs_fit(number):
+def test_reports_of_all_kinds_of_rigs_fit(number, request):
+    if number:
+        request.getfixturevalue("unpainted")
     law, contact = FRICTION[number % len(FRICTION)], CONTACTS[number % len(CONTACTS)]
     own = ss.Slider(friction=law, contact=contact, stiffness=9e9, mass=1e6 * (number % 2), drive=DRIVES[number % 3])
     found = ss.report(own)
@@ -336,6 +348,7 @@ def test_reports_of_all_kinds_of_rigs_fit(number):
     assert len(found.html.encode()) <= 500_000
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_the_command_writes_a_report(tmp_path):
     ss.write_rig(OWN_RIG, tmp_path / "my rig.toml")
     answered = run("report", tmp_path / "my rig.toml", "-o", tmp_path / "report.html", "--set", "stiffness=90 GPa/m")
@@ -349,6 +362,7 @@ def test_the_command_writes_a_report(tmp_path):
     assert ".html" in refused.stderr
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_locked_rigs_have_reports_too():
     text = words(ss.report(rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0))).html)
     assert "No steady sliding at 1 µm/s" in text

@@ -47,7 +47,7 @@ def test_orders_of_a_trend():
 
 def test_fits_of_other_laws_are_tried_as_starts():
     record = made(lab.STEP, 2, lab.two_states())
-    compared = ss.compare_laws(ss.lab_rig(), record, ("slip", "slip, two states"), starts=4)
+    compared = ss.compare_laws(ss.lab_rig(), record, ("slip", "slip, two states"), starts=2)
     assert compared.fits["slip, two states"].ssq <= compared.fits["slip"].ssq * ALLOWED
 
 
@@ -111,4 +111,4 @@ def test_the_valley_that_catches_most_starts():
     """Half a minute of basalt, two states: nearly all starts end in a degenerate valley at 1.8755e-3."""
     spec = ss.read_spec("examples/fits/basalt.toml")
     record = spec.read("examples/data/basalt_b819_velocity_step.txt").between(11650, 11700)
-    assert ss.fit(two(), record, trend=1).ssq == pytest.approx(1.85867e-3, rel=1e-4)
+    assert ss.fit(two(), record, trend=1, starts=6).ssq == pytest.approx(1.85867e-3, rel=1e-4)

@@ -36,7 +36,7 @@ def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
     import emcee
 
     told, _ = experiments(3, 3)
-    found = pooled(told, 2, np.ones(2), 8000, 1)
+    found = pooled(told, 2, np.ones(2), 4000, 1)
 
     inverse = np.array([np.linalg.inv(one.covariance) for one in told])
     values = np.array([one.values for one in told])
@@ -56,8 +56,8 @@ def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
         64, 10, log_probability, vectorize=True, moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.StretchMove(), 0.2)]
     )
     sampler._random = np.random.RandomState(4)
-    sampler.run_mcmc(centre + 0.02 * rng.standard_normal((64, 10)), 4000)
-    chain = sampler.get_chain(discard=1000, flat=True)
+    sampler.run_mcmc(centre + 0.02 * rng.standard_normal((64, 10)), 2500)
+    chain = sampler.get_chain(discard=700, flat=True)
     ours = np.column_stack([found.mean[:, :, 0], np.log(found.spread), found.members.reshape(-1, 6)])
     for level in (0.1, 0.5, 0.9):
         theirs = np.quantile(chain, level, axis=0)
@@ -85,11 +85,11 @@ def test_known_spreads_leave_generalised_least_squares():
 @pytest.mark.parametrize("count", [4])
 def test_intervals_contain_the_truth_as_often_as_they_say(count):
     """Means, spreads and members of populations of few experiments; see benchmarks/population.py for many."""
-    trials = 16
+    trials = 10
     hits = {"mean": 0, "spread": 0, "members": 0}
     for seed in range(trials):
         told, truth = experiments(seed, count)
-        found = pooled(told, 2, np.ones(2), 1000, seed)
+        found = pooled(told, 2, np.ones(2), 400, seed)
         for what, draws, value in (
             ("mean", found.mean[:, 0, 0], MEAN[0]),
             ("spread", found.spread[:, 0], SPREAD[0]),
@@ -106,12 +106,12 @@ def test_experiments_that_say_little_are_drawn_to_the_others():
     """Partial pooling lies between none and complete, and leaves smaller errors than none."""
     told, truth = experiments(11, 8, errors=(0.05, 0.05))
     vague = Told(np.arange(2), truth[0] + 0.6, 0.5**2 * np.eye(2), np.array([1.0]))
-    found = pooled([*told, vague], 2, np.ones(2), 4000, 0)
+    found = pooled([*told, vague], 2, np.ones(2), 1000, 0)
     own = found.members[:, -1]
     assert np.all(np.std(own, axis=0) < 0.3)
     assert np.all(np.mean(own, axis=0) < truth[0] + 0.35)
     unseen = Told(np.array([1]), truth[:1, 1], np.array([[1e-4]]), np.array([1.0]))  # says nothing of the first
-    members = pooled([*told, unseen], 2, np.ones(2), 4000, 0).members[:, -1, 0]
+    members = pooled([*told, unseen], 2, np.ones(2), 1000, 0).members[:, -1, 0]
     assert np.mean(members) == pytest.approx(MEAN[0], abs=0.15)
     assert np.std(members) > 0.8 * SPREAD[0]
 
@@ -126,17 +126,17 @@ def fits():
         rig = lab.rig(a=a).with_values(
             {"contact.steady_normal_stress": stress, "slider.stiffness": 2e10 * stress / 1e7}
         )
-        found[f"run {j + 1}"] = ss.fit(ss.lab_rig(), lab.record(rig, lab.STEP, j, count=800))
+        found[f"run {j + 1}"] = ss.fit(ss.lab_rig(), lab.record(rig, lab.STEP, j, count=400))
     return found
 
 
 def test_a_population_of_fits(fits):
-    everyone = ss.population(fits, count=1000)
+    everyone = ss.population(fits, count=400)
     assert set(everyone.names) == {"friction.a", "friction.mu_ref", "friction.b", "friction.d_c"}
     assert everyone.spread("a")[0] == pytest.approx(0.13, abs=0.08)
     assert everyone.mean("d_c").low < 12e-6 < everyone.mean("d_c").high
     assert everyone.another("a").high - everyone.another("a").low > everyone.mean("a").high - everyone.mean("a").low
-    by_stress = ss.population(fits, ["a"], conditions="normal stress", count=1000)
+    by_stress = ss.population(fits, ["a"], conditions="normal stress", count=400)
     assert by_stress.spread("a")[0] < 0.6 * everyone.spread("a")[0]
     assert by_stress.slope("a", "normal stress")[1] > 0
     text = str(by_stress)
@@ -202,7 +202,7 @@ def fit_all(files, text, *arguments):
 def test_a_population_from_files(files):
     """One command; every level of friction is that at one rate, though the records begin at two."""
     outputs = [word for end in ("json", "png", "html", "nc") for word in ("-o", f"rock.{end}")]
-    done = fit_all(files, SPEC.format(""), *outputs)
+    done = fit_all(files, SPEC.format("") + "draws = 400", *outputs)
     assert done.returncode == 0, done.stderr
     assert "population of 3 experiments" in done.stdout
     assert "p2  alone 0.01" in done.stdout

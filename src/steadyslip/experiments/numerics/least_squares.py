@@ -24,6 +24,7 @@ HOPE = 2.0  # times the best sum of squares: rough minima beyond have no chance
 NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
 PACE = 10  # iterations over which the progress of a problem is judged
+CRAWL = 3e-7  # of its sum of squares in as many: along a valley that data do not tell from its bottom; it ends there
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
 
@@ -145,9 +146,11 @@ def minimise(
         promise = _promise(normal, gradient, free)
         over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | stuck[active]
         best = min(known, float(np.min(found.ssq[found.converged], initial=np.inf)))
-        if race and iteration % PACE == 0:
+        if iteration % PACE == 0:
             gone = (earlier[active] - found.ssq[active]) / PACE
-            over |= found.ssq[active] - gone * (most - iteration) > best
+            over |= gone * PACE <= CRAWL * found.ssq[active]
+            if race:
+                over |= found.ssq[active] - gone * (most - iteration) > best
             earlier = found.ssq.copy()
         if race and np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
             over |= found.ssq[active] - promise > (1 - 1e-9) * best

@@ -3,9 +3,11 @@
 import json
 import re
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import sympy as sp
 from hypothesis import assume, given, settings, strategies as st
 
 import steadyslip as ss
@@ -14,12 +16,13 @@ from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.explorer.assembly import parts
-from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.equations import _judged, _stable_set, linear_part, program
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
+from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
 from steadyslip.model.reduction import reduce_model
 from steadyslip.model.scales import natural_scales, posed
@@ -55,24 +58,38 @@ def test_roots_are_those_that_a_polynomial_was_made_of(script, real, pairs):
     assert all(s["im"] == 0 or any(t["im"] == -s["im"] and t["re"] == s["re"] for t in found) for s in found)
 
 
-def test_polynomials_are_judged_as_in_python(script):
-    rng = np.random.default_rng(2)
-    for n in (2, 3, 4, 5):
-        for _ in range(40):
-            p, q = 10.0 ** rng.uniform(-4, 4, (2, n + 1)) * rng.choice([1, 1, 1, -1], (2, n + 1))
-            q[n] = 0.0
-            if rng.random() < 0.3:
-                p[n] = 0.0
-            assert script("isHurwitz(p)", p=p) == bool(is_hurwitz(p))
-            mine = np.array([complex(s["re"], s["im"]) for s in script("roots(p)", p=p)])
-            truth = roots(p)
-            truth = truth[np.isfinite(truth)]
-            truth = truth[np.lexsort((-truth.imag, -truth.real))]
-            assert np.all(np.abs(mine - truth) <= BAR * np.abs(truth))
-            found, expected = script("stableSet(p, q)", p=p, q=q), stable_set(p, q)
-            intervals = np.array([[one["low"], one["high"]] for one in found["intervals"]]).reshape(-1, 2)
-            kept = expected.intervals[np.isfinite(expected.intervals[:, 0])]
-            assert np.allclose(intervals, kept, rtol=1e-10, atol=0)
+def polynomial_programs(n):
+    """A Linear whose equations are two polynomials p and q of n + 1 coefficients, in the record R."""
+    names = sp.symbols(f"c:{2 * n + 2}")
+    model = SimpleNamespace(arguments=names)
+    whole = program(model, "coefficients", names[: n + 1], then=_judged)
+    several = _stable_set(list(names), model)
+    text = "".join(javascript.text(one) for one in (whole, *several))
+    facts = {"parameters": list(map(str, names)), "degree": n, "squares": len(several[0].stores) - 2, "closed": False,
+             "observed": []}  # fmt: skip
+    return f"{text}const own = new Linear({{ coefficients, edges, onAxis, stableAt }}, {json.dumps(facts)});"
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5])
+def test_polynomials_are_judged_as_in_python(n):
+    rng = np.random.default_rng(n)
+    script = Script(f"{library()}\n{polynomial_programs(n)}")
+    for _ in range(40):
+        p, q = 10.0 ** rng.uniform(-4, 4, (2, n + 1)) * rng.choice([1, 1, 1, -1], (2, n + 1))
+        q[n] = 0.0
+        if rng.random() < 0.3:
+            p[n] = 0.0
+        judged = script("own.set(all).ask('coefficients', n + 3).slice(n + 1)", all=[*p, *q], n=n)
+        assert judged == [bool(is_hurwitz(p)), bool(ill_posed(p))]
+        mine = np.array([complex(s["re"], s["im"]) for s in script("roots(p)", p=p)])
+        truth = roots(p)
+        truth = truth[np.isfinite(truth)]
+        truth = truth[np.lexsort((-truth.imag, -truth.real))]
+        assert np.all(np.abs(mine - truth) <= BAR * np.abs(truth))
+        found, expected = script("own.set(all).stableSet(p, q)", all=[*p, *q], p=p, q=q), stable_set(p, q)
+        intervals = np.array([[one["low"], one["high"]] for one in found["intervals"]]).reshape(-1, 2)
+        kept = expected.intervals[np.isfinite(expected.intervals[:, 0])]
+        assert np.allclose(intervals, kept, rtol=1e-10, atol=0)
 
 
 @pytest.mark.parametrize("middle", [-1.0, -1e-6, 2e5])

@@ -208,6 +208,7 @@ def test_files_and_links_carry_every_digit(browser, file, tmp_path):
         visit.slider("contact.angle").focus()
         visit.page.keyboard.press("PageUp")
         (tmp_path / "rig.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+        visit.page.wait_for_function("location.hash.includes('contact.angle')")  # browsers take long over it
         link = visit.page.evaluate("location.hash")
         critical = visit.page.inner_text(".verdict p")
         table = visit.saved("values and edges")

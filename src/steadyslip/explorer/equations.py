@@ -16,9 +16,9 @@ from steadyslip.core.records import conditions, twin
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.source import Formulas
-from steadyslip.linear import cubic
+from steadyslip.linear import crossing, cubic
 from steadyslip.linear.boundary import present_zeros
-from steadyslip.linear.response import has_closed_form
+from steadyslip.linear.response import has_closed_form, response
 from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.linear.stiffness import interval_ingredients
 from steadyslip.machine.slider import Slider
@@ -87,17 +87,21 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
     programs = [
         _steady(model) if equation.affine else program(model, "residual", [_mismatch(model)]),
         program(model, "allowed", [_allowed(rig, model)]),
-        program(model, "coefficients", coefficients),
+        program(model, "coefficients", coefficients, then=_judged),
         program(model, "split", [*without, *slope]),
+        program(model, "statics", _static_terms(model), then=lambda terms: [crossing.share_left(terms, select)]),
         program(model, "observables", observables),
         program(model, "stiffness", [model.axial_share or 1, model.gain]),
     ]
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
+    else:
+        programs += _stable_set([*without, *slope], model)
     facts = {
         "parameters": list(model.parameters),
         "affine": equation.affine,
         "degree": len(coefficients) - 1,
+        "squares": 0 if closed else len(programs[-3].stores) - 2,
         "closed": closed,
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
@@ -115,6 +119,43 @@ def _steady(model: Model) -> Program:
     exists = sp.And(slope < 1, sp.StrictGreaterThan(sigma, 0, evaluate=False))
     load = sigma if equation.given else sigma * (1 - slope)
     return program(model, "steady", [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, load])
+
+
+def _static_terms(model: Model) -> list[sp.Expr]:
+    """What adds up to the static stiffness, as `steadyslip.linear.status.on_edge` takes it."""
+    if has_closed_form(model):
+        part = response(model)
+        return [part.k, part.mu * part.k * part.B2, part.mu * part.B3]
+    without, slope = stiffness_split(model)
+    return [without[0], model.parameters["slider.stiffness"] * slope[0]]
+
+
+def _judged(c: list[Node]) -> list[Value]:
+    """Coefficients, and behind them whether all roots are on the left, and whether the equations are ill-posed."""
+    truths = crossing.is_hurwitz(c, select), crossing.is_ill_posed(c)
+    return [*c, *(select(truth, 1.0, 0.0) for truth in truths)]
+
+
+def _stable_set(both: list[sp.Expr], model: Model) -> list[Program]:
+    """Where p + k q may change: real edges and the polynomial in β²; k of a root of it; the verdict at any k."""
+    n, number = len(both) // 2, sp.Symbol("number")
+
+    def edges(c: list[Node]) -> list[Value]:
+        p, q = c[:n], c[n:]
+        return [*crossing.real_edges(p, q, select), *crossing.axis_polynomial(p, q, select)]
+
+    def on_axis(c: list[Node]) -> list[Value]:
+        return [crossing.stiffness_on_axis(c[:n], c[n : 2 * n], c[-1])]
+
+    def verdict(c: list[Node]) -> list[Value]:
+        at = [one + c[-1] * other for one, other in zip(c[:n], c[n:], strict=False)]
+        return [select(crossing.is_hurwitz(at, select), 1.0, 0.0)]
+
+    return [
+        program(model, "edges", both, then=edges),
+        program(model, "onAxis", [*both, number], number, then=on_axis),
+        program(model, "stableAt", [*both, number], number, then=verdict),
+    ]
 
 
 def _interval(ingredients: list[Node]) -> Sequence[Value]:

@@ -14,6 +14,8 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.linear import crossing
+
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
@@ -214,23 +216,8 @@ def routh_column(c: Array) -> Array:
 
     The entries depend on s to powers of one unit, so they have mixed units; only signs matter.
     """
-    d = c.shape[-1] - 1
     scale = np.abs(c).max(axis=-1, keepdims=True)
-    high = c / scale
-    width = d // 2 + 1
-    upper = np.zeros((*c.shape[:-1], width))
-    lower = np.zeros_like(upper)
-    upper[..., : len(range(d, -1, -2))] = high[..., d::-2]
-    if d >= 1:
-        lower[..., : len(range(d - 1, -1, -2))] = high[..., d - 1 :: -2]
-    column = [upper[..., 0]]
-    for _ in range(d):
-        column.append(lower[..., 0])
-        with np.errstate(all="ignore"):
-            ratio = upper[..., :1] / lower[..., :1]
-            following = np.zeros_like(upper)
-            following[..., :-1] = upper[..., 1:] - ratio * lower[..., 1:]
-        upper, lower = lower, following
+    column = crossing.routh(columns(c / scale))
     return np.asarray(np.nan_to_num(np.stack(column, axis=-1) * scale, nan=-1.0))
 
 
@@ -310,18 +297,11 @@ def _near_one(c: Array) -> tuple[Array, NDArray[np.intp]]:
 
 def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
     """Positive k at which a root may cross, and its β; NaN where there is none."""
-    n = p.shape[-1] - 1
     with np.errstate(all="ignore"):
-        static = -p[:, 0] / q[:, 0]
-        top = -p[:, n] / q[:, n]
-        no_inertia = (p[:, n] == 0) & (q[:, n] == 0)
-        top = np.where(no_inertia, -p[:, n - 1] / q[:, n - 1], top)
+        static, top = crossing.real_edges(columns(p), columns(q))
     w = crossing_squares(p, q)
-    pe, po = even_odd(p)
-    qe, qo = even_odd(q)
     with np.errstate(all="ignore"):
-        e1, o1, e2, o2 = (evaluate(part[:, None, :], w) for part in (pe, po, qe, qo))
-        oscillatory = -(e1 * e2 + w * o1 * o2) / (e2 * e2 + w * o2 * o2)
+        oscillatory = crossing.stiffness_on_axis(columns(p[:, None, :]), columns(q[:, None, :]), w)
     k = np.concatenate([static[:, None], top[:, None], oscillatory], axis=-1)
     zero = np.zeros_like(static)[:, None]
     beta = np.concatenate([zero, zero + np.inf, np.sqrt(w)], axis=-1)
@@ -330,38 +310,28 @@ def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
     return k, beta
 
 
+def columns(c: Array) -> list[Any]:
+    """Coefficients of polynomials one by one, as `crossing` takes them."""
+    return [c[..., i] for i in range(c.shape[-1])]
+
+
 def even_odd(c: Array) -> tuple[Array, Array]:
     """E and O with c(iβ) = E(β²) + iβ O(β²), as polynomials in β²."""
-    even, odd = c[..., 0::2].copy(), c[..., 1::2].copy()
-    even[..., 1::2] *= -1
-    odd[..., 1::2] *= -1
-    return even, odd if odd.shape[-1] else np.zeros((*c.shape[:-1], 1))
+    even, odd = crossing.even_odd(columns(c))
+    return np.stack(even, axis=-1), np.stack(odd, axis=-1)
 
 
 def product(a: Array, b: Array) -> Array:
     """Coefficients of products of polynomials."""
-    out = np.zeros((*a.shape[:-1], a.shape[-1] + b.shape[-1] - 1))
-    for i in range(a.shape[-1]):
-        out[..., i : i + b.shape[-1]] += a[..., i : i + 1] * b
-    return out
+    return np.stack(crossing.product(columns(a), columns(b)), axis=-1)
 
 
 @quietly
 def crossing_squares(p: Array, q: Array) -> Array:
     """Positive β² where p(iβ)/q(iβ) is real, NaN padded: the roots of Im[p conj q]/β."""
-    pe, po = even_odd(p)
-    qe, qo = even_odd(q)
-    first, second = product(po, qe), product(pe, qo)
-    width = max(first.shape[-1], second.shape[-1])
-    difference = np.zeros((*p.shape[:-1], width))
-    difference[..., : first.shape[-1]] += first
-    size = np.abs(difference)
-    difference[..., : second.shape[-1]] -= second
-    size[..., : second.shape[-1]] += np.abs(second)
-    # what is left of an exact cancellation is not a coefficient
-    difference[np.abs(difference) < 8 * np.finfo(float).eps * size] = 0.0
+    difference = np.stack(np.broadcast_arrays(*crossing.axis_polynomial(columns(p), columns(q))), axis=-1)
     keep = np.any(difference != 0, axis=0)
-    if width < 2 or not np.any(keep[1:]):
+    if not np.any(keep[1:]):
         return np.full((len(p), 1), np.nan)
     w = roots(difference[:, : np.flatnonzero(keep)[-1] + 1])
     with np.errstate(invalid="ignore"):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.linear import quasi as sums
+from steadyslip.linear import crossing, quasi as sums
 from steadyslip.linear.polynomials import Array, ComplexArray, damping_measures, is_hurwitz, roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi
@@ -50,7 +50,7 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
 
 def ill_posed(c: Array) -> NDArray[np.bool_]:
     """The same of polynomials (..., n+1)."""
-    return np.asarray((c[..., -1] < 0) | ((c[..., -1] == 0) & (c[..., -2] <= 0)))
+    return np.asarray(crossing.is_ill_posed((c[..., -2], c[..., -1])))
 
 
 def static_sum(point: OperatingPoint) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
+from steadyslip.linear.crossing import share_left
 from steadyslip.linear.response import has_closed_form, response_numbers
 from steadyslip.linear.spectrum import is_near_edge, is_stable, static_sum
 from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
@@ -111,6 +112,4 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         else:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
-        largest = sum(np.abs(term) for term in terms)
-        static = np.where(largest == 0, 0.0, np.abs(sum(terms)) / largest)
-        return np.asarray(undamped | (static <= ON_THE_EDGE))
+        return np.asarray(undamped | (share_left(terms) <= ON_THE_EDGE))

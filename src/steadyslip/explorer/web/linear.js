@@ -1,13 +1,14 @@
 // What a rig's linear equations say at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
 // The equations themselves are generated (steadyslip/explorer/equations.py).
-import { dampingOfPairs, isHurwitz, isIllPosed, roots, stableSet } from "./polynomials.js";
+import { dampingOfPairs, roots } from "./polynomials.js";
 
 /** @typedef {import("./polynomials.js").Complex} Complex */
-/** @typedef {import("./polynomials.js").Interval} Interval */
+/** @typedef {{low: number, high: number}} Interval */
 /** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
-/** @typedef {{parameters: string[], affine: boolean, degree: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
+/** @typedef {{parameters: string[], affine: boolean, degree: number, squares: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
  *   observed: [string, string, string][]}} Facts */
 
+const NEARLY_REAL = 1e-6, SAME = 1e-9; // imaginary part of a root that is tried as real; two edges that are one
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
 
 export class Linear {
@@ -20,13 +21,13 @@ export class Linear {
     this.facts = facts;
     this.count = facts.parameters.length;
     this.R = new Float64Array(this.count + 1);
-    this.y = new Float64Array(Math.max(8, 2 * facts.degree + 2, facts.observed.length));
-    this.c = new Float64Array(facts.degree + 1);
+    this.y = new Float64Array(Math.max(8, 2 * facts.degree + 4, facts.squares + 2, facts.observed.length));
+    this.c = new Float64Array(facts.degree + 3); // whether all roots are on the left, and it is ill-posed, behind coefficients
   }
 
-  /** What a program gives. @param {string} name @param {number} many */
-  ask(name, many) {
-    this.programs[name](this.R, 0, this.y);
+  /** What a program gives. @param {string} name @param {number} many @param {number} [number] */
+  ask(name, many, number = 0) {
+    this.programs[name](this.R, number, this.y);
     return Array.from(this.y.subarray(0, many));
   }
 
@@ -77,8 +78,9 @@ export class Linear {
     if (!(sigma > 0)) return ABSENT;
     R[this.count] = sigma;
     programs.coefficients(R, 0, c);
-    for (let i = 0; i < c.length; i++) if (!Number.isFinite(c[i])) return UNKNOWN;
-    return isHurwitz(c) ? STABLE : UNSTABLE;
+    const { degree } = this.facts;
+    for (let i = 0; i <= degree; i++) if (!Number.isFinite(c[i])) return UNKNOWN;
+    return c[degree + 1] === 1 ? STABLE : UNSTABLE;
   }
 
   /** The whole answer at the parameters that are set. */
@@ -87,20 +89,19 @@ export class Linear {
     const answer = { status, sigma: found.length > branch ? found[branch] : NaN, states: found.length, slope, load };
     if (status === ABSENT || status === UNKNOWN) return { ...answer, ...NOTHING };
     this.R[this.count] = answer.sigma;
-    const degree = this.facts.degree, c = this.ask("coefficients", degree + 1);
+    const degree = this.facts.degree, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1;
     const eigenvalues = roots(c), both = this.ask("split", 2 * degree + 2);
     const p = both.slice(0, degree + 1), q = both.slice(degree + 1), own = this.R[this.facts.parameters.indexOf("slider.stiffness")];
-    const { intervals, ends } = this.stableStiffness(p, q);
+    const { intervals, ends } = this.stableStiffness(p, q), [statics] = this.ask("statics", 1);
     const critical = ends.length ? ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a)) : null;
     const [share, gain] = this.ask("stiffness", 2);
     const at = critical === null ? [] : roots(p.map((v, i) => v + critical * q[i]));
     const swing = at.filter((s) => s.im > 0).sort((a, b) => Math.abs(a.re) / a.im - Math.abs(b.re) / b.im)[0];
     const edgewise = swing && Math.abs(swing.re) < 1e-6 * swing.im ? swing.im : 0;
-    const fixed = p[0] + own * q[0], statics = Math.abs(fixed) / (Math.abs(p[0]) + Math.abs(own * q[0]));
     const observed = this.ask("observables", this.facts.observed.length);
     return {
       ...answer, eigenvalues, intervals, ends, p, q, critical, share, gain, stiffness: own,
-      illPosed: isIllPosed(c),
+      illPosed,
       side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
       frequency: critical === null ? null : edgewise,
       onEdge: Math.abs(0.5 * dampingOfPairs(eigenvalues)) <= this.facts.edge || statics <= this.facts.edge,
@@ -110,12 +111,29 @@ export class Linear {
 
   /** Stable k > 0, and the ends where stability changes; the closed form where there is one, which keeps its digits. */
   stableStiffness(p, q) {
-    if (!this.facts.closed) {
-      const { intervals, edges } = stableSet(p, q);
-      return { intervals, ends: edges.map((edge) => edge.k) };
-    }
+    if (!this.facts.closed) return this.stableSet(p, q);
     const [low, high] = this.ask("interval", 2), intervals = low < high ? [{ low, high }] : [];
     const ends = intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k));
+    return { intervals, ends };
+  }
+
+  /** The same by trial: between all k at which a root may cross the axis, the verdict is one. */
+  stableSet(p, q) {
+    const [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2), cuts = [still, infinite];
+    for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, re)[0]);
+    const found = cuts.filter((k) => k > 0 && Number.isFinite(k)).sort((a, b) => a - b);
+    const apart = [0, ...found.filter((k, i) => i === 0 || k > found[i - 1] * (1 + SAME)), Infinity];
+    const ratios = p.map((v, i) => Math.abs(v / q[i])).filter((r) => r > 0 && Number.isFinite(r)), natural = ratios.length ? Math.max(...ratios) : 1;
+    const intervals = [], ends = [];
+    let before = false;
+    for (let i = 0; i + 1 < apart.length; i++) {
+      const low = apart[i], high = apart[i + 1], inner = low > 0 ? Math.sqrt(low) * Math.sqrt(high) : high / 2, last = low > 0 ? 2 * low : natural;
+      const stable = this.ask("stableAt", 1, high === Infinity ? last : inner)[0] === 1;
+      if (i > 0 && stable !== before) ends.push(low);
+      if (stable && before) intervals[intervals.length - 1].high = high;
+      else if (stable) intervals.push({ low, high });
+      before = stable;
+    }
     return { intervals, ends };
   }
 }

@@ -1,10 +1,9 @@
-// Real polynomials, coefficients lowest power first: roots, Hurwitz test, and the k for which p + k q is stable.
-// The counterpart of steadyslip/linear/polynomials.py, for one rig at a time.
+// Roots of real polynomials, coefficients lowest power first: what NumPy's LAPACK is to Python. What polynomials mean for
+// a rig is generated (steadyslip/explorer/equations.py).
 
 /** @typedef {{re: number, im: number}} Complex */
-/** @typedef {{low: number, high: number}} Interval */
 
-const NEARLY_REAL = 1e-6, SAME = 1e-9, CLOSE = 1e-3, EPS = 2.220446049250313e-16;
+const CLOSE = 1e-3, EPS = 2.220446049250313e-16;
 
 /** Value and slope of a polynomial at x + iy: [re, im, slope re, slope im]. @param {number[]} c */
 function valueAndSlope(c, x, y) {
@@ -154,97 +153,6 @@ export function roots(given) {
     else if (d > 2) found.push(...paired(c, ...aberth(c)));
   }
   return found.sort((a, b) => b.re - a.re || b.im - a.im);
-}
-
-let upper = new Float64Array(16), lower = new Float64Array(16); // rows of Routh's array
-
-/** Whether the highest coefficient is positive and all roots have negative real parts (Routh). @param {ArrayLike<number>} c */
-export function isHurwitz(c) {
-  const n = c.length - 1;
-  let d = n, most = 0;
-  while (d >= 0 && c[d] === 0) d--;
-  if (d < Math.max(n - 1, 0)) return false; // the equations have lost more than their inertia: ill-posed
-  for (let i = 0; i <= d; i++) most = Math.max(most, Math.abs(c[i]));
-  if (d + 2 > upper.length) [upper, lower] = [new Float64Array(d + 2), new Float64Array(d + 2)];
-  const width = (d >> 1) + 1;
-  for (let i = 0; i < width; i++) {
-    upper[i] = c[d - 2 * i] / most;
-    lower[i] = d - 1 - 2 * i >= 0 ? c[d - 1 - 2 * i] / most : 0;
-  }
-  lower[width] = 0;
-  for (let row = 0; row <= d; row++) {
-    if (!(upper[0] > 0)) return false;
-    const ratio = upper[0] / lower[0];
-    for (let i = 1; i < width; i++) upper[i - 1] = upper[i] - ratio * lower[i];
-    upper[width - 1] = 0;
-    [upper, lower] = [lower, upper];
-  }
-  return true;
-}
-
-/** Whether the equations cannot be solved for their unknown (theory 3). @param {ArrayLike<number>} c */
-export const isIllPosed = (c) => c[c.length - 1] < 0 || (c[c.length - 1] === 0 && c[c.length - 2] <= 0);
-
-const evaluate = (c, s) => c.reduceRight((value, coefficient) => value * s + coefficient, 0);
-
-/** E and O with c(iβ) = E(β²) + iβ O(β²). */
-function evenOdd(c) {
-  const part = (from) => c.filter((_, i) => i % 2 === from).map((v, i) => (i % 2 ? -v : v));
-  return [part(0), c.length > 1 ? part(1) : [0]];
-}
-
-function product(a, b) {
-  const out = new Array(a.length + b.length - 1).fill(0);
-  a.forEach((x, i) => b.forEach((y, j) => (out[i + j] += x * y)));
-  return out;
-}
-
-/** β² > 0 where p(iβ)/q(iβ) is real, and the k there. */
-function oscillatory(p, q) {
-  const [pe, po] = evenOdd(p), [qe, qo] = evenOdd(q), a = product(po, qe), b = product(pe, qo), rest = [];
-  for (let i = 0; i < Math.max(a.length, b.length); i++) {
-    const one = a[i] || 0, other = b[i] || 0, small = 8 * EPS * (Math.abs(one) + Math.abs(other));
-    rest.push(Math.abs(one - other) < small ? 0 : one - other); // of an exact cancellation nothing is left
-  }
-  const found = [];
-  for (const { re: w, im } of roots(rest)) {
-    if (!(w > 0) || Math.abs(im) > NEARLY_REAL * Math.hypot(w, im)) continue;
-    const [e1, o1, e2, o2] = [pe, po, qe, qo].map((part) => evaluate(part, w));
-    found.push([-(e1 * e2 + w * o1 * o2) / (e2 * e2 + w * o2 * o2), Math.sqrt(w)]);
-  }
-  return found;
-}
-
-/**
- * The k > 0 for which p + k q has all roots in the left half plane.
- * @param {number[]} p
- * @param {number[]} q
- * @returns {{intervals: Interval[], edges: {k: number, frequency: number}[]}} edges where stability changes
- */
-export function stableSet(p, q) {
-  const n = p.length - 1, none = p[n] === 0 && q[n] === 0;
-  const all = [[-p[0] / q[0], 0], [none ? -p[n - 1] / q[n - 1] : -p[n] / q[n], Infinity], ...oscillatory(p, q)];
-  const cuts = all.filter(([k]) => k > 0 && Number.isFinite(k)).sort((a, b) => a[0] - b[0]);
-  const apart = cuts.filter(([k], i) => i === 0 || k > cuts[i - 1][0] * (1 + SAME));
-  const ratios = p.map((v, i) => Math.abs(v / q[i])).filter((r) => r > 0 && Number.isFinite(r));
-  const natural = ratios.length ? Math.max(...ratios) : 1;
-  const stable = [];
-  for (let i = 0; i <= apart.length; i++) {
-    const low = i > 0 ? apart[i - 1][0] : 0, high = i < apart.length ? apart[i][0] : Infinity;
-    const last = low > 0 ? 2 * low : natural, inner = low > 0 ? Math.sqrt(low) * Math.sqrt(high) : high / 2;
-    const k = high === Infinity ? last : inner;
-    stable.push(isHurwitz(p.map((v, j) => v + k * q[j])));
-  }
-  const intervals = [], edges = [];
-  for (let i = 0; i <= apart.length; i++) {
-    if (i > 0 && stable[i] !== stable[i - 1]) edges.push({ k: apart[i - 1][0], frequency: apart[i - 1][1] });
-    if (!stable[i]) continue;
-    const low = i > 0 ? apart[i - 1][0] : 0, high = i < apart.length ? apart[i][0] : Infinity;
-    const last = intervals[intervals.length - 1];
-    if (last && i > 0 && stable[i - 1]) last.high = high;
-    else intervals.push({ low, high });
-  }
-  return { intervals, edges };
 }
 
 /**

@@ -1,0 +1,114 @@
+"""Polynomials beside the imaginary axis: the Routh array, and where p + k q has a root iβ (theory 3).
+
+Plain arithmetic: a polynomial is a list of coefficients, lowest power first, that are numbers, arrays or nodes of a
+program. Arrays of rigs (`polynomials`) and pages (`steadyslip.explorer`) are judged by these lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+ROUNDING = 8 * float(np.finfo(float).eps)  # share of two terms below which what is left of them is none
+Polynomial = Sequence[Any]
+
+
+def routh(c: Polynomial) -> list[Any]:
+    """First column of the Routh array of a polynomial of full degree: all roots are on the left if all are positive."""
+    upper, lower = list(c[::-1][0::2]), list(c[::-1][1::2])
+    column = [upper[0]]
+    for _ in range(len(c) - 1):
+        column.append(lower[0])
+        ratio = upper[0] / lower[0]
+        following = [one - ratio * lower[i] if i < len(lower) else one for i, one in enumerate(upper[1:], start=1)]
+        upper, lower = lower, following
+    return column
+
+
+def is_ill_posed(c: Polynomial) -> Any:
+    """Whether the equations cannot be solved for their unknown: a3 < 0, or a3 = 0 and a2 <= 0."""
+    highest, second = c[-1], c[-2]
+    return (highest < 0) | ((highest <= 0) & (second <= 0))
+
+
+def even_odd(c: Polynomial) -> tuple[list[Any], list[Any]]:
+    """E and O with c(iβ) = E(β²) + iβ O(β²), as polynomials in β²."""
+    signed = [-one if i % 4 > 1 else one for i, one in enumerate(c)]
+    return signed[0::2], signed[1::2] or [0.0 * signed[0]]
+
+
+def product(a: Polynomial, b: Polynomial) -> list[Any]:
+    """Coefficients of the product of two polynomials."""
+    out: list[Any] = [0.0] * (len(a) + len(b) - 1)
+    for i, one in enumerate(a):
+        for j, other in enumerate(b):
+            out[i + j] = one * other + out[i + j]
+    return out
+
+
+def axis_polynomial(p: Polynomial, q: Polynomial, choose: Callable[..., Any] = np.where) -> list[Any]:
+    """Im[p(iβ) conj q(iβ)]/β as a polynomial in β²: at its positive roots some real k puts a root of p + k q at iβ.
+
+    Parameters
+    ----------
+    choose : callable
+        ``choose(condition, value, other)``; that of a program, where coefficients are its nodes.
+    """
+    (pe, po), (qe, qo) = even_odd(p), even_odd(q)
+    first, second = product(po, qe), product(pe, qo)
+    found = []
+    for i in range(max(len(first), len(second))):
+        one, other = (part[i] if i < len(part) else 0.0 for part in (first, second))
+        left = one - other
+        # what is left of an exact cancellation is not a coefficient
+        found.append(choose(abs(left) < ROUNDING * (abs(one) + abs(other)), 0.0, left))
+    return found
+
+
+def stiffness_on_axis(p: Polynomial, q: Polynomial, square: Any) -> Any:
+    """That k, given β²."""
+    e1, o1, e2, o2 = (_at(part, square) for part in (*even_odd(p), *even_odd(q)))
+    return -(e1 * e2 + square * o1 * o2) / (e2 * e2 + square * o2 * o2)
+
+
+def real_edges(p: Polynomial, q: Polynomial, choose: Callable[..., Any] = np.where) -> tuple[Any, Any]:
+    """The k at which a root is zero, and that at which the highest coefficient vanishes, where one is infinite."""
+    none = (abs(p[-1]) <= 0) & (abs(q[-1]) <= 0)
+    return -p[0] / q[0], choose(none, -p[-2] / q[-2], -p[-1] / q[-1])
+
+
+def is_hurwitz(c: Polynomial, choose: Callable[..., Any]) -> Any:
+    """Whether the highest coefficient is positive and all roots are on the left; of full degree, or of one less.
+
+    For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
+    """
+    largest: Any = 0.0
+    for one in c:
+        largest = choose(abs(one) > largest, abs(one), largest)
+    scaled = [one / largest for one in c]
+    full, less = (_all_positive(routh(part)) for part in (scaled, scaled[:-1]))
+    return ((c[-1] > 0) & full) | ((abs(c[-1]) <= 0) & less)
+
+
+def _all_positive(values: Polynomial) -> Any:
+    good = values[0] > 0
+    for one in values[1:]:
+        good = good & (one > 0)
+    return good
+
+
+def share_left(terms: Sequence[Any], choose: Callable[..., Any] = np.where) -> Any:
+    """What is left of a sum, as a share of its terms; zero where there are none."""
+    total, sizes = 0.0, 0.0
+    for term in terms:
+        total, sizes = total + term, sizes + abs(term)
+    return choose(sizes <= 0, 0.0, abs(total) / sizes)
+
+
+def _at(c: Polynomial, x: Any) -> Any:
+    value = c[-1]
+    for one in c[-2::-1]:
+        value = value * x + one
+    return value

@@ -25,7 +25,7 @@ from steadyslip.nonlinear.kicks.fold import at_fold
 from steadyslip.nonlinear.kicks.kicks import Kicked
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood, rates_at
 from steadyslip.nonlinear.kicks.rest import rest_of
-from steadyslip.nonlinear.kicks.spans import BLOW_UP, DOUBTS, EXHAUSTED, LATE, OUTCOMES, RETURNS, Budget, doubt_of
+from steadyslip.nonlinear.kicks.spans import BLOW_UP, DOUBTS, EXHAUSTED, LATE, OUTCOMES, RETURNS, StepBudget, doubt_of
 
 STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
 
@@ -583,7 +583,7 @@ CLOSE_TO_A_FOLD = ss.Slider(
 def test_next_to_a_fold_small_kicks_return():
     """Sliding is steady, and a hundredth slower the forces would no longer balance: the motion is not at that fold."""
     found = Kicked(CLOSE_TO_A_FOLD, "normal-stress", 1, "before", {}, 0, None)
-    found.budget = Budget(3e5)  # rounding is not followed with tiny steps
+    found.budget = StepBudget(3e5)  # rounding is not followed with tiny steps
     assert set(found.outcomes(np.zeros(24, dtype=int), np.geomspace(1e-6, 1e-3, 24)).tolist()) == {RETURNS}
     rest = found.rest
     assert at_fold(rest, rest.state).tolist() == [True]

@@ -220,7 +220,7 @@ def test_changes_that_are_wrong(change, said):
 
 COMMANDS = [
     ("simulate", "--until", "1 s"), ("cycles",), ("threshold",), ("explore", "-o", "a.html"),
-    ("report", "-o", "a.html"), ("map", "-o", "a.zarr"), ("sensitivity",), ("analyze", "--kick", "velocity"),
+    ("map", "-o", "a.zarr"), ("sensitivity",), ("analyze", "--kick", "velocity"),
     ("analyze", "--branch", "1"),
 ]  # fmt: skip
 

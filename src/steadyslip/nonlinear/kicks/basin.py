@@ -23,7 +23,7 @@ from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import rest_of
-from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Budget, Judged, doubt_of
+from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
@@ -143,7 +143,7 @@ def basin(
     near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
     near.computed()
     runs = Judged(
-        replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every, budget=Budget(STEPS)
+        replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every, budget=StepBudget(STEPS)
     )
     with progress_bar(count, progress, "starting points") as advanced:
         found = outcomes_of(runs, threads, advanced)

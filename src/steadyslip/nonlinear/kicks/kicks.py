@@ -22,7 +22,7 @@ from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
-from steadyslip.nonlinear.kicks.spans import STIFF, Budget, Judged, continuous_at
+from steadyslip.nonlinear.kicks.spans import STIFF, Judged, StepBudget, continuous_at
 
 Array = np.ndarray
 PATIENCE = 5.0  # times longer than in a scan is a motion followed where it matters by itself
@@ -97,7 +97,7 @@ class Kicked:
     exists, neutral, stable : ndarray of bool (size,)
         Whether there is steady sliding; whether small motions about it neither grow nor decay; whether they decay
         or are neutral.
-    budget : Budget
+    budget : StepBudget
         Of all motions that are run.
     """
 
@@ -114,7 +114,7 @@ class Kicked:
             problems.append(Problem("reference", f"got {reference!r}; allowed: 'before' or 'after'"))
         if problems:
             raise ParameterError(problems)
-        self.kick, self.sign, self.budget = KICKS[kick], float(direction), Budget()
+        self.kick, self.sign, self.budget = KICKS[kick], float(direction), StepBudget()
         self.from_other = kick == "velocity" and reference == "after"
         values = operating_point(rig, vary, branch=branch)
         if kick == "impulse" and "slider.mass" not in values.named():

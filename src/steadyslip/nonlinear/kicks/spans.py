@@ -52,7 +52,7 @@ def doubt_of(outcome: int) -> str:
 
 
 @dataclass
-class Budget:
+class StepBudget:
     """Steps of integration that a search may still take, all its motions together."""
 
     steps: float = np.inf
@@ -76,7 +76,7 @@ class Judged:
         For each motion the first with the same rig and inputs.
     effort : float
         Multiplies how long a motion is followed before it is undecided.
-    budget : Budget
+    budget : StepBudget
         Motions that are open when it is used up are undecided.
     """
 
@@ -86,7 +86,7 @@ class Judged:
     jump: Array
     group: Array
     effort: float = 1.0
-    budget: Budget = field(default_factory=Budget)
+    budget: StepBudget = field(default_factory=StepBudget)
 
     def repeated(self, one: int, count: int) -> Judged:
         """So many motions of one rig, to be started anywhere."""

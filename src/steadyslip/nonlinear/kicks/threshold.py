@@ -23,7 +23,7 @@ from steadyslip.nonlinear.kicks.spans import (
     OUTCOMES,
     RETURNS,
     UNDECIDED,
-    Budget,
+    StepBudget,
     doubt_of,
 )
 from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
@@ -235,7 +235,7 @@ class _Search:
 
     def __init__(self, kicked: Kicked, progress: Callable[[int, float, float], None] | None) -> None:
         self.kicked, self.progress = kicked, progress
-        kicked.budget = Budget(STEPS)
+        kicked.budget = StepBudget(STEPS)
         self.low, self.high, self.edge = 0.0, np.inf, np.inf
         self.outcome = self.doubt = RETURNS
         self.tried, self.interrupted = 0, False

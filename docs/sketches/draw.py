@@ -1,6 +1,7 @@
 """Draws the sketches beside this file: ``python docs/sketches/draw.py [folder] [svg|png]``.
 
-One function for each mechanism of `steadyslip.laws.contact`; geometry and signs are those of its docstrings.
+One function for each mechanism of `steadyslip.laws.contact`; geometry and signs are those of its docstrings. Machines
+of examples/machines are drawn from their files.
 Blue: motion. Red: stresses on the block. Black: bodies. Green: angles and lengths.
 """
 
@@ -8,12 +9,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import pyplot as plt, rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, FancyArrowPatch, Polygon, Rectangle
 
-from steadyslip import figures
+from steadyslip import analyze, figures, read_rig
 from steadyslip.figures.style import BLACK, BLUE, GREEN, VERMILION
 from steadyslip.reproduce import paper_rig
 from steadyslip.units import GPa, deg
@@ -383,6 +384,16 @@ def draw(folder: Path, kind: str = "svg") -> list[Path]:
             metadata = {"Date": None, "Creator": None} if kind == "svg" else None
             ax.figure.savefig(path, facecolor="white", dpi=110, metadata=metadata)
             written.append(path)
+        for rig in sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml")):
+            ax = figures.machine_sketch(read_rig(rig))
+            path = folder / f"machine-{rig.stem}.{kind}"
+            metadata = {"Date": None, "Creator": None} if kind == "svg" else None
+            ax.figure.savefig(path, facecolor="white", dpi=110, metadata=metadata)
+            plt.close(ax.figure)
+            written.append(path)
+        axes = figures.machine_verdict(analyze(read_rig(rig.with_stem("telescope"))))
+        written.append(folder / f"machine-verdict.{kind}")
+        axes[0].figure.savefig(written[-1], facecolor="white", dpi=110, metadata=metadata)
     return written
 
 

@@ -20,15 +20,18 @@ from steadyslip.figures.experiments.fits import fit, steps
 from steadyslip.figures.experiments.populations import population
 from steadyslip.figures.experiments.records import record
 from steadyslip.figures.locus import root_locus
+from steadyslip.figures.machine_verdict import eigenvalue_plane, machine_verdict, mode_shape, stable_ranges
+from steadyslip.figures.machines import machine_sketch
 from steadyslip.figures.map_results import refined, sensitivity
 from steadyslip.figures.maps import map_figure
 from steadyslip.figures.motion import history, phase_plane
 from steadyslip.figures.nonlinear import basin, cycle_branch, hopf_curve, threshold_map
 from steadyslip.figures.tolerances import tolerances
+from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
 from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
-from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated
 
 __all__ = [
     "ANGLES",
@@ -37,11 +40,15 @@ __all__ = [
     "corner",
     "critical_stiffness_against_mass",
     "cycle_branch",
+    "eigenvalue_plane",
     "fit",
     "history",
     "hopf_curve",
     "kicks",
+    "machine_sketch",
+    "machine_verdict",
     "map_figure",
+    "mode_shape",
     "phase_plane",
     "population",
     "prediction",
@@ -52,6 +59,7 @@ __all__ = [
     "root_locus",
     "sensitivity",
     "stability_chart",
+    "stable_ranges",
     "steps",
     "threshold_map",
     "tolerances",
@@ -63,6 +71,10 @@ def _locus(found: Analysis, ax: Axes | None = None, **options: Any) -> Axes:
 
 
 register_figures(Analysis, locus=_locus)
+register_figures(
+    MachineAnalysis, verdict=machine_verdict, ranges=stable_ranges, mode=mode_shape, eigenvalues=eigenvalue_plane
+)
+register_figures(Machine, sketch=machine_sketch)
 register_figures(History, history=history, phase=phase_plane)
 register_figures(CycleBranch, branch=cycle_branch)
 register_figures(HopfCurve, curve=hopf_curve)

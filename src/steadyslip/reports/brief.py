@@ -48,12 +48,13 @@ PLAIN = frozenset(
     residuals
     seen worth errors first second first_interval total_interval total missing spacing edge correlation
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
-    sides conditions amplitudes energy speeds links""".split()  # noqa: SIM905 -- a list of words
+    sides conditions amplitudes energy speeds links characteristic_terms unstable_roots""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _NOT_SHOWN = frozenset(
     "rig version plan data protocol area unit units html start fit fits draws search noise plot map".split()  # noqa: SIM905
 )
+_SKETCHED = "Motion is to the right. Solid blue: what the drive does; dashed: what it measures; red: constant forces."
 _ROWS, _ARRAY = 12, 4
 
 
@@ -132,6 +133,8 @@ def _record(record: FrozenRecord) -> Iterator[str]:
     yield heading(f"{type(record).__name__}{f' ({name})' if isinstance(name, str) and name else ''}", 3)
     if isinstance(record, Slider):
         yield figure(sketch(record))
+    if isinstance(record, Machine):
+        yield figure(drawn(lambda: draw(record), "sketch of the machine"), _SKETCHED)
     rows = []
     for path, one in parameters(record).items():
         if one.value is not None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from steadyslip import figures
 from steadyslip.core.quantities import shown
 from steadyslip.reports import rig as of_rig
 from steadyslip.reports.brief import inside
 from steadyslip.reports.document import Parts
-from steadyslip.reports.elements import heading, paragraph, table
+from steadyslip.reports.drawings import drawn
+from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import MachineAnalysis
 from steadyslip.verdict.words import disturbance
 
@@ -21,13 +23,18 @@ def about(analysis: MachineAnalysis) -> Parts:
     body = [
         heading("The machine"), inside(machine),
         heading("The verdict"), *_verdict(analysis),
-        heading("How far is the edge?"), *of_rig.edges(analysis),
+        heading("How far is the edge?"), _picture(analysis), *of_rig.edges(analysis),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
         paragraph(of_rig.SMALL),
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
     return Parts(of_rig.in_a_sentence(analysis), lead, question, body, None, of_rig.as_file(machine))
+
+
+def _picture(analysis: MachineAnalysis) -> str:
+    words = "Where it is stable in each parameter, how it moves in its leading mode, and its eigenvalues."
+    return figure(drawn(lambda: figures.machine_verdict(analysis), words, 8.0), words)
 
 
 def _verdict(analysis: MachineAnalysis) -> Iterator[str]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
+from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins
 from steadyslip.linear.modes import Mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
@@ -21,6 +23,9 @@ from steadyslip.verdict.export import common_numbers
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.words import BEYOND, disturbance, headline, lines_of, margin_table
+
+if TYPE_CHECKING:
+    import sympy as sp
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,13 +40,30 @@ class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
         """`to_dict` as JSON text."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
+    def plot(self, kind: str | None = None, **options: Any) -> Any:
+        """A figure: ``"verdict"``, or of its parts ``"ranges"``, ``"mode"`` and ``"eigenvalues"`` alone."""
+        return draw(self, kind, **options)
+
+    def formula(self) -> sp.Eq:
+        """Refused: `steadyslip.formula` is one of sliders."""
+        return linear_formula(self.rig)
+
     def __str__(self) -> str:
-        rows = [("steady sliding", _sliding(self.steady)), ("a disturbance", disturbance(self))] if self.steady else []
-        rows += [("the mode", self.mode.words())] if self.mode else []
-        return lines_of(self, rows, margin_table(self), [_MEANING] if self.stable and not self.on_edge else [])
+        return lines_of(self, machine_facts(self), margin_table(self), machine_meaning(self))
 
     def __repr__(self) -> str:
         return f"<MachineAnalysis: {headline(self)}; print it for the whole verdict>"
+
+
+def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
+    """What is known of steady sliding, its disturbances and the leading mode: name and words."""
+    rows = [("steady sliding", _sliding(found.steady)), ("a disturbance", disturbance(found))] if found.steady else []
+    return rows + ([("the mode", found.mode.words())] if found.mode else [])
+
+
+def machine_meaning(found: MachineAnalysis) -> list[str]:
+    """What the verdict does not say."""
+    return [_MEANING] if found.stable and not found.on_edge else []
 
 
 _MEANING = "Stable means: small disturbances die out. A large enough kick may still start an oscillation."

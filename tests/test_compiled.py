@@ -59,7 +59,8 @@ def test_log(x):
 @given(st.floats(-1.5, 1.5).filter(lambda x: abs(x) > 1e-290))
 def test_sine(x):
     assert ulps("sin", x) < 3
-    rounded = 0.5 * np.spacing(abs(x) + np.pi / 2)  # of x + pi/2, whose sine it is: relative to 1, not to cos x
+    quarter = abs(float(mpmath.pi / 2 - mpmath.mpf(np.pi / 2)))  # as a float, which x is added to
+    rounded = quarter + 0.5 * np.spacing(abs(x) + np.pi / 2)  # x + pi/2, whose sine it is: relative to 1, not to cos x
     assert abs(primitives.cos(x) - float(mpmath.cos(mpmath.mpf(x)))) < rounded + 3 * np.spacing(np.cos(x))
 
 

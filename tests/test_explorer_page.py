@@ -13,6 +13,7 @@ import pytest
 import steadyslip as ss
 from browser import chromium, driver
 from command import run
+from firefox import Firefox
 from rigs_of_theory import ONE_MEMORY, SIGMA, rate_state, rig
 from steadyslip.core.roles import positive
 from steadyslip.reports import Report
@@ -498,6 +499,43 @@ def test_reports_ask_for_nothing_fit_every_width_and_print_without_the_explorer(
         visit.page.emulate_media(media="print")
         assert not visit.page.locator(".steadyslip-root").is_visible()
         assert visit.page.get_by_role("heading", name="How far is the edge?").is_visible()
+
+
+COMPLETE = """return new Promise((done) => {
+  const end = performance.now() + 30000;
+  const look = () => {
+    const told = document.querySelector(".told")?.textContent ?? "";
+    if (!/slip event|runs away/.test(told) && performance.now() < end) return setTimeout(look, 20);
+    done([document.querySelector("h1").textContent, told, document.querySelector(".notice").textContent,
+      document.querySelector("footer").textContent, document.querySelectorAll(".strips .curve").length]);
+  };
+  look();
+});"""
+MOVE = """const slider = document.querySelector('input[type=range][aria-label^="slider.stiffness: "]');
+slider.value = "1000";
+slider.dispatchEvent(new Event("input"));
+slider.dispatchEvent(new Event("change"));
+return [document.querySelector("h1").textContent, slider.style.getPropertyValue("--track").includes("--stable")];"""
+
+
+def test_firefox_shows_the_same(file, moved, tmp_path_factory):
+    """Another engine agrees with Python's answers, moves the rig in its worker, and judges it as sliders move."""
+    firefox = Firefox(tmp_path_factory.mktemp("firefox"))
+    try:
+        firefox.ask("WebDriver:Navigate", url=moved["explorer"].as_uri())
+        sentence, told, notice, foot, curves = firefox.run(COMPLETE)
+        assert sentence == "Unstable: steady sliding at 1 µm/s"
+        assert "slip events, the last two" in told
+        assert notice == ""
+        assert "agrees with 4 answers of Python" in foot
+        assert curves >= 2
+        assert firefox.run(MOVE) == ["Stable: steady sliding at 1 µm/s", True]
+        width = "return document.documentElement.scrollWidth <= innerWidth"
+        for size in (500, 1366):  # narrower windows it has not
+            firefox.ask("WebDriver:SetWindowRect", width=size, height=900)
+            assert firefox.run(width)
+    finally:
+        firefox.close()
 
 
 MODEL = """const listeners = [], state = { values: start };

@@ -34,7 +34,7 @@ STYLE = """
 .steadyslip-told pre { background: #f4f4f1; padding: 10px; overflow: auto; font-size: 13px; line-height: 1.4;
   white-space: pre-wrap; overflow-wrap: anywhere; }
 .steadyslip-told math { font-size: 17px; }
-.steadyslip-told msub > :last-child { transform: translateY(.18em); }
+@supports not (-moz-appearance: none) { .steadyslip-told msub > :last-child { transform: translateY(.18em); } }
 .steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 8px 0; padding: 2px 0; }
 """
 """Of everything inside an element of class ``steadyslip-told``."""

@@ -73,6 +73,7 @@ from .laws.contact import (
     Lift as Lift,
     Linear as Linear,
     Motion as Motion,
+    PoreFluid as PoreFluid,
     PreloadedContact as PreloadedContact,
     Prescribed as Prescribed,
     SelfEnergising as SelfEnergising,

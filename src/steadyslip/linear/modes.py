@@ -169,7 +169,7 @@ def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[s
 
 def _stiffness_of(touch: Touch) -> float:
     """Normal stiffness of a contact, from its law."""
-    at_rest = Motion(*(0.0 for _ in range(9)))
+    at_rest = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     apart = replace(at_rest, separation=1.0)
     return float(touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart))
 

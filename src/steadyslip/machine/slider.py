@@ -66,6 +66,11 @@ class Slider(Rig, section="slider"):
                 "friction.lag", "friction that follows velocity late is not offered for a slider; describe it as a "
                 "machine with one body",
             )  # fmt: skip
+        if self.contact.memory():
+            yield Problem(
+                "contact", f"the contact {self.contact.name!r} has states of its own, which is not offered for a "
+                "slider; describe it as a machine with one body",
+            )  # fmt: skip
         if self.contact.is_compliant():
             yield Problem(
                 "contact",

@@ -41,6 +41,7 @@ class _Place:
     sigma: sp.Symbol
     sigma_ss: sp.Symbol
     memory: tuple[sp.Symbol, ...]
+    states: tuple[sp.Symbol, ...]
 
     @cached_property
     def tau_ss(self) -> sp.Expr:
@@ -96,6 +97,9 @@ class _Assembly:
         memory = tuple(
             sp.Symbol(self.letter(f"{touch.name or 'memory'}.{name}"), real=True) for name in touch.friction.memory()
         )
+        states = tuple(
+            sp.Symbol(self.letter(f"{touch.name or 'contact'}.{name}"), real=True) for name in touch.contact.memory()
+        )
         return _Place(
             touch,
             row_of(touch.slip, self.x),
@@ -107,6 +111,7 @@ class _Assembly:
             symbol("sigma", positive=True),
             symbol("sigma_ss", positive=True),
             memory,
+            states,
         )
 
     @cached_property
@@ -137,6 +142,7 @@ class _Assembly:
         return Motion(
             place.slip, place.velocity, place.acceleration, place.spring, spring_ss, place.tau, place.tau_ss,
             stiffness, place.speed, separation, steady_separation, row_of(place.touch.separation, self.v),
+            place.states, tuple(map(sp.sympify, place.touch.contact.steady_memory(place.speed))),
         )  # fmt: skip
 
     # -- forces
@@ -312,6 +318,10 @@ class _Assembly:
             friction=place.tau,
             normal=place.sigma,
             memory=tuple(Variable(f"{own}{n}", s, unit, "memory of friction", "memory") for n, s, unit in remembered),
+            own_states=tuple(
+                Variable(f"{own}{n}", s, unit, "state of the contact", "state")
+                for n, s, unit in zip(contact.memory(), place.states, contact.memory_units(), strict=True)
+            ),
             balance=self._strength(place) - place.tau,
             unknown=own_unknown if self.single else place.tau,
             sigma_ss=place.sigma_ss,
@@ -346,10 +356,11 @@ class _Assembly:
             if one.inertial:
                 variables.append(Variable(f"{name}v", one.velocity, f"{one.unit}/s", f"velocity {what}", "velocity"))
                 rates.append(one.acceleration)
-        for contact, place in zip(contacts, self.places, strict=True):
-            variables += contact.memory
+        for contact, place, motion in zip(contacts, self.places, self.motions, strict=True):
+            variables += [*contact.memory, *contact.own_states]
             law = place.touch.friction
             rates += [sp.sympify(e) for e in law.rates(place.velocity, place.sigma, place.memory, place.tau)]
+            rates += [sp.sympify(e) for e in place.touch.contact.rates(motion)]
         integral = self.mechanism.integral
         if integral is not None:
             what = "time integral of x (controller)" if self.single else "time integral of the controller's error"
@@ -369,6 +380,7 @@ class _Assembly:
             found[place.sigma] = place.sigma_ss
             memory = place.touch.friction.steady_memory(place.speed, place.sigma_ss)
             found |= dict(zip(place.memory, map(sp.sympify, memory), strict=True))
+            found |= dict(zip(place.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
         return found | {V_LP: sp.sympify(self.mechanism.velocity), Q: zero, P: zero}
 
@@ -392,6 +404,9 @@ class _Assembly:
             law = place.touch.friction
             seen = law.observables(place.velocity, place.sigma, place.memory, place.tau)
             found |= {f"{own}{name}": (sp.sympify(e), unit) for name, (e, unit) in seen.items()}
+            contact = place.touch.contact
+            held = zip(contact.memory(), place.states, contact.memory_units(), strict=True)
+            found |= {f"{own}{name}": (symbol, unit) for name, symbol, unit in held}
         for element in self.mechanism.elements:
             if element.name:
                 resting = self._known(self._tension(element, self.statics.displacement, {}))

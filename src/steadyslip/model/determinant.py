@@ -102,7 +102,9 @@ class _Block:
 
     def __init__(self, rows: Rows, columns: Mapping[sp.Symbol, int], index: int, model: Model) -> None:
         contact = model.contacts[index]
-        self.own = [columns[item.symbol] for item in contact.memory] + [columns[contact.friction]]
+        self.own = [columns[item.symbol] for item in (*contact.memory, *contact.own_states)] + [
+            columns[contact.friction]
+        ]
         table = list(rows.values())
         square = [[table[i][j] for j in self.own] for i in self.own]
         outside = [j for j in columns.values() if j not in self.own and any(table[i][j] for i in self.own)]

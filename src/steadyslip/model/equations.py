@@ -20,8 +20,8 @@ from steadyslip.core.roles import Parameter
 class Variable:
     """A differential variable of the model: name, symbol, SI unit, meaning.
 
-    `kind` says what it is to the stages that must know: ``slip``, ``velocity``, ``memory`` (of friction) or
-    ``integral`` (of a controller).
+    `kind` says what it is to the stages that must know: ``slip``, ``velocity``, ``memory`` (of friction),
+    ``state`` (of a contact law) or ``integral`` (of a controller).
     """
 
     name: str
@@ -76,6 +76,8 @@ class Contact:
         Stresses T, τ and σ, which the Model's `definitions` define.
     memory : tuple of Variable
         The memory variables of its friction.
+    own_states : tuple of Variable
+        Those of its contact law, kind ``state``.
     balance : sympy.Expr
         Friction law minus τ by the balance of forces; zero in motion.
     unknown : sympy.Symbol
@@ -114,6 +116,7 @@ class Contact:
     imposed: sp.Expr
     direction: sp.Expr
     area: sp.Expr
+    own_states: tuple[Variable, ...] = ()
 
     @property
     def inertial(self) -> bool:
@@ -204,7 +207,7 @@ class Model(Keeper, Displayed):
     @property
     def has_closed_form(self) -> bool:
         """Whether the paper's cubic describes it: a slider with one memory variable and no integral control."""
-        return self.is_slider and len(self.memory) == 1 and not self.integrals
+        return self.is_slider and len(self.memory) == 1 and not self.integrals and not self.states
 
     @property
     def is_slider(self) -> bool:
@@ -230,6 +233,11 @@ class Model(Keeper, Displayed):
     def memory(self) -> tuple[Variable, ...]:
         """The memory variables of all contacts."""
         return tuple(item for item in self.variables if item.kind == "memory")
+
+    @cached_property
+    def states(self) -> tuple[Variable, ...]:
+        """The states of all contact laws."""
+        return tuple(item for item in self.variables if item.kind == "state")
 
     @cached_property
     def integrals(self) -> tuple[Variable, ...]:

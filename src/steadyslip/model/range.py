@@ -87,7 +87,7 @@ def _coefficient_function(model: Model) -> Callable[..., list[Array]]:
 def _steady_function(model: Model) -> Callable[..., list[Array]]:
     """Stresses and memory in steady sliding."""
     frictions = [model.steady[contact.friction] for contact in model.contacts]
-    return model.function([*frictions, *(model.steady[item.symbol] for item in model.memory)])
+    return model.function([*frictions, *(model.steady[item.symbol] for item in (*model.memory, *model.states))])
 
 
 @question

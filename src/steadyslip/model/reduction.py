@@ -224,6 +224,10 @@ def reduce_model(model: Model, eliminate: int | None = 0) -> Reduction:
     """
     if model.delays:
         raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
+    if model.states:
+        raise NotAvailable(
+            "motion of contacts with states of their own, such as pore fluid, is not offered; their verdict is"
+        )
     equations = _Equations(model)
     if model.inertial:
         return _inertial(model, equations)

@@ -98,7 +98,7 @@ class _Statement:
 
 
 def _values(motion: Motion) -> list[Any]:
-    return [getattr(motion, name) for name in Motion.__dataclass_fields__]
+    return [getattr(motion, name) for name in Motion.__dataclass_fields__ if not name.endswith("memory")]
 
 
 def check_contact_names(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:

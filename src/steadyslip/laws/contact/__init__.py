@@ -2,6 +2,7 @@
 
 from steadyslip.laws.contact.basic import Constant, Linear, Prescribed, pressed_at
 from steadyslip.laws.contact.compliant import Compliant
+from steadyslip.laws.contact.fluid import PoreFluid
 from steadyslip.laws.contact.law import ContactLaw, Motion, PreloadedContact
 from steadyslip.laws.contact.mechanisms import (
     DilatingLayer,
@@ -28,6 +29,7 @@ __all__ = [
     "Lift",
     "Linear",
     "Motion",
+    "PoreFluid",
     "PreloadedContact",
     "Prescribed",
     "SelfEnergising",

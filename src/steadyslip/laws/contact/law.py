@@ -34,6 +34,8 @@ class Motion:
     separation, steady_separation, separation_rate
         Distance (m) of the surfaces from where they just touch, in steady sliding too, and its rate (m/s). Only bodies
         of a machine that move away from the surface have one; a law that depends on it is `is_compliant`.
+    memory, steady_memory
+        The law's own states, in steady sliding too; empty for most.
     """
 
     slip: Expression
@@ -48,6 +50,8 @@ class Motion:
     separation: Expression = 0
     steady_separation: Expression = 0
     separation_rate: Expression = 0
+    memory: tuple[Expression, ...] = ()
+    steady_memory: tuple[Expression, ...] = ()
 
     @property
     def steady(self) -> Motion:
@@ -61,6 +65,7 @@ class Motion:
             separation_rate=0,
             spring=self.steady_spring,
             friction=self.steady_friction,
+            memory=self.steady_memory,
         )
 
 
@@ -109,6 +114,22 @@ class ContactLaw(FrozenRecord, family="contact law"):
     def coupling(self, motion: Motion) -> Expression:
         """Normal stress due to the motion (Pa)."""
         return 0
+
+    def memory(self) -> tuple[str, ...]:
+        """Names of the law's own states, which are continuous; empty for a law without."""
+        return ()
+
+    def memory_units(self) -> tuple[str, ...]:
+        """SI units of the states."""
+        return tuple("Pa" for _ in self.memory())
+
+    def rates(self, motion: Motion) -> tuple[Expression, ...]:
+        """Time derivatives of the states."""
+        return ()
+
+    def steady_memory(self, velocity: Expression) -> tuple[Expression, ...]:
+        """The states in steady sliding at a `velocity` > 0."""
+        return ()
 
     def is_imposed(self) -> bool:
         """Whether the normal stress is given from outside, whatever the block does."""

@@ -1,0 +1,38 @@
+"""A contact whose pores hold a fluid: slip dilates them, the fluid is sucked in, and presses less for a while."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from steadyslip.core.records import parameter
+from steadyslip.core.roles import positive, real
+from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
+
+
+class PoreFluid(PreloadedContact, name="pore-fluid"):
+    """Pore fluid with dilatancy and drainage (Segall & Rice 1995; theory 4): σ' = σ0 − p, the effective normal stress.
+
+    Porosity φ follows slip, φ̇ = −(v/d_c)[φ − φ0 − ε ln(v/v_ref)], and pore pressure p, counted from that around,
+    ṗ = −c* p − φ̇/β. Here both are pressures, D = (φ − φ0)/β and p, and `suction` is ε/β: by so much the pressure would
+    fall for each e-fold of velocity if nothing drained. `preload` is the effective one. For contacts of machines.
+    """
+
+    suction: float = parameter("Pa", real, "fall of pore pressure ε/β per e-fold of velocity, undrained")
+    drainage: float = parameter("1/s", positive, "rate c* at which pore pressure evens out", letter="c_d")
+    slip_distance: float = parameter("m", positive, "slip over which porosity follows", letter="d_p")
+    v_ref: float = parameter("m/s", positive, "velocity from which porosity counts", gauge=True)
+
+    def memory(self) -> tuple[str, ...]:
+        return ("dilation", "pore_pressure")
+
+    def rates(self, motion: Motion) -> tuple[Expression, ...]:
+        dilation, pressure = motion.memory
+        v = motion.velocity
+        opening = -v / self.slip_distance * (dilation - self.suction * sp.log(v / self.v_ref))
+        return opening, -self.drainage * pressure - opening
+
+    def steady_memory(self, velocity: Expression) -> tuple[Expression, ...]:
+        return self.suction * sp.log(velocity / self.v_ref), sp.Integer(0)
+
+    def coupling(self, motion: Motion) -> Expression:
+        return -motion.memory[1]

@@ -20,7 +20,7 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
 from steadyslip.files.sealed import write_sealed
 from steadyslip.kernels import build, driver_text, primitives
 from steadyslip.kernels.driver.jobs import start_job
-from steadyslip.kernels.layout import Cursor, Out, Routines, Row, make_layout
+from steadyslip.kernels.layout import TALLIED, Cursor, Out, Routines, Row, make_layout
 from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
 from steadyslip.kernels.printers import python as plain
@@ -250,11 +250,13 @@ def test_a_plain_program_is_readable():
 
 
 def test_no_two_quantities_of_a_record_share_a_place():
-    layout = make_layout(lanes=1, size=3, kept=4, constants=5, harmonics=2, stages=7, seen=2, own=3, events=4)
+    layout = make_layout(lanes=1, size=3, kept=4, constants=5, harmonics=2, stages=7, seen=2, own=3, events=8,
+                         massless=3, contacts=2)  # fmt: skip
     places = [(row, 1) for row in Row if row not in (Row.INPUT, Row.SLOPE)] + [(Row.INPUT, 3), (Row.SLOPE, 3)]
     places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 6)]
     places += [(layout.omega, 6), (layout.phase, 6), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
-    places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 4), (layout.happened, 4), (layout.counted, 8)]
+    places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 8), (layout.happened, 8), (layout.counted, 16)]
+    places += [(layout.guess, 2), (layout.elsewhere, 3), (layout.tallies, TALLIED), (layout.jumped, 4)]
     taken = [place + i for place, count in places for i in range(count)]
     assert sorted(taken) == list(range(layout.rows))
 

@@ -219,7 +219,7 @@ def test_changes_that_are_wrong(change, said):
 
 
 COMMANDS = [
-    ("simulate", "--until", "1 s"), ("cycles",), ("threshold",), ("explore", "-o", "a.html"),
+    ("cycles",), ("threshold",), ("explore", "-o", "a.html"),
     ("map", "-o", "a.zarr"), ("sensitivity",), ("analyze", "--kick", "velocity"),
     ("analyze", "--branch", "1"),
 ]  # fmt: skip
@@ -236,7 +236,7 @@ def test_what_machines_do_not_have_yet_is_refused_in_one_line(command, tmp_path)
 
 
 CALLS = [
-    lambda m: ss.simulate(m, until=1.0), lambda m: ss.simulate_many(m, {}, until=1.0), lambda m: ss.hopf(m),
+    lambda m: ss.hopf(m),
     lambda m: ss.cycles(m), lambda m: ss.threshold(m, kick="velocity"), lambda m: ss.critical_stiffness(m),
     lambda m: ss.stable_stiffness(m), lambda m: ss.small_signal(m), lambda m: ss.state_space(m),
     lambda m: ss.formula(m), lambda m: ss.explore(m), lambda m: ss.safety_factor(m),

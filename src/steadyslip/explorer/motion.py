@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import NotAvailable
+from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.explorer.equations import program
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
@@ -75,6 +75,8 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
     if not np.all(posed(point)):
         raise NotAvailable("the motion of the rig is ill-posed")
     eliminate = eliminable(point)
+    if isinstance(eliminate, tuple):
+        raise InternalError("a slider has one contact")
     reduction = reduce_model(point.model, eliminate)
     kernel = Kernel(reduction, Choice(automatic_method(reduction, OPTIONS.rtol), "constant", 0, 1, True))
     kernel_text = javascript.machine(kernel.programs, kernel.layout)

@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from steadyslip.core.errors import NoSteadySliding, ParameterError, Problem
+from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.core.quantities import shown, stress_name
+from steadyslip.figures import machine_motion
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -24,7 +25,9 @@ from steadyslip.figures.style import (
     labelled,
 )
 from steadyslip.kernels.layout import SLIP_EVENT
-from steadyslip.model.sliding import steady_state
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.model.sliding import SteadySliding, steady_state
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
@@ -38,7 +41,7 @@ _DECADES = 12.0  # a blow-up is drawn to this many decades above the drive
 
 
 def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
-    """Velocity, friction and normal stress in time, one panel each.
+    """Velocity, friction and normal stress in time, one panel each; of a machine, of every contact.
 
     Parameters
     ----------
@@ -56,16 +59,17 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
         If `ax` is not three Axes.
     """
     panels = _three(ax)
+    if isinstance(run.rig, Machine):
+        return machine_motion.history(run, panels)
+    area = run.rig.area
     factor, unit = display_unit("s", float(run.end) or 1.0)
     time = run["t"] / factor
     _velocity_panel(run, panels[0], time)
     panels[1].plot(time, run["friction"], color=BLUE)
     panels[1].set_ylabel("friction τ/σ (1)")
-    stress_factor, stress_unit = display_unit(
-        "Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)), run.rig.area
-    )
+    stress_factor, stress_unit = display_unit("Pa", float(np.nanmax(np.abs(run["normal_stress"]), initial=1.0)), area)
     panels[2].plot(time, run["normal_stress"] / stress_factor, color=BLUE)
-    panels[2].set_ylabel(labelled(stress_name("normal stress", run.rig.area), stress_unit))
+    panels[2].set_ylabel(labelled(stress_name("normal stress", area), stress_unit))
     panels[2].set_xlabel(labelled("time", unit))
     _keep_span(panels[1], run["friction"])
     _keep_span(panels[2], run["normal_stress"] / stress_factor)
@@ -172,20 +176,22 @@ def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: st
     -------
     matplotlib.axes.Axes
     """
-    ax = axes_or_new(ax)
+    if isinstance(run.rig, Machine):
+        raise NotAvailable("the phase plane is not offered for a machine, which has more variables; draw the history")
+    ax, area = axes_or_new(ax), run.rig.area
     drive = run.rig.drive.velocity
     moving = run["v"] > 0
     with np.errstate(all="ignore"):
         u = np.where(moving, np.log(np.where(moving, run["v"], 1.0) / drive), np.nan)
     shows = np.abs(u) < _DECADES * np.log(10)
-    factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), run.rig.area)
+    factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), area)
     x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
     ax.plot(x, y, color=color, label=label or None, linewidth=1)
     _arrows(ax, x, y, color)
     if not ax.get_xlabel():
-        _steady_line(run, ax, x, factor)
+        _steady_line(run, run.rig, ax, x, factor)
         ax.set_xlabel("ln(v/v0) (1)")
-        ax.set_ylabel(labelled(stress_name("spring stress", run.rig.area), unit))
+        ax.set_ylabel(labelled(stress_name("spring stress", area), unit))
     return ax
 
 
@@ -205,7 +211,12 @@ def _arrows(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:
         )
 
 
-def _steady_line(run: History, ax: Axes, x: np.ndarray, factor: float) -> None:
+def _steady_pull(rig: Slider, velocity: float) -> float:
+    state = steady_state(rig.with_values({"drive.velocity": velocity}))
+    return state.spring_stress if isinstance(state, SteadySliding) else math.nan
+
+
+def _steady_line(run: History, rig: Slider, ax: Axes, x: np.ndarray, factor: float) -> None:
     """Spring stress of steady sliding at other drive velocities, and the dot at the last one of the run."""
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     margin = 0.1 * (high - low) + 0.05
@@ -213,8 +224,8 @@ def _steady_line(run: History, ax: Axes, x: np.ndarray, factor: float) -> None:
     stress = []
     for u in steps:
         try:
-            velocity = run.rig.drive.velocity * float(np.exp(u))
-            stress.append(steady_state(run.rig.with_values({"drive.velocity": velocity})).spring_stress)
+            velocity = rig.drive.velocity * float(np.exp(u))
+            stress.append(_steady_pull(rig, velocity))
         except NoSteadySliding:
             stress.append(np.nan)
     pressed = any(piece.channel == NORMAL_STRESS for piece in Protocol.of(run.protocol).pieces)
@@ -223,8 +234,8 @@ def _steady_line(run: History, ax: Axes, x: np.ndarray, factor: float) -> None:
     last = float(run["load_velocity"][-1])
     if not pressed and last > 0:
         with suppress(NoSteadySliding):
-            level = steady_state(run.rig.with_values({"drive.velocity": last})).spring_stress / factor
-            u = np.log(last / run.rig.drive.velocity)
+            level = _steady_pull(rig, last) / factor
+            u = np.log(last / rig.drive.velocity)
             ax.plot([u], [level], "o", color=BLACK, markersize=4, label="_steady sliding")
     elif pressed:
         ax.legend(fontsize="small")

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import derivative
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Layout, make_layout
 from steadyslip.kernels.methods import METHODS, Method
 from steadyslip.kernels.rosenbrock import Pattern
 from steadyslip.kernels.source import Constants, Formulas
-from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction, W
+from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
 
 CHANNELS = ("v", "q", "p")
 LEVELS = ("constant", "linear", "harmonic")
@@ -65,7 +66,8 @@ class Formulation:
         self.method: Method = METHODS[choice.method]()
         self.size = self.counted = len(reduction.state)  # how many errors are averaged
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | _INPUT_NAMES | _SLOPE_NAMES
-        variables = {*reduction.state, *reduction.continuous, *INPUTS, *SLOPES[:3], sp.Symbol("w", real=True)}
+        own = (one.variable.w for one in reduction.slidings if one.variable is not None)
+        variables = {*reduction.state, *reduction.continuous, *INPUTS, *SLOPES[:3], *own}
         if reduction.unknown is not None:
             self.names[reduction.unknown] = "z"
             variables.add(reduction.unknown)
@@ -128,14 +130,16 @@ class Formulation:
     def _write(self) -> None:
         """All formulas; in this order their constants are numbered."""
         reduction, n = self.reduction, self.size
-        outputs = [self._fixed(reduction.outputs[name]) for name in OUTPUTS]
+        seen = [[self._fixed(one.outputs[name]) for name in OUTPUTS] for one in reduction.slidings]
+        outputs = [e for one in seen for e in one]
         self.residual: Formulas | None = None
         if reduction.unknown is not None and reduction.residual is not None:
             pair = (reduction.residual, derivative(reduction.residual, reduction.unknown))
             self.residual = self._formulas([self._fixed(e) for e in pair])
         self.rates = self._formulas(self._rates)
-        self.full = self._formulas(self._rates + outputs[:3])
-        self.outputs = self._formulas(outputs)
+        self.full = self._formulas(self._rates + [e for one in seen for e in one[:3]])
+        also = [*reduction.further.values(), *(one.slip for one in reduction.slidings)]
+        self.outputs = self._formulas(outputs + [self._fixed(e) for e in also])
         self.restored = self._formulas([self._fixed(e) for e in reduction.restored])
         self.pattern: Pattern = set()
         if self.method.implicit:
@@ -147,26 +151,45 @@ class Formulation:
                 entries += [self._fixed(e) for e in reduction.time_derivative()]
             self.jacobian = self._formulas(entries)
         self._write_velocity()
-        self.restart: Formulas | None = None
-        if reduction.restart is not None:
-            w = sp.Symbol("w", real=True)
-            known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | {w: "w"} | _INPUT_NAMES | _SLOPE_NAMES
-            pair = (reduction.restart, derivative(reduction.restart, w))
-            self.restart = Formulas([self._fixed(e) for e in pair], known)
+        known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | _INPUT_NAMES | _SLOPE_NAMES
+        known |= {w: f"w{k}" for k, (w, _) in enumerate(reduction.restarts)}
+        pairs = [self._fixed(e) for w, balance in reduction.restarts for e in (balance, derivative(balance, w))]
+        self.restart = Formulas(pairs, known) if pairs else None
+        self.shift = self._formulas([self._fixed(e) for e in reduction.shifts])
+        self.shares = self._formulas([self._fixed(e) for i in range(self.contacts) for e in self._shares(i)])
+
+    @property
+    def contacts(self) -> int:
+        """How many there are."""
+        return len(self.reduction.slidings)
+
+    def _shares(self, index: int) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+        """Of a contact in steady sliding: slip rate over the drive's and the first contact's, and σ over that one's."""
+        one, first = self.reduction.slidings[index], self.reduction.slidings[0]
+        stresses = [contact.sigma_ss for contact in self.reduction.model.contacts]
+        return one.ratio, one.ratio / first.ratio, stresses[index] / stresses[0]
 
     def _write_velocity(self) -> None:
         """Velocity as a function of w alone, and w of velocity, where w is integrated and memory is not needed."""
-        reduction, v = self.reduction, self.reduction.model.contact.velocity
-        speed, inverse = reduction.outputs["v"], reduction.w_of_v
+        reduction = self.reduction
+        self.speed: Formulas | None = None
+        self.limit: Formulas | None = None
+        if self.contacts > 1:
+            return
+        ((contact,), (sliding,)) = reduction.model.contacts, reduction.slidings
+        speed, v, own = sliding.outputs["v"], contact.velocity, sliding.variable
+        if own is None:
+            raise InternalError("a single contact has its own velocity variable")
+        inverse = own.w_of_v
         variables = {*reduction.state, *reduction.continuous, *INPUTS}
         if reduction.unknown is not None:
             variables.add(reduction.unknown)
-        self.speed: Formulas | None = None
-        self.limit: Formulas | None = None
-        alone = speed.free_symbols & variables == {W} and not inverse.free_symbols & variables and W in reduction.state
+        alone = speed.free_symbols & variables == {own.w} and not inverse.free_symbols & variables
+        if own.w not in reduction.state:
+            return
         if self.choice.dense and alone:
             self.speed = self._formulas([self._fixed(speed)])
-            self.limit = Formulas([self._fixed(inverse.xreplace({v: W}))], {W: "v"})
+            self.limit = Formulas([self._fixed(inverse.xreplace({v: own.w}))], {own.w: "v"})
 
     @property
     def terms(self) -> int:
@@ -175,7 +198,9 @@ class Formulation:
 
     def _made_layout(self) -> Layout:
         reduction, choice = self.reduction, self.choice
-        massless = reduction.restart is not None
+        massless = len(reduction.restarts)
+        own = [w for w, _ in reduction.restarts]
+        own += [one.variable.w for one in reduction.slidings if self.contacts == 1 and one.variable is not None]
         return make_layout(
             lanes=choice.lanes,
             size=self.size,
@@ -186,9 +211,10 @@ class Formulation:
             terms=self.terms,
             extra=choice.dense and self.method.all_stages > self.method.stages,
             massless=massless,
-            solved=massless and reduction.unknown is not None,
-            w=reduction.names.index("w") if "w" in reduction.names else -1,
-            x=reduction.names.index("x"),
-            events=len(EVENTS) if choice.dense else 0,
+            solved=massless > 0 and reduction.unknown is not None,
+            w=reduction.state.index(own[0]) if own and own[0] in reduction.state else -1,
+            contacts=self.contacts,
+            events=self.contacts * len(EVENTS) if choice.dense else 0,
+            further=len(reduction.further),
             watched=choice.lanes > 1 and self.speed is not None and reduction.unknown is None,
         )

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from steadyslip.kernels.driver.places import guess_at, marks_at, outputs_at, width
 from steadyslip.kernels.events import faster
-from steadyslip.kernels.formulation import Formulation
+from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Out, Row
 from steadyslip.kernels.nodes import Program, Value
-from steadyslip.kernels.record import Evaluator, horner, slope_of
+from steadyslip.kernels.record import Evaluator, horner, slope_of, times
 from steadyslip.kernels.step import Step
 from steadyslip.kernels.watch import Watch
 
@@ -26,7 +27,7 @@ class Kernel(Formulation):
         """All programs, in the order of `Routines`."""
         found: tuple[Program, ...] = (
             self._step(), self._rates_program(), self._outputs_program(), self._restore_program(),
-            self._place_program(), self._balance_program(), self._dense_program(),
+            self._shift_program(), self._place_program(), self._balance_program(), self._dense_program(),
         )  # fmt: skip
         if self.choice.dense:
             found = (*found, self._extend_program())
@@ -53,11 +54,13 @@ class Kernel(Formulation):
             record.program.store(self.layout.rate + i, found[i])
         for i, row in enumerate((Row.V, Row.ACCELERATION, Row.SIGMA)):
             record.program.store(row, found[self.size + i])
-        moment = record.moment(point, found[self.size :])
-        for e, value in enumerate(record.marks(moment) if self.choice.dense else ()):
+        for place, value in record.elsewhere(found[self.size :]):
+            record.program.store(place, value)
+        moments = record.moments(point, found[self.size :])
+        for e, value in enumerate(record.marks(moments) if self.choice.dense else ()):
             record.program.store(self.layout.mark + e, value)
         if self.choice.dense and self.limit is not None:
-            for row, v in ((Row.W_LIMIT, faster(moment)), (Row.W_LP, moment.v_lp)):
+            for row, v in ((Row.W_LIMIT, faster(moments[0])), (Row.W_LP, moments[0].v_lp)):
                 record.program.store(row, self.limit(record.constants | {"v": v})[0])
         record.keep_unknown()
         return record.program
@@ -71,16 +74,27 @@ class Kernel(Formulation):
         found = record.evaluated(self.outputs, point)
         if self.reduction.unknown is not None:
             program.store(n + Out.UNKNOWN, record.z, "y")
-        for i, value in enumerate(found):
-            program.store(n + i, value, "y")
-        program.store(n + Out.V_LP, point["in_v"], "y")
-        program.store(n + Out.Q, point["in_q"], "y")
-        program.store(n + Out.ADVANCE, record.load_advance(program.number), "y")
+        each = len(OUTPUTS)
+        seen = found[: each * self.contacts]
+        advance = record.load_advance(program.number)
+        moved = program.load(Row.LOAD_MOVED)
+        for c in range(self.contacts):
+            first, (ratio, share, _) = outputs_at(self.layout, c), record.shares(c)
+            for i in range(each):
+                program.store(first + i, seen[each * c + i], "y")
+            program.store(first + Out.V_LP, times(point["in_v"], ratio), "y")
+            program.store(first + Out.Q, point["in_q"], "y")
+            program.store(first + Out.ADVANCE, times(advance, ratio), "y")
+            place = found[len(seen) + len(self.reduction.further) + c] + times(moved, ratio) + times(advance, ratio)
+            program.store(first + Out.PLACE, place, "y")
+            program.store(first + Out.SHARE, share, "y")
         if self.choice.dense:
             if self.speed is not None:  # an extreme of velocity is one of the dense output in w
-                found[1] = program.load(n + Out.W_SLOPE, "y")
-            for e, value in enumerate(record.marks(record.moment(point, found))):
-                program.store(n + Out.COUNT + e, value, "y")
+                seen[1] = program.load(n + Out.W_SLOPE, "y")
+            for e, value in enumerate(record.marks(record.moments(point, seen))):
+                program.store(marks_at(self.layout) + e, value, "y")
+        for i in range(len(self.reduction.further)):
+            program.store(width(self.layout) - self.layout.further + i, found[len(seen) + i], "y")
         return program
 
     def _restore_program(self) -> Program:
@@ -93,12 +107,13 @@ class Kernel(Formulation):
         return record.program
 
     def _balance_program(self) -> Program:
-        """The balance as a function of w, after a jump or now; without one, velocity simply continues."""
+        """Balances as functions of their w, after a jump or now; without one, velocity simply continues."""
         record = Evaluator(self, Program("balance"))
         program = record.program
         found: list[Value] = [0.0, 1.0]
         if self.restart is not None:
-            point = record.inputs(program.load(Row.TAU)) | {"w": program.number}
+            point = record.inputs(program.load(Row.TAU))
+            point |= {f"w{k}": program.load(guess_at(self.layout, k)) for k in range(self.layout.massless)}
             point |= {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}
             found = self.restart(record.constants | point)
         for i, value in enumerate(found):
@@ -106,15 +121,24 @@ class Kernel(Formulation):
         return program
 
     def _place_program(self) -> Program:
-        """The state from the continuous variables and w."""
+        """The state from the continuous variables and the velocity variables that balances fix."""
         program, reduction = Program("place"), self.reduction
+        fixed = [w for w, _ in reduction.restarts]
         for i, symbol in enumerate(reduction.state):
-            value = program.number
             if symbol in reduction.continuous:
-                value = program.load(self.layout.continuous + reduction.continuous.index(symbol))
-            program.store(self.layout.state + i, value)
-        if reduction.unknown is not None and str(reduction.unknown) == "w":
-            program.store(Row.Z, program.number)
+                place = self.layout.continuous + reduction.continuous.index(symbol)
+            else:
+                place = guess_at(self.layout, fixed.index(symbol))
+            program.store(self.layout.state + i, program.load(place))
+        return program
+
+    def _shift_program(self) -> Program:
+        """A jump of the load point: everything falls behind by its own share."""
+        record = Evaluator(self, Program("shift"))
+        program = record.program
+        for i, share in enumerate(self.shift(record.constants)):
+            place = self.layout.continuous + i
+            program.store(place, program.load(place) - times(program.number, share))
         return program
 
     def _extend_program(self) -> Program:

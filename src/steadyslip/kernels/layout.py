@@ -56,6 +56,10 @@ class Row(IntEnum):
     """The unknown of the balance at the start of the last step."""
 
 
+TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
+"""Numbers from `Row.EVENTS` to `Row.NOW_SEGMENT`, of the first contact; those of others have a group of their own."""
+
+
 INPUTS = 3
 MOST_FAILURES = 400.0
 """Steps in a row that may be in vain. A block with mass that is stopped falls by hundreds of decades in a moment: so
@@ -67,10 +71,12 @@ SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, a
 class Out(IntEnum):
     """Places of the outputs, counted from the end of the state."""
 
-    V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, UNKNOWN, COUNT = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
-    """Q is the disturbance, ADVANCE the way of the load point since the start of the segment. W_SLOPE is the slope of
-    the dense output of the velocity variable and UNKNOWN a guess of the unknown of the balance: outputs need both.
-    Events follow from COUNT on. What `observe` gives ends with ADVANCE."""
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, UNKNOWN, PLACE, SHARE, COUNT = range(13)
+    """V_LP is the velocity of the load point as the contact feels it, Q the disturbance, ADVANCE the way of the load
+    point since the start of the segment. W_SLOPE is the slope of the dense output of the velocity variable and UNKNOWN
+    a guess of the unknown of the balance: outputs need both. PLACE is the distance slipped since the start of the run,
+    SHARE the slip rate in steady sliding over that of the first contact. Further contacts follow, COUNT numbers each,
+    then events, then what else is observed. What `observe` gives of a contact ends with ADVANCE."""
 
 
 class Setting(IntEnum):
@@ -102,7 +108,10 @@ class EventPlace(IntEnum):
 
 
 class Kind(IntEnum):
-    """What a row of the log says: 2 e + 1 where event number e falls, 2 e + 2 where it rises."""
+    """What a row of the log says: 2 e + 1 where event number e falls, 2 e + 2 where it rises.
+
+    Events of further contacts have higher numbers, in the same order.
+    """
 
     SLIP_ENDS, SLIP_BEGINS, PEAK, TROUGH, LOST = 1, 2, 3, 4, 5
 
@@ -147,15 +156,19 @@ class Layout(NamedTuple):
     """That are kept for dense output; none without."""
     extra: int
     """Whether dense output has stages of its own: then steps are long."""
+    contacts: int
     events: int
-    """That are watched; none without dense output."""
+    """That are watched, of all contacts; none without dense output."""
+    further: int
+    """How many other quantities are observed."""
     watched: int
     """Whether frequent events are found in all lanes at once."""
     massless: int
+    """How many balances fix a velocity variable after a jump."""
     solved: int
     """Whether the balance has to be solved to restore the variables that jumps leave alone."""
     w: int
-    """Place of the velocity variable in the state, -1 if it is not there."""
+    """Place in the state of the velocity variable, or the first of those that balances fix; -1 if none is there."""
     own: int
     """Length of the state without sensitivities."""
     directions: int
@@ -181,13 +194,21 @@ class Layout(NamedTuple):
     """How often each kind of event happened."""
     seen: int
     before: int
+    guess: int
+    """Guesses of further velocity variables that balances fix."""
+    elsewhere: int
+    """Velocity, normal stress and velocity again at further contacts, the latter two as shares of the first's."""
+    tallies: int
+    """What is known about slip events of further contacts."""
+    jumped: int
+    """Of each contact: velocity before a jump, and whether it slipped."""
     rows: int
 
 
 def make_layout(
     *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, terms: int = 0,
-    massless: bool = False, solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0,
-    seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False,
+    massless: int = 0, solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0,
+    seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False, contacts: int = 1, further: int = 0,
 ) -> Layout:  # fmt: skip
     """Put the groups one behind the other."""
     waves = INPUTS * harmonics
@@ -197,6 +218,8 @@ def make_layout(
         "curve": size * terms if stages else 0,
         "mark": events, "happened": events, "counted": 2 * events, "seen": seen,
         "before": own if seen else 0,
+        "guess": max(massless - 1, 0), "elsewhere": 3 * (contacts - 1), "tallies": TALLIED * (contacts - 1),
+        "jumped": 2 * contacts if events else 0,
     }  # fmt: skip
     places, position = {}, max(Row) + 1
     for name, count in sizes.items():
@@ -204,8 +227,8 @@ def make_layout(
         position += count
     return Layout(
         lanes=lanes, size=size, kept=kept, constants=constants, harmonics=harmonics, stages=stages,
-        massless=int(massless), solved=int(solved), w=w, own=own, directions=directions, x=x, events=events,
-        watched=int(watched), extra=int(extra), rows=position, **places,
+        massless=massless, solved=int(solved), w=w, own=own, directions=directions, x=x, events=events,
+        watched=int(watched), extra=int(extra), contacts=contacts, further=further, rows=position, **places,
     )  # fmt: skip
 
 
@@ -225,8 +248,9 @@ class Routines(NamedTuple):
     outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events;
         the unknown of the balance is looked for near ``array[size + Out.UNKNOWN]``, and stands there afterwards
     restore : the variables that a jump leaves alone, from the record's state; what the load point moved is added up
-    place : the record's state from them and the velocity variable `number`
-    balance : ``array`` = residual of the balance of forces at velocity variable `number`, and its slope
+    shift : these, when the load point has jumped ahead by `number`
+    place : the record's state from them and from the velocity variables that balances fix
+    balance : ``array`` = residual and slope of each balance of forces at the record's guesses of velocity variables
     dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`, `Out.UNKNOWN`
     extend : the dense output of the last step, made ready for `dense`
     watch_lanes : of every lane: frequent events within the last step, found and tallied
@@ -237,6 +261,7 @@ class Routines(NamedTuple):
     rates: Routine
     outputs: Routine
     restore: Routine
+    shift: Routine
     place: Routine
     balance: Routine
     dense: Routine

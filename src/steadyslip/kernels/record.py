@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 from steadyslip.kernels.events import EVENTS
-from steadyslip.kernels.formulation import CHANNELS, Formulation
+from steadyslip.kernels.formulation import CHANNELS, OUTPUTS, Formulation
 from steadyslip.kernels.layout import Row
-from steadyslip.kernels.nodes import Loop, Node, Program, Value, larger, primitive, select, smaller, weighted
+from steadyslip.kernels.nodes import Loop, Node, Program, Value, as_node, larger, primitive, select, smaller, weighted
 from steadyslip.kernels.source import Formulas
 from steadyslip.protocol.inputs import integral_to, level_at, slope_at
 
@@ -27,6 +27,11 @@ def sine(x: Value) -> Node:
 def cosine(x: Value) -> Node:
     """Of a node."""
     return primitive("cos", x)
+
+
+def times(value: Value, share: Value) -> Value:
+    """A product, left out where the share is one."""
+    return value if not isinstance(share, Node) and share == 1 else share * value
 
 
 def horner(coefficients: Sequence[Value], x: Node) -> Value:
@@ -56,6 +61,7 @@ class Moment:
 
     record: Evaluator
     point: Values
+    contact: int
     v: Any
     acceleration: Any
     sigma: Any
@@ -73,7 +79,8 @@ class Moment:
         return self._output(4)
 
     def _output(self, place: int) -> Value:
-        return self.record.kernel.outputs(self.record.constants | self.point | {"z": self.record.z})[place]
+        found = self.record.kernel.outputs(self.record.constants | self.point | {"z": self.record.z})
+        return found[len(OUTPUTS) * self.contact + place]
 
 
 class Evaluator:
@@ -129,7 +136,8 @@ class Evaluator:
     def _solved(self, residual: Formulas, point: Values) -> Value:
         """Newton's method for the unknown, a fixed number of steps; the failure is NaN."""
         reduction = self.kernel.reduction
-        clamped = not (str(reduction.unknown) == "a_x" or reduction.velocity == "linear")
+        linear = [one.variable.w for one in reduction.slidings if one.variable and one.variable.kind == "linear"]
+        clamped = bool(reduction.restarts) and reduction.unknown not in linear
 
         def improved(z: Node) -> tuple[list[Value], list[Value]]:
             value, slope = residual(self.constants | point | {"z": z})
@@ -196,12 +204,36 @@ class Evaluator:
 
     # -- events
 
-    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> Moment:
-        """What events are functions of, from the outputs v, acceleration and sigma at a point."""
-        v, acceleration, sigma = found[:3]
-        limits = {"v_low": self.program.load(Row.V_LOW), "sigma_low": self.program.load(Row.SIGMA_LOW)}
-        return Moment(self, point, v, acceleration, sigma, v_lp=point["in_v"], h=h, **limits)
+    def shares(self, contact: int) -> list[Value]:
+        """See `Formulation`."""
+        return self.kernel.shares(self.constants)[3 * contact : 3 * contact + 3]
 
-    def marks(self, moment: Moment) -> list[Value]:
+    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> Moment:
+        """What events are functions of, from the outputs v, acceleration and sigma of a contact at a point."""
+        v, acceleration, sigma = found[:3]
+        ratio, share, pressed = self.shares(contact)
+        limits = {
+            "v_lp": times(point["in_v"], ratio),
+            "v_low": times(self.program.load(Row.V_LOW), share),
+            "sigma_low": times(self.program.load(Row.SIGMA_LOW), pressed),
+        }
+        return Moment(self, point, contact, v, acceleration, sigma, h=h, **limits)
+
+    def moments(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> list[Moment]:
+        """Of all contacts, from as many outputs of each as there are."""
+        each = len(found) // self.kernel.contacts
+        return [self.moment(point, found[c * each :], h, c) for c in range(self.kernel.contacts)]
+
+    def elsewhere(self, found: Sequence[Value]) -> list[tuple[int, Value]]:
+        """What the record holds of further contacts, and where, from v, acceleration and sigma of all."""
+        stored: list[tuple[int, Value]] = []
+        for c in range(1, self.kernel.contacts):
+            v, _, sigma = found[3 * c : 3 * c + 3]
+            _, share, pressed = self.shares(c)
+            first = self.kernel.layout.elsewhere + 3 * (c - 1)
+            stored += [(first, v), (first + 1, sigma / as_node(pressed)), (first + 2, v / as_node(share))]
+        return stored
+
+    def marks(self, moments: Sequence[Moment]) -> list[Value]:
         """Functions of all events."""
-        return [event.function(moment) for event in EVENTS]
+        return [event.function(moment) for moment in moments for event in EVENTS]

@@ -54,7 +54,7 @@ class Runner:
         return _constants(point, self).copy() if point.size == 1 else self._table(point)
 
     def _table(self, point: OperatingPoint) -> np.ndarray:
-        found = self._constants(*map(np.asarray, point.arguments), point.stresses)
+        found = self._constants(*map(np.asarray, point.arguments), *map(np.atleast_1d, point.sigmas))
         size = max([1, *(np.size(value) for value in found)])
         table = np.empty((size, len(found)))
         for column, value in enumerate(found):
@@ -62,12 +62,13 @@ class Runner:
         return table
 
     def settings(self, values: Mapping[str, Any], atol: np.ndarray) -> np.ndarray:
-        """Rows of settings by name, `atol` (rigs or 1, state) last."""
+        """Rows of settings by name, then `atol` (rigs or 1, state), then guesses of further velocity variables."""
         size = max([len(atol), *(np.size(value) for value in values.values())])
-        table = np.empty((size, len(SETTINGS) + self.kernel.size))
+        further = max(self.kernel.layout.massless - 1, 0)
+        table = np.zeros((size, len(SETTINGS) + self.kernel.size + further))
         for column, name in enumerate(SETTINGS):
             table[:, column] = values[name]
-        table[:, len(SETTINGS) :] = atol
+        table[:, len(SETTINGS) : len(SETTINGS) + self.kernel.size] = atol
         return table
 
 
@@ -77,7 +78,9 @@ def _constants(point: OperatingPoint, machine: Runner) -> np.ndarray:
 
 
 @question
-def runner(model: Model, choice: Choice, eliminate: int | None = 0) -> Runner:
+def runner(
+    model: Model, choice: Choice, eliminate: int | tuple[int | None, ...] | None = 0, push: str = "", press: str = ""
+) -> Runner:
     """The kernel of a model; made once per process."""
-    reduction = reduce_model(model, eliminate)
+    reduction = reduce_model(model, eliminate, push, press)
     return Runner(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Runner(reduction, choice)

@@ -129,7 +129,7 @@ class Step(Evaluator):
             self._keep_stages()
         self._keep_state()
         before = [load(row) for row in (Row.V, Row.ACCELERATION, Row.SIGMA)]
-        v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs, before, strict=True))
+        v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs[:3], before, strict=True))
         for row, value in ((Row.V, v), (Row.ACCELERATION, acceleration), (Row.SIGMA, sigma)):
             store(row, value)
         moved = select(good, self.after, self.tau)
@@ -149,6 +149,11 @@ class Step(Evaluator):
             sigma <= load(Row.SIGMA_LOW),
             moved > load(Row.NEXT),
         ]
+        for c, (place, value) in enumerate(self.elsewhere(self.outputs)):
+            store(place, select(good, value, load(place)))
+            if c % 3:
+                lost, away = value <= load(Row.SIGMA_LOW), abs(as_node(value)) >= load(Row.V_HIGH)
+                reasons.append(good & (lost if c % 3 == 1 else away))
         flag = total([select(reason, 1.0, 0.0) for reason in reasons])
         flag = flag + load(Row.RECORD) * select(good, 1.0, 0.0)
         if self.kernel.choice.dense:
@@ -172,9 +177,10 @@ class Step(Evaluator):
     def _events(self) -> Node:
         """Which functions of events changed sign; returns how many, where that is watched."""
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
-        at = self.moment(self.here, self.outputs, self.h)
+        moments = self.moments(self.here, self.outputs, self.h)
         count = as_node(0.0)
-        for e, (event, value) in enumerate(zip(EVENTS, self.marks(at), strict=True)):
+        for e, value in enumerate(self.marks(moments)):
+            event, at = EVENTS[e % len(EVENTS)], moments[e // len(EVENTS)]
             before = load(layout.mark + e)
             small = event.rounding(at) if event.rounding is not None else 0.0
             change = as_node(0.0)
@@ -186,11 +192,11 @@ class Step(Evaluator):
             change = change * load(Row.WATCH)
             store(layout.happened + e, change)
             for kind, own in ((2 * e, change < 0.0), (2 * e + 1, change > 0.0)):
-                if COUNTED[kind]:
+                if COUNTED[kind % len(COUNTED)]:
                     place = layout.counted + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
             store(layout.mark + e, select(self.good, value, before))
-            if e not in tuple(EventPlace):  # its count is all there is to the tally
+            if e % len(EVENTS) not in tuple(EventPlace):  # its count is all there is to the tally
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)

@@ -104,8 +104,6 @@ class Mechanism:
     ----------
     velocity
         Of the drive.
-    disturbed : str
-        The coordinate on which a disturbance acts, and beside whose contact the normal stress is disturbed.
     gain
         Stiffness that a controller adds to that of the slider.
     axial_share
@@ -117,6 +115,5 @@ class Mechanism:
     integral: Integral | None
     touches: tuple[Touch, ...]
     velocity: Any
-    disturbed: str = ""
     gain: Any = 0
     axial_share: Any = None

@@ -107,7 +107,6 @@ class Slider(Rig, section="slider"):
             integral=None if ki is None else Integral({"x": 1}, {"x": 1}, ki),
             touches=(Touch("", self.friction, self.contact, {"x": 1}, {}, 1),),
             velocity=drive.velocity,
-            disturbed="x",
             gain=drive.proportional(),
             axial_share=None if self.axial_stiffness is None else self.contact.sliding_stiffness(1),
         )

@@ -42,6 +42,7 @@ class _Place:
     sigma_ss: sp.Symbol
     memory: tuple[sp.Symbol, ...]
     states: tuple[sp.Symbol, ...]
+    press: sp.Symbol
 
     @cached_property
     def tau_ss(self) -> sp.Expr:
@@ -80,6 +81,7 @@ class _Assembly:
             return {n: sp.Symbol(alone if self.single else letter(f"{n}.{of}"), real=True) for n in names}
 
         self.x, self.v, self.a = symbols("x", "x"), symbols("v", "v"), symbols("a", "a_x")
+        self.push = {names[0]: Q} if self.single else symbols("q", "q")
         self.moving = self.v | {LOAD_POINT: V_LP}
         self.speeds = {c.name: sp.sympify(c.speed) for c in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
         self.places = [self._place(touch) for touch in mechanism.touches]
@@ -112,6 +114,7 @@ class _Assembly:
             symbol("sigma_ss", positive=True),
             memory,
             states,
+            P if self.single else symbol("p", real=True),
         )
 
     @cached_property
@@ -208,7 +211,7 @@ class _Assembly:
                 self.definitions[place.velocity] = row_of(place.touch.slip, self.moving)
         self.motions = [self._seen(place) for place in self.places]
         self.normal = [
-            sp.sympify(p.touch.contact.normal_stress(m)) + (P if self._disturbs(p) else 0)
+            sp.sympify(p.touch.contact.normal_stress(m)) + p.press
             for p, m in zip(self.places, self.motions, strict=True)
         ]
         self.inertial = {
@@ -250,16 +253,13 @@ class _Assembly:
         (place,), (body,) = self.places, self.mechanism.coordinates
         held = -sp.Add(*(self._tension(one, self.x, self.moving) for one in self._held()))
         found = place.spring + (held + body.force - body.inertia * self.a[body.name]) / place.touch.area
-        return found + Q if self._disturbs(place) else found
-
-    def _disturbs(self, place: _Place) -> bool:
-        return bool(self.mechanism.disturbed) and self.mechanism.disturbed in place.touch.slip
+        return found + self.push[body.name] / place.touch.area
 
     def _balance(self, name: str, inertia: Any) -> sp.Expr | None:
         """Inertia less forces of a coordinate, those that are the same in steady sliding left out on both sides."""
         if self.single:
             return None
-        total = inertia * self.a[name] - self._pull(name, list(self.mechanism.elements))
+        total = inertia * self.a[name] - self._pull(name, list(self.mechanism.elements)) - self.push[name]
         for one in self.mechanism.elements:  # what a dashpot that moves steadily carries, springs carry the other way
             total -= one.acts.get(name, 0) * self._tension(one, {}, self.speeds)
         for place in self.places:
@@ -275,14 +275,17 @@ class _Assembly:
             Coordinate(
                 one.name, self.x[one.name], self.v[one.name], self.a[one.name], sp.sympify(one.inertia),
                 sp.sympify(one.speed), self.inertial[one.name], self._balance(one.name, one.inertia), one.unit,
+                self.push[one.name],
             )
             for one in self.mechanism.coordinates
         )  # fmt: skip
         contacts = tuple(map(self._contact, range(len(self.places))))
         variables, rates = self._variables(coordinates, contacts)
-        inputs = {"load_velocity": V_LP, "disturbance": Q, "normal_disturbance": P, "time": TIME}
-        if not self.mechanism.disturbed:
-            inputs = {"load_velocity": V_LP, "time": TIME}
+        disturbances = {"disturbance": Q, "normal_disturbance": P}
+        if not self.bare:
+            disturbances = {f"{one.name}.push": one.push for one in coordinates}
+            disturbances |= {f"{one.name}.press": one.press for one in contacts}
+        inputs = {"load_velocity": V_LP, **disturbances, "time": TIME}
         share = self.mechanism.axial_share
         return Model(
             variables=variables,
@@ -331,6 +334,7 @@ class _Assembly:
             imposed=sp.sympify(contact.imposed(TIME)),
             direction=sp.sympify(friction.direction(place.velocity, place.speed)),
             area=sp.sympify(place.touch.area),
+            press=place.press,
         )
 
     def _strength(self, place: _Place) -> sp.Expr:
@@ -382,7 +386,8 @@ class _Assembly:
             found |= dict(zip(place.memory, map(sp.sympify, memory), strict=True))
             found |= dict(zip(place.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
-        return found | {V_LP: sp.sympify(self.mechanism.velocity), Q: zero, P: zero}
+        none = dict.fromkeys((*self.push.values(), *(place.press for place in self.places)), zero)
+        return found | {V_LP: sp.sympify(self.mechanism.velocity)} | none
 
     def _observables(self) -> dict[str, tuple[sp.Expr, str]]:
         """The named results that every stage shows, with units; totals where contacts have names."""

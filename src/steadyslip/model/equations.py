@@ -49,6 +49,8 @@ class Coordinate:
         Inertia less forces, zero in motion; None where the balance of a contact stands in its place.
     unit : str
         Of the displacement.
+    push : sympy.Symbol
+        A disturbance that acts on it, a force or torque; on a slider a stress.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Coordinate:
     inertial: bool
     balance: sp.Expr | None
     unit: str
+    push: sp.Symbol
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +88,8 @@ class Contact:
         gives τ, `acceleration`, or without inertia `velocity`.
     area : sympy.Expr
         Over which the stresses act.
+    press : sympy.Symbol
+        A disturbance of the normal stress.
     sigma_ss : sympy.Symbol
         Normal stress in steady sliding.
     steady_stress : sympy.Expr
@@ -116,6 +121,7 @@ class Contact:
     imposed: sp.Expr
     direction: sp.Expr
     area: sp.Expr
+    press: sp.Symbol
     own_states: tuple[Variable, ...] = ()
 
     @property
@@ -150,7 +156,8 @@ class Model(Keeper, Displayed):
     coordinates : tuple of Coordinate
     contacts : tuple of Contact
     inputs : dict of str to sympy.Symbol
-        Load-point velocity, disturbance stress q, normal-stress disturbance (B4 of eq. 12), time.
+        Load-point velocity, disturbance stress q, normal-stress disturbance (B4 of eq. 12), time; of machines,
+        pushes at every coordinate and normal-stress disturbances at every contact.
     parameters : dict of str to sympy.Symbol
         By dotted name. ``slider.stiffness`` is always the component along the sliding direction.
     roles : dict of str to Parameter

@@ -1,12 +1,16 @@
-"""A Model as an ordinary differential equation: which variables are integrated and how velocity is found.
+"""A Model as an ordinary differential equation: which variables are integrated and how velocities are found.
 
-A massless model fixes its velocity by one scalar equation, the balance of forces. `reduce_model` turns that
-into explicit rates in one of three ways and records which:
+A contact brings a velocity variable w, which takes the place of one velocity of a body (`kinematics.py`). Coordinates
+with inertia have accelerations, from their balances of forces. Without inertia the balance fixes the velocity of the
+contact that acts there, and `reduce_model` turns that into explicit rates in one of three ways and records which:
 
 - *eliminated*: logarithmic laws. ln v is integrated and one memory variable follows from the balance, which
   is linear in it; no equation is left to solve and nothing can drift.
 - *explicit*: the unknown (velocity variable, or acceleration with inertia) has a closed form.
 - *implicit*: it is found by Newton's method at every evaluation.
+
+Where nothing rubs on a coordinate without inertia its balance is linear; it is solved for the velocity or, without a
+dashpot, for the displacement.
 
 The velocity variable w is ln(v/v0) where a law is singular at rest, the argument of the regularised law's
 asinh where there is one (exact through rest and reversal), v itself otherwise.
@@ -14,18 +18,54 @@ asinh where there is one (exact through rest and reversal), v itself otherwise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import sympy as sp
 
 from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.core.expressions import asinh_exp, derivative
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import Keeper, question
-from steadyslip.model.equations import Model
+from steadyslip.model.equations import Contact, Coordinate, Model
+from steadyslip.model.kinematics import (
+    VelocityVariable,
+    W,
+    in_variables,
+    kinematics,
+    only,
+    solved_in_turn,
+    solved_together,
+)
 
+__all__ = ["INPUTS", "SLOPES", "TIME", "V_LP", "P", "Q", "Reduction", "Sliding", "W", "reduce_model"]
 Row = dict[sp.Symbol, sp.Expr]
 STANDSTILL = -200
 """Of ln(v/v0): a block with mass slower than this keeps still to every purpose; products of 1/v stay numbers there."""
+V_LP, Q, P, TIME = sp.symbols("v_lp q p t", real=True)
+INPUTS = (V_LP, Q, P, TIME)
+SLOPES = (*sp.symbols("v_lp_dot q_dot p_dot", real=True), sp.Integer(1))
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """A contact in motion.
+
+    Attributes
+    ----------
+    variable : VelocityVariable or None
+        Its velocity variable; None where its velocity follows from those of others.
+    outputs : dict of str to sympy.Expr
+        v, acceleration, sigma, tau and T.
+    slip : sympy.Expr
+        How far it is ahead of steady sliding.
+    ratio : sympy.Expr
+        Slip rate over the velocity of the drive, in steady sliding.
+    """
+
+    variable: VelocityVariable | None
+    outputs: Mapping[str, sp.Expr]
+    slip: sp.Expr
+    ratio: sp.Expr
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,28 +79,29 @@ class Reduction(Keeper):
     ----------
     form : str
         ``eliminated``, ``explicit`` or ``implicit``.
-    velocity : str
-        Meaning of w: ``logarithm``, ``asinh`` or ``linear``.
     state : tuple of sympy.Symbol
-        What is integrated: x, w (unless massless and not eliminated), memory variables, integral.
+        What is integrated: displacements, velocity variables (unless massless and not eliminated), memory variables,
+        integral.
     names : tuple of str
-        Names of the state variables; ``w`` is the velocity variable.
+        Names of the state variables; ``w`` is the velocity variable, with the contact's name before it if it has one.
     continuous : tuple of sympy.Symbol
-        What a jump of the inputs leaves unchanged: x, velocity (with inertia), memory, integral.
+        What a jump of the inputs leaves unchanged: displacements, velocities (with inertia), memory, integral.
     rates : tuple of sympy.Expr
         d(state)/dt.
     unknown : sympy.Symbol or None
         What Newton's method finds, in form *implicit*: w or the acceleration.
     residual : sympy.Expr or None
         Its equation, in form *implicit*.
-    restart : sympy.Expr or None
-        Massless: the balance as an equation for w, to be solved after a jump, in terms of `continuous`.
+    restarts : tuple of (sympy.Symbol, sympy.Expr)
+        Without inertia: velocity variables and the balances that fix them after a jump, in terms of `continuous`.
     restored : tuple of sympy.Expr
         `continuous` from the state.
-    outputs : dict of str to sympy.Expr
-        v, acceleration, sigma, tau, T and the memory variables.
-    w_of_v : sympy.Expr
-        The velocity variable from v and the memory.
+    slidings : tuple of Sliding
+        The contacts, in the order of the Model.
+    shifts : tuple of sympy.Expr
+        How far each displacement moves back, the first ones of `continuous`, when the load point jumps ahead by one.
+    further : dict of str to sympy.Expr
+        What else is observed: velocity, acceleration and displacement of the coordinates of machines.
     directions : tuple of tuple of sympy.Symbol
         State variables (see `steadyslip.model.variational`) that answer to changes of the constants, one tuple
         for each independent change; the kernel adds that to their `rates`, in the order of the first variables
@@ -69,18 +110,34 @@ class Reduction(Keeper):
 
     model: Model
     form: str
-    velocity: str
     state: tuple[sp.Symbol, ...]
     names: tuple[str, ...]
     continuous: tuple[sp.Symbol, ...]
     rates: tuple[sp.Expr, ...]
     unknown: sp.Symbol | None
     residual: sp.Expr | None
-    restart: sp.Expr | None
+    restarts: tuple[tuple[sp.Symbol, sp.Expr], ...]
     restored: tuple[sp.Expr, ...]
-    outputs: dict[str, sp.Expr]
-    w_of_v: sp.Expr
+    slidings: tuple[Sliding, ...]
+    shifts: tuple[sp.Expr, ...]
+    further: Mapping[str, sp.Expr] = field(default_factory=dict)
     directions: tuple[tuple[sp.Symbol, ...], ...] = ()
+
+    @property
+    def velocity(self) -> str:
+        """Meaning of w of a single contact: ``logarithm``, ``asinh`` or ``linear``."""
+        return only(one.variable for one in self.slidings).kind
+
+    @property
+    def w_of_v(self) -> sp.Expr:
+        """The velocity variable of a single contact from its velocity and memory."""
+        return only(one.variable for one in self.slidings).w_of_v
+
+    @property
+    def outputs(self) -> Mapping[str, sp.Expr]:
+        """v, acceleration, sigma, tau and T of a single contact."""
+        (one,) = self.slidings
+        return one.outputs
 
     @property
     def inputs(self) -> tuple[sp.Symbol, ...]:
@@ -107,254 +164,322 @@ class Reduction(Keeper):
         ]
 
 
-V_LP, Q, P, TIME = sp.symbols("v_lp q p t", real=True)
-INPUTS = (V_LP, Q, P, TIME)
-SLOPES = (*sp.symbols("v_lp_dot q_dot p_dot", real=True), sp.Integer(1))
-W = sp.Symbol("w", real=True)
-
-
-class _Equations:
-    """A Model's equations with the velocity written through w, and derivatives through T, τ and σ."""
-
-    def __init__(self, model: Model) -> None:
-        self.model, contact = model, model.contact
-        self.x, self.v, self.acceleration = contact.slip, contact.velocity, contact.acceleration
-        self.tau, self.sigma, self.spring = contact.friction, contact.normal, contact.spring
-        self.memory = tuple(item.symbol for item in model.memory)
-        self.integrals = tuple(item.symbol for item in model.integrals)
-        self.velocity, self.of_w, self.w_of_v = _velocity_variable(model, self.memory)
-
-        def written(expression: sp.Expr) -> sp.Expr:
-            smooth = expression.replace(sp.sign, lambda argument: contact.direction.xreplace({self.v: argument}))
-            return _in_w(smooth, self.v, self.of_w, self.velocity, model)
-
-        pressed = P + contact.imposed.xreplace({model.inputs["time"]: TIME})
-        given = {
-            model.inputs["load_velocity"]: V_LP,
-            model.inputs["disturbance"]: Q,
-            model.inputs["normal_disturbance"]: pressed,
-            model.inputs["time"]: TIME,
-        }
-        self.definitions = {s: written(e.xreplace(given)) for s, e in model.definitions.items()}
-        self.balance = written(contact.balance.xreplace(given))
-        self.rates = {symbol: written(rate.xreplace(given)) for symbol, rate in model.rate_of.items()}
-
-    def inlined(self, expression: sp.Expr) -> sp.Expr:
-        """T, τ and σ replaced by what they are, in w."""
-        return self.model.inlined(expression, self.definitions)
-
-
-def _velocity_variable(model: Model, memory: tuple[sp.Symbol, ...]) -> tuple[str, sp.Expr, sp.Expr]:
-    """The kind of w, v as a function of it, and the other way round."""
-    contact = model.contact
-    v = contact.velocity
-    everything = [contact.balance, *model.rates, *model.definitions.values()]
-    for expression in (contact.balance, *model.definitions.values()):
-        if _singular_at_rest(expression, v):
-            scale = model.parameters["drive.velocity"]
-            return "logarithm", scale * sp.exp(W), sp.log(v / scale)
-    regularised = {primitive for e in everything for primitive in e.atoms(asinh_exp) if primitive.has(v)}
-    if len(regularised) == 1:
-        scaled, exponent = regularised.pop().args
-        factor = scaled / v
-        reference = _at_steady_stress(exponent, model)
-        if not factor.has(v) and not exponent.has(v) and reference.free_symbols & set(memory):
-            return "asinh", sp.sinh(W) * sp.exp(-reference) / factor, asinh_exp(scaled, reference)
-    return "linear", W, v
-
-
-def _at_steady_stress(exponent: sp.Expr, model: Model) -> sp.Expr:
-    """The exponent of the regularised law with memory as it is, stresses as in steady sliding."""
-    contact = model.contact
-    return exponent.xreplace({stress: model.steady[stress] for stress in (contact.friction, contact.normal)})
-
-
-def _singular_at_rest(expression: sp.Expr, v: sp.Symbol) -> bool:
-    """Whether an expression has ln v or a negative or fractional power of v in it."""
-    for logarithm in expression.atoms(sp.log):
-        if logarithm.has(v) and logarithm.args[0].xreplace({v: sp.Integer(0)}) == 0:
-            return True
-    return any(
-        power.base.xreplace({v: sp.Integer(0)}) == 0 and not (power.exp.is_integer and power.exp.is_positive)
-        for power in expression.atoms(sp.Pow)
-        if power.base.has(v)
-    )
-
-
-def _in_w(expression: sp.Expr, v: sp.Symbol, of_w: sp.Expr, kind: str, model: Model) -> sp.Expr:
-    """Write an expression in w, so that ln v and the regularised law become linear in it."""
-    if kind == "logarithm":
-        scale = model.parameters["drive.velocity"]
-
-        def log_of(argument: sp.Expr) -> sp.Expr:
-            rest = argument / v
-            return sp.log(argument) if rest.has(v) else W + sp.log(scale * rest)
-
-        expression = expression.replace(sp.log, log_of).replace(sp.Abs, lambda a: a if (a / v).is_positive else abs(a))
-        expression = expression.replace(_is_product_with_sum, lambda product: sp.expand_mul(product, deep=False))
-    elif kind == "asinh":
-
-        def regularised(x: sp.Expr, y: sp.Expr) -> sp.Expr:
-            if not x.has(v):
-                return asinh_exp(x, y)
-            rest = y - _at_steady_stress(y, model)
-            return W if rest == 0 else asinh_exp(sp.sinh(W), rest)
-
-        expression = expression.replace(asinh_exp, regularised)
-    return expression.xreplace({v: of_w})
-
-
-def _is_product_with_sum(expression: sp.Expr) -> bool:
-    """Whether this is a plain factor times (w + constant), which has to be spread for terms to cancel."""
-    if not expression.is_Mul or sum(factor.is_Add for factor in expression.args) != 1:
-        return False
-    return any(factor.is_Add and W in factor.args for factor in expression.args)
-
-
 @question
-def reduce_model(model: Model, eliminate: int | None = 0) -> Reduction:
+def reduce_model(
+    model: Model, eliminate: int | tuple[int | None, ...] | None = 0, push: str = "", press: str = ""
+) -> Reduction:
     """Choose the variables of a model and write their rates.
 
     Parameters
     ----------
     model : Model
-    eliminate : int, optional
-        Index of the memory variable that follows from the balance, where the form *eliminated* is
-        possible; None forbids that form (the variable's weight in friction is zero or tiny).
+    eliminate : int or tuple of int, optional
+        Index of the memory variable, among those of its contact, that follows from the balance, where the form
+        *eliminated* is possible, for all contacts or each; None forbids that form (the variable's weight in friction is
+        zero or tiny).
+    push, press : str, optional
+        The coordinate that disturbances push, and the contact at which they press; where there is but one, that.
+
+    Raises
+    ------
+    NotAvailable
+        If the motion cannot be brought into this form.
     """
-    if model.delays:
-        raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
-    if model.states:
-        raise NotAvailable(
-            "motion of contacts with states of their own, such as pore fluid, is not offered; their verdict is"
+    each = eliminate if isinstance(eliminate, tuple) else (eliminate,) * len(model.contacts)
+    return _Reducing(model, push, press).reduction(each)
+
+
+@question
+def can_eliminate(model: Model, index: int, which: int) -> bool:
+    """Whether a memory variable of a contact follows from the balance of forces there."""
+    return _Reducing(model, "", "").victim(index, which) is not None
+
+
+class _Reducing:
+    """One pass from a Model to its Reduction."""
+
+    def __init__(self, model: Model, push: str, press: str) -> None:
+        if model.delays:
+            raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
+        if model.states:
+            raise NotAvailable(
+                "motion of contacts with states of their own, such as pore fluid, is not offered; their verdict is"
+            )
+        self.model, self.moving = model, kinematics(model)
+        self.given = _inputs(model, push, press)
+        self.memory = tuple(item.symbol for item in model.memory)
+        self.integrals = tuple(item.symbol for item in model.integrals)
+        owner = {item.symbol: contact for contact in model.contacts for item in contact.memory}
+        speeds = {contact.velocity for contact in model.contacts}
+        self.definitions = {
+            s: self._variables(e, self._of(s)) for s, e in model.definitions.items() if s not in speeds
+        }  # fmt: skip
+        self.balances = [self._variables(contact.balance, contact) for contact in model.contacts]
+        self.rates = {symbol: self._variables(rate, owner.get(symbol)) for symbol, rate in model.rate_of.items()}
+        self.found: Row = {}
+        self._forces()
+        self._light()
+
+    def _of(self, stress: sp.Symbol) -> Contact | None:
+        return next((c for c in self.model.contacts if stress in (c.spring, c.friction, c.normal)), None)
+
+    def _variables(self, expression: sp.Expr, contact: Contact | None) -> sp.Expr:
+        """An expression with its inputs and in the velocity variables; what motion takes for sign(v) put in."""
+        expression = expression.xreplace(self.given)
+        if contact is not None:
+            v, direction = contact.velocity, contact.direction
+            expression = expression.replace(sp.sign, lambda argument: direction.xreplace({v: argument}))
+        return in_variables(expression, self.moving, self.model)
+
+    def inlined(self, expression: sp.Expr) -> sp.Expr:
+        """T, τ and σ replaced by what they are, and what is known of light coordinates put in."""
+        return self.model.inlined(expression, self.definitions).xreplace(self.found)
+
+    # -- which equation fixes what
+
+    def _force_balance(self, coordinate: Coordinate) -> sp.Expr:
+        if coordinate.balance is None:  # that of its contact stands in its place
+            return self.balances[0]
+        return self._variables(coordinate.balance, None)
+
+    def _forces(self) -> None:
+        """Friction of the contacts that have a symbol for it: of the law, or without inertia of the forces."""
+        equations = []
+        for i, contact in enumerate(self.model.contacts):
+            if contact.friction in self.model.definitions:
+                continue
+            place = self.moving.coordinates[i]
+            light = place is not None and not place.inertial
+            balance = self._force_balance(place) if place is not None and light else self.balances[i]
+            equations.append((self.inlined(balance), contact.friction))
+        found, left = solved_in_turn(equations)
+        if left:
+            self._refuse(
+                f"friction of {self._names(left)} changes the normal force on it, which the law answers in a way that "
+                "has no closed form"
+            )
+        self.definitions = found | self.definitions  # put in last
+
+    def _names(self, left: Iterable[tuple[sp.Expr, sp.Symbol]]) -> str:
+        wanted = {symbol for _, symbol in left}
+        return " and ".join(c.name for c in self.model.contacts if c.friction in wanted)
+
+    def _refuse(self, why: str) -> None:
+        raise NotAvailable(f"motion is not offered for this machine yet: {why}; give its bodies mass, or other laws")
+
+    def _light(self) -> None:
+        """Coordinates without inertia on which no contact acts that has its velocity from them."""
+        places = [one for one in self.model.coordinates if not one.inertial and self.moving.contact_at(one) is None]
+        equations = []
+        for one in places:
+            balance = self.inlined(self._force_balance(one))
+            equations.append((balance, one.velocity if balance.has(one.velocity) else one.displacement))
+        found, left = solved_in_turn(equations)
+        if left or any(e.has(*(c.acceleration for c in self.model.coordinates)) for e in found.values()):
+            names = ", ".join(one.name for one in places)
+            self._refuse(f"{names} has no mass, and what holds it there does not say how it moves")
+        for one in places:
+            if one.displacement in found:
+                found[one.velocity] = self._followed(one, found)
+        self.found = found
+
+    def _followed(self, one: Coordinate, found: Row) -> sp.Expr:
+        """Velocity of a coordinate whose displacement follows from those of others."""
+        place = found[one.displacement]
+        drift = self.rates[one.displacement].xreplace({one.velocity: sp.Integer(0)})
+        terms = [derivative(place, s) * rate for s, rate in self.rates.items() if s is not one.displacement]
+        terms += [derivative(place, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
+        return (sp.Add(*terms) - drift).xreplace(found)
+
+    # -- rates
+
+    def reduction(self, eliminate: tuple[int | None, ...]) -> Reduction:
+        """Everything put together."""
+        model = self.model
+        heavy = [one for one in model.coordinates if one.inertial]
+        self.pushed, left = solved_in_turn(
+            [(self.inlined(self._force_balance(one)), one.acceleration) for one in heavy]
         )
-    equations = _Equations(model)
-    if model.inertial:
-        return _inertial(model, equations)
-    if eliminate is not None and equations.velocity == "logarithm" and len(equations.memory) > eliminate:
-        victim = equations.memory[eliminate]
-        slope = derivative(equations.balance, victim)
-        if slope != 0 and not slope.has(victim) and not slope.has(W):
-            return _eliminated(model, equations, victim, slope)
-    return _massless(model, equations)
+        light = [i for i in range(len(model.contacts)) if self._is_light(i)]
+        residuals = [(self.inlined(self.balances[i]), self._w(i)) for i in light]
+        self.victims = self._victims(light, eliminate)
+        self.closed: Row = {}
+        if light and not self.victims:
+            self.closed, unsolved = solved_in_turn(residuals)
+            left += unsolved
+        if len(left) > 1 or (left and self.victims):
+            self._refuse("several equations would have to be solved together at every moment")
+        unknown, residual = (left[0][1], left[0][0]) if left else (None, None)
+        places = tuple(one.displacement for one in self._free())
+        speeds = tuple(self._speed_of(one) for one in heavy)
+        own = tuple(w for _, w in residuals) if self.victims else ()
+        memory = tuple(symbol for symbol in self.memory if symbol not in self.victims)
+        state = (*places, *own, *speeds, *memory, *self.integrals)
+        continuous = (*places, *speeds, *self.memory, *self.integrals)
+        self._raw_rates(heavy, residuals)
+        rates = {symbol: self._written(self.raw[symbol]) for symbol in state}
+        for i, variable in enumerate(self.moving.variables):
+            if variable is not None and variable.kind == "logarithm" and i not in light:
+                rates = {symbol: _kept_moving(rate, variable.w) for symbol, rate in rates.items()}
+        return Reduction(
+            model=model,
+            form="eliminated" if self.victims else "explicit" if unknown is None else "implicit",
+            state=state,
+            names=self._names_of(state),
+            continuous=continuous,
+            rates=tuple(rates[s] for s in state),
+            unknown=unknown,
+            residual=residual,
+            restarts=tuple((w, balance) for balance, w in residuals),
+            restored=tuple(map(self._written, continuous)) if self.victims else continuous,
+            slidings=tuple(map(self._sliding, range(len(model.contacts)))),
+            shifts=tuple(one.speed / self._drive for one in self._free()),
+            further=self._further(),
+        )
+
+    def _is_light(self, index: int) -> bool:
+        """Whether the velocity of a contact stands for that of a coordinate without inertia."""
+        place = self.moving.coordinates[index]
+        return place is not None and not place.inertial
+
+    def _w(self, index: int) -> sp.Symbol:
+        variable = self.moving.variables[index]
+        if variable is None:
+            raise InternalError("a contact without a velocity variable has none")
+        return variable.w
+
+    def _speed_of(self, coordinate: Coordinate) -> sp.Symbol:
+        """What is integrated in place of a coordinate's velocity, or that."""
+        index = self.moving.contact_at(coordinate)
+        return coordinate.velocity if index is None else self._w(index)
+
+    @property
+    def _drive(self) -> sp.Expr:
+        return self.model.steady[self.model.inputs["load_velocity"]]
+
+    def _free(self) -> list[Coordinate]:
+        """Coordinates whose displacement does not follow from those of others."""
+        return [one for one in self.model.coordinates if one.displacement not in self.found]
+
+    def _victims(self, light: list[int], eliminate: tuple[int | None, ...]) -> Row:
+        """Memory variables that follow from the balance, and what they are; none unless every light contact has one."""
+        found: Row = {}
+        for i in light:
+            own = self.victim(i, eliminate[i])
+            if own is None:
+                return {}
+            found |= own
+        return found
+
+    def victim(self, index: int, which: int | None) -> Row | None:
+        """A memory variable of a contact from its balance; None where that is not linear in it."""
+        variable, memory = self.moving.variables[index], self.model.contacts[index].memory
+        if variable is None or variable.kind != "logarithm" or which is None or which >= len(memory):
+            return None
+        symbol, balance = memory[which].symbol, self.balances[index]
+        slope = derivative(balance, symbol)
+        if slope == 0 or slope.has(symbol) or slope.has(variable.w):
+            return None
+        rest = balance.xreplace({symbol: sp.Integer(0)})
+        terms = (-term / slope for term in sp.Add.make_args(rest))
+        return {symbol: sp.expand_mul(sp.Add(*terms))}  # so that ln σ cancels
+
+    def _written(self, expression: sp.Expr) -> sp.Expr:
+        """An expression in state, inputs and the unknown."""
+        if self.victims:
+            expression = expression.xreplace(self.victims)
+        return self.inlined(expression).xreplace(self.pushed).xreplace(self.closed)
+
+    def _raw_rates(self, heavy: list[Coordinate], residuals: list[tuple[sp.Expr, sp.Symbol]]) -> None:
+        """Rates of everything that moves, memory variables that follow from a balance and their w included."""
+        self.raw: Row = {}
+        for symbol in (*(one.displacement for one in self._free()), *self.memory, *self.integrals):
+            self.raw[symbol] = self.inlined(self.rates[symbol]).xreplace(self.pushed)
+        for one in heavy:
+            if self.moving.contact_at(one) is None:
+                self.raw[one.velocity] = self.inlined(one.acceleration).xreplace(self.pushed)
+        rates = {w: sp.Dummy(real=True) for w in (variable.w for variable in self.moving.variables if variable)}
+        placed = {self._w(i): one for i, one in enumerate(self.moving.coordinates) if one is not None and one.inertial}
+        self.raw |= {w: rates[w] for w in (*placed, *(w for _, w in residuals))}
+        equations = [self._change(self._velocity(one.velocity)) - self._acceleration(one) for one in placed.values()]
+        equations += [self._change(balance) for balance, _ in residuals]
+        solved = solved_together(equations, [rates[w] for w in rates if w in self.raw])
+        self.raw = {symbol: rate.xreplace(solved) for symbol, rate in self.raw.items()}
+
+    def _change(self, expression: sp.Expr) -> sp.Expr:
+        """Rate of an expression in what moves and the inputs."""
+        terms = [derivative(expression, symbol) * rate for symbol, rate in self.raw.items()]
+        terms += [derivative(expression, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
+        return sp.Add(*terms)
+
+    def _acceleration_at(self, contact: Contact) -> sp.Expr:
+        """Rate of a contact's velocity: by forces, where these accelerate all that moves with it."""
+        slip = sp.sympify(self.model.definitions.get(contact.velocity, contact.velocity))
+        moving = [one for one in self.model.coordinates if slip.has(one.velocity)]
+        if not all(one.inertial for one in moving):
+            return self._change(self._velocity(contact.velocity))
+        total = derivative(slip, V_LP) * SLOPES[0]
+        return total + sp.Add(*(derivative(slip, one.velocity) * self._acceleration(one) for one in moving))
+
+    def _acceleration(self, coordinate: Coordinate) -> sp.Expr:
+        if coordinate.inertial:
+            return self.inlined(coordinate.acceleration).xreplace(self.pushed)
+        return self._change(self._velocity(coordinate.velocity))
+
+    def _velocity(self, symbol: sp.Symbol) -> sp.Expr:
+        """A velocity of a coordinate or a contact in the variables."""
+        return self.inlined(in_variables(symbol, self.moving, self.model))
+
+    # -- what comes out
+
+    def _sliding(self, index: int) -> Sliding:
+        contact = self.model.contacts[index]
+        outputs = {
+            "v": self._written(self._velocity(contact.velocity)),
+            "acceleration": self._written(self._acceleration_at(contact)),
+            "sigma": self._written(contact.normal),
+            "tau": self._written(contact.friction),
+            "T": self._written(contact.spring),
+        }
+        ratio = self.model.steady[contact.velocity] / self._drive
+        return Sliding(self.moving.variables[index], outputs, self._written(contact.slip), ratio)
+
+    def _further(self) -> dict[str, sp.Expr]:
+        """What is observed of coordinates that have names of their own."""
+        found: dict[str, sp.Expr] = {}
+        for one in self.model.coordinates if self.model.contacts[0].name else ():
+            found[f"{one.name}.v"] = self._written(self._velocity(one.velocity))
+            found[f"{one.name}.acceleration"] = self._written(self._acceleration(one))
+            if one.displacement in self.found:
+                found[f"{one.name}.x"] = self._written(one.displacement)
+        return found
+
+    def _names_of(self, state: tuple[sp.Symbol, ...]) -> tuple[str, ...]:
+        names = {item.symbol: item.name for item in self.model.variables}
+        for variable, contact in zip(self.moving.variables, self.model.contacts, strict=True):
+            if variable is not None:
+                names[variable.w] = f"{contact.name}.w" if contact.name else "w"
+        return tuple(names[symbol] for symbol in state)
 
 
-def _solved(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
-    """The unknown, if the residual is linear in it."""
-    slope = derivative(residual, unknown)
-    if slope.has(unknown):
-        return None
-    return -residual.xreplace({unknown: sp.Integer(0)}) / slope
+def _inputs(model: Model, push: str, press: str) -> Row:
+    """What stands for the inputs of a Model: disturbances act on one coordinate and at one contact."""
+    given: Row = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
+    alone = model.is_single
+    for one in model.coordinates:
+        given[one.push] = Q if alone or one.name == push else sp.Integer(0)
+    for contact in model.contacts:
+        pressed = P / contact.area if alone or contact.name == press else sp.Integer(0)
+        given[contact.press] = pressed + contact.imposed.xreplace({model.inputs["time"]: TIME})
+    return given
 
 
-def _names(eq: _Equations, state: tuple[sp.Symbol, ...]) -> tuple[str, ...]:
-    by_symbol = {item.symbol: item.name for item in eq.model.variables}
-    return tuple("w" if symbol is W else by_symbol[symbol] for symbol in state)
-
-
-def _inertial(model: Model, eq: _Equations) -> Reduction:
-    """Velocity is a variable; the balance gives the acceleration."""
-    state = (eq.x, W, *eq.memory, *eq.integrals)
-    residual = eq.inlined(eq.balance)
-    acceleration = _solved(residual, eq.acceleration)
-    unknown = None if acceleration is not None else eq.acceleration
-    found = {} if acceleration is None else {eq.acceleration: acceleration}
-
-    def written(expression: sp.Expr) -> sp.Expr:
-        return eq.inlined(expression).xreplace(found)
-
-    memory_rates = {symbol: written(eq.rates[symbol]) for symbol in eq.memory}
-    push = written(eq.acceleration)
-    for symbol, rate in memory_rates.items():
-        slope = derivative(eq.of_w, symbol)
-        if slope != 0:
-            push -= slope * rate
-    rates = {eq.x: written(eq.rates[eq.x]), W: push / derivative(eq.of_w, W), **memory_rates}
-    rates |= {symbol: eq.rates[symbol] for symbol in eq.integrals}
-    if eq.velocity == "logarithm":
-        rates = {symbol: _kept_moving(rate) for symbol, rate in rates.items()}
-    outputs = _outputs(eq, written, written(eq.acceleration))
-    return Reduction(
-        model, "explicit" if unknown is None else "implicit", eq.velocity, state, _names(eq, state),
-        state, tuple(rates[s] for s in state), unknown, None if unknown is None else residual, None,
-        state, outputs, eq.w_of_v,
-    )  # fmt: skip
-
-
-def _kept_moving(rate: sp.Expr) -> sp.Expr:
+def _kept_moving(rate: sp.Expr, w: sp.Symbol) -> sp.Expr:
     """A rate in which the velocity falls no further than to `STANDSTILL`, while friction goes on with ln v.
 
     Whoever pulls the block back far below its strength would else divide by a velocity beneath floating point.
     """
-    least = sp.Piecewise((W, W > STANDSTILL), (sp.Integer(STANDSTILL), True))
+    least = sp.Piecewise((w, w > STANDSTILL), (sp.Integer(STANDSTILL), True))
     bounded = sp.Dummy(real=True)  # put in last: a condition must not be bounded by itself
-    slowed = rate.replace(lambda e: isinstance(e, sp.exp) and e.has(W), lambda e: e.xreplace({W: bounded}))
+    slowed = rate.replace(lambda e: isinstance(e, sp.exp) and e.has(w), lambda e: e.xreplace({w: bounded}))
     return slowed.xreplace({bounded: least})
-
-
-def _outputs(eq: _Equations, written: object, acceleration: sp.Expr) -> dict[str, sp.Expr]:
-    if not callable(written):
-        raise InternalError("callable(written)")
-    return {
-        "v": written(eq.of_w),
-        "acceleration": acceleration,
-        "sigma": written(eq.sigma),
-        "tau": written(eq.tau),
-        "T": written(eq.spring),
-    } | {str(symbol): written(symbol) for symbol in eq.memory}
-
-
-def _massless(model: Model, eq: _Equations) -> Reduction:
-    """Slip and memory are integrated; the balance gives the velocity variable."""
-    state = (eq.x, *eq.memory, *eq.integrals)
-    residual = eq.inlined(eq.balance)
-    solution = _solved(residual, W)
-    unknown = None if solution is not None else W
-    found = {} if solution is None else {W: solution}
-
-    def written(expression: sp.Expr) -> sp.Expr:
-        return eq.inlined(expression).xreplace(found)
-
-    rates = {symbol: written(eq.rates[symbol]) for symbol in state}
-    raw = {symbol: eq.inlined(eq.rates[symbol]) for symbol in state}
-    w_rate = -_change(residual, raw) / derivative(residual, W)
-    acceleration = derivative(eq.of_w, W) * w_rate
-    acceleration += sp.Add(*(derivative(eq.of_w, s) * raw[s] for s in eq.memory))
-    outputs = _outputs(eq, written, acceleration.xreplace(found))
-    return Reduction(
-        model, "explicit" if unknown is None else "implicit", eq.velocity, state, _names(eq, state),
-        state, tuple(rates[s] for s in state), unknown, None if unknown is None else residual, residual,
-        state, outputs, eq.w_of_v,
-    )  # fmt: skip
-
-
-def _change(residual: sp.Expr, rates: Row) -> sp.Expr:
-    """Rate of a residual at fixed w."""
-    terms = [derivative(residual, symbol) * rate for symbol, rate in rates.items()]
-    terms += [derivative(residual, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
-    return sp.Add(*terms)
-
-
-def _eliminated(model: Model, eq: _Equations, victim: sp.Symbol, slope: sp.Expr) -> Reduction:
-    """ln v is integrated in place of the memory variable `victim`."""
-    others = tuple(s for s in eq.memory if s is not victim)
-    state = (eq.x, W, *others, *eq.integrals)
-    rest = eq.balance.xreplace({victim: sp.Integer(0)})
-    given = sp.expand_mul(sp.Add(*(-term / slope for term in sp.Add.make_args(rest))))  # so that ln σ cancels
-    residual = eq.inlined(eq.balance)
-    raw = {symbol: eq.inlined(eq.rates[symbol]) for symbol in (eq.x, *eq.memory, *eq.integrals)}
-    w_rate = -_change(residual, raw) / derivative(residual, W)
-
-    def written(expression: sp.Expr) -> sp.Expr:
-        return eq.inlined(expression.xreplace({victim: given}))
-
-    rates = {symbol: written(rate) for symbol, rate in raw.items() if symbol is not victim}
-    rates[W] = written(w_rate)
-    acceleration = derivative(eq.of_w, W) * rates[W]
-    outputs = _outputs(eq, written, acceleration)
-    continuous = (eq.x, *eq.memory, *eq.integrals)
-    restored = tuple(written(symbol) for symbol in continuous)
-    return Reduction(
-        model, "eliminated", eq.velocity, state, _names(eq, state), continuous,
-        tuple(rates[s] for s in state), None, None, residual, restored, outputs, eq.w_of_v,
-    )  # fmt: skip

@@ -13,8 +13,9 @@ from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
+from steadyslip.model.kinematics import kinematics
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import Reduction, reduce_model
+from steadyslip.model.reduction import Reduction, can_eliminate
 
 Choose = Callable[[Any, Any, Any], Any]
 LEAST_WEIGHT = 1e-5  # in that of ln v, below which a memory variable is not eliminated: its inverse amplifies rounding
@@ -57,51 +58,112 @@ class Weights(ReadOnly):
         return cls(direct, by_slip, by_memory, decay, memory, by_unknown)
 
 
-def weighed(model: Model) -> list[sp.Expr]:
+def weighed(model: Model, index: int = 0) -> list[sp.Expr]:
     """What `Weights` holds: direct, by slip, by unknown, then of each memory its weight, its decay, itself."""
-    contact = model.contact
-    v, memory = contact.velocity, [item.symbol for item in model.memory]
-    inlined = model.inlined(contact.balance)
-    wanted = [
-        v * derivative(contact.balance, v),
-        derivative(inlined, contact.slip),
-        derivative(inlined, contact.unknown),
-    ]
+    contact = model.contacts[index]
+    v, memory = contact.velocity, [item.symbol for item in contact.memory]
+    wanted = [v * derivative(contact.balance, v), *_held(model, index)]
     wanted += [derivative(contact.balance, m) for m in memory]
     wanted += [derivative(model.rate_of[m], m) for m in memory]
-    return [e.doit().xreplace(model.steady) for e in (*wanted, *memory)]
+    return [model.at_steady(e.doit()) for e in (*wanted, *memory)]
+
+
+def _held(model: Model, index: int) -> list[sp.Expr]:
+    """Derivatives of a contact's balance of forces in slip and in what it fixes; per area of that contact."""
+    contact, place = model.contacts[index], kinematics(model).coordinates[index]
+    inlined = model.inlined(contact.balance)
+    if contact.friction in model.definitions:
+        return [derivative(inlined, contact.slip), derivative(inlined, contact.unknown)]
+    slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
+    place = place or next(one for one in model.coordinates if slip.has(one.velocity))
+    share = contact.area * derivative(slip, place.velocity) ** 2
+    balance = model.inlined(sp.Integer(0) if place.balance is None else place.balance)
+    fixed = derivative(balance, place.acceleration if place.inertial else place.velocity) / share
+    friction = sp.Integer(0) if place.inertial else derivative(contact.balance, contact.velocity)
+    return [derivative(balance, place.displacement) / share, fixed + friction]
 
 
 @question
-def _weights_function(model: Model) -> Callable[..., list[Any]]:
-    return model.function(weighed(model))
+def _weights_function(model: Model, index: int) -> Callable[..., list[Any]]:
+    return model.function(weighed(model, index))
 
 
 @question
-def weights(point: OperatingPoint) -> Weights:
-    """Derivatives in steady sliding of all rigs of a point."""
-    found = _weights_function(point.model)(*map(np.asarray, point.arguments), point.stresses)
+def weights(point: OperatingPoint, index: int = 0) -> Weights:
+    """Derivatives in steady sliding of all rigs of a point, at one of their contacts."""
+    found = _weights_function(point.model, index)(*_arrays(point))
     return Weights.of([np.asarray(x, dtype=float) for x in found])
+
+
+def _arrays(point: OperatingPoint) -> list[np.ndarray]:
+    return [*map(np.asarray, point.arguments), *map(np.atleast_1d, point.sigmas)]
+
+
+@question
+def slip_rates(point: OperatingPoint) -> tuple[Any, ...]:
+    """Velocity of every contact in steady sliding, m/s."""
+    model = point.model
+    return tuple(point.evaluate(_slip_rates(model)))
+
+
+@question
+def _slip_rates(model: Model) -> Callable[..., list[Any]]:
+    return model.function(model.steady[contact.velocity] for contact in model.contacts)
 
 
 @question
 def posed(point: OperatingPoint) -> np.ndarray:
-    """Whether the balance of forces rises with its unknown (velocity, or acceleration) in steady sliding.
+    """Whether the balances of forces rise with their unknowns (velocities, or accelerations) in steady sliding.
 
-    If not, the least lag or mass that was left out decides the motion.
+    If not, the least lag or mass that was left out decides the motion. Of several balances the eigenvalues must be
+    positive.
     """
-    return np.atleast_1d(weights(point).by_unknown > 0)
+    if point.model.is_single:
+        return np.atleast_1d(weights(point).by_unknown > 0)
+    function, size = _rising(point.model)
+    entries = [np.broadcast_to(np.asarray(e, dtype=float), point.shape or (1,)) for e in function(*_arrays(point))]
+    matrix = np.moveaxis(np.array(entries).reshape(size, size, -1), -1, 0)
+    good = np.isfinite(matrix).all(axis=(1, 2))
+    rising = np.ones(len(matrix), dtype=bool)
+    if size:
+        rising = np.linalg.eigvals(np.where(good[:, None, None], matrix, 0.0)).real.min(axis=1) > 0
+    return np.asarray(rising & good)
 
 
 @question
-def _force_function(model: Model) -> Callable[..., list[Any]]:
-    """Forces that keep each other in balance in steady sliding.
+def _rising(model: Model) -> tuple[Callable[..., list[Any]], int]:
+    """Derivatives of the balances of coordinates in accelerations, or without inertia in velocities of contacts."""
+    moving = kinematics(model)
+    places = [one for one in model.coordinates if one.inertial or moving.contact_at(one) is not None]
+    slopes = {}
+    for contact in model.contacts:  # friction follows what moves
+        balance = model.inlined(contact.balance)
+        slopes[contact.friction] = {
+            s: -derivative(balance, s) / derivative(balance, contact.friction)
+            for one in places
+            for s in (one.acceleration, one.velocity)
+        }
+    entries = []
+    for one in places:
+        balance = model.inlined(sp.Integer(0) if one.balance is None else one.balance)
+        for other in places:
+            symbol = other.acceleration if other.inertial else other.velocity
+            total = derivative(balance, symbol)
+            for friction, slope in slopes.items():
+                total += derivative(balance, friction) * slope[symbol]
+            entries.append(model.at_steady(total.doit()))
+    return model.function(entries), len(places)
+
+
+@question
+def _force_function(model: Model, index: int) -> Callable[..., list[Any]]:
+    """Forces that keep each other in balance in steady sliding, at a contact.
 
     The force of a dashpot per change of ln v; what pull and friction do to the normal stress; then what adds up to
     nothing: pull and friction, and the shares of normal stress and memory in it.
     """
-    contact = model.contact
-    inner = [contact.normal, *(item.symbol for item in model.memory)]
+    contact = model.contacts[index]
+    inner = [contact.normal, *(item.symbol for item in contact.memory)]
     shares = [model.at_steady(symbol * derivative(contact.balance, symbol)) for symbol in inner]
     dashpot = model.at_steady(contact.velocity * derivative(model.definitions[contact.spring], contact.velocity))
     pressing = [
@@ -120,35 +182,51 @@ def resolved(point: OperatingPoint) -> np.ndarray:
     velocity changes the force of a dashpot, and that of forces the normal stress, by little beside what there is. Where
     motion is ill-posed, that is the matter instead.
     """
-    found = weights(point)
-    dashpot, pull, friction, *forces = point.evaluate(_force_function(point.model))
+    apart = np.ones(1, dtype=bool)
+    for index in range(len(point.model.contacts)):
+        apart = apart & _resolved(point, index)
+    return np.asarray(apart | ~posed(point))
+
+
+def _resolved(point: OperatingPoint, index: int) -> np.ndarray:
+    found, drive = weights(point, index), slip_rates(point)[index]
+    place = kinematics(point.model).coordinates[index]
+    dashpot, pull, friction, *forces = point.evaluate(_force_function(point.model, index))
     with np.errstate(all="ignore"):
-        held = np.abs(np.asarray(point.drive, dtype=float) * found.by_unknown)
-        if point.model.inertial:
-            rates = [found.by_slip * point.drive / found.direct, *found.decay]
+        held = np.abs(np.asarray(drive, dtype=float) * found.by_unknown)
+        if place is None or place.inertial:
+            rates = [found.by_slip * drive / found.direct, *found.decay]
             held = np.abs(found.direct) + held * np.maximum.reduce(np.broadcast_arrays(*map(np.abs, rates)))
         largest = np.maximum.reduce(np.broadcast_arrays(*map(np.abs, forces)))
         least = MOST_NOISE / np.finfo(float).eps
         hidden = (largest > least * held) | (np.abs(dashpot) > least * largest)
-        hidden |= np.maximum(np.abs(pull), np.abs(friction)) > least * point.stresses
-        return np.asarray(~hidden | ~posed(point))
+        hidden |= np.maximum(np.abs(pull), np.abs(friction)) > least * np.atleast_1d(point.sigmas[index])
+        return np.asarray(~hidden)
 
 
 @question
-def eliminable(point: OperatingPoint) -> int | None:
+def eliminable(point: OperatingPoint) -> int | tuple[int | None, ...] | None:
     """The memory variable to leave out: of those that allow it, the one with most weight in friction.
 
-    None where there is none, or where in some rig it has no weight to speak of.
+    None where there is none, or where in some rig it has no weight to speak of. One for each contact of a machine.
     """
     model = point.model
-    if model.inertial or not model.memory:
+    if model.is_single:
+        return _eliminable(point, 0)
+    return tuple(_eliminable(point, index) for index in range(len(model.contacts)))
+
+
+def _eliminable(point: OperatingPoint, index: int) -> int | None:
+    model, contact = point.model, point.model.contacts[index]
+    place = kinematics(model).coordinates[index]
+    if place is None or place.inertial or not contact.memory:
         return None
-    found = weights(point)
+    found, drive = weights(point, index), slip_rates(point)[index]
     with np.errstate(all="ignore"):
-        steepest = np.maximum(np.abs(found.direct), np.abs(point.drive * found.by_unknown))  # with dashpots
+        steepest = np.maximum(np.abs(found.direct), np.abs(drive * found.by_unknown))  # with dashpots
         shares = [float(np.nanmin(np.abs(one) / steepest, initial=np.inf)) for one in found.by_memory]
     for i in np.argsort(shares)[::-1]:
-        if shares[i] >= LEAST_WEIGHT and reduce_model(model, int(i)).form == "eliminated":
+        if shares[i] >= LEAST_WEIGHT and can_eliminate(model, index, int(i)):
             return int(i)
     return None
 
@@ -159,12 +237,81 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
 
     By name; and the size of the unknown that is left to solve for, which has no name among them.
     """
+    speeds = [np.asarray(speed, dtype=float) for speed in slip_rates(point)]
     with np.errstate(all="ignore"):
-        return sizes(weights(point), np.asarray(point.drive, dtype=float), reduction, np.where)
+        each = [
+            sizes(weights(point, i), speed, reduction, np.where, i) for i, speed in enumerate(speeds)
+        ]  # fmt: skip
+        return _together(point, reduction, speeds, each) if point.model.contacts[0].name else each[0]
 
 
-def sizes(found: Weights, drive: Any, reduction: Reduction, choose: Choose) -> tuple[dict[str, Any], Any]:
-    """`natural_scales` in plain arithmetic, of arrays or of the nodes of a program.
+@question
+def _coordinate_function(model: Model) -> Callable[..., list[Any]]:
+    """Speed of every coordinate in steady sliding, its share in the slip of every contact, stiffness and area."""
+    wanted = [one.speed for one in model.coordinates]
+    for contact in model.contacts:
+        slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
+        wanted += [derivative(slip, one.velocity) for one in model.coordinates]
+    balances = [model.inlined(sp.Integer(0) if one.balance is None else one.balance) for one in model.coordinates]
+    wanted += [derivative(e, one.displacement) for e, one in zip(balances, model.coordinates, strict=True)]
+    return model.function(model.at_steady(e) for e in (*wanted, *(contact.area for contact in model.contacts)))
+
+
+def _together(
+    point: OperatingPoint, reduction: Reduction, speeds: list[Any], each: list[tuple[dict[str, Any], Any]]
+) -> tuple[dict[str, Any], Any]:
+    """Scales of a machine, from those at its contacts.
+
+    A coordinate matters by what it slips at its contacts, or else by how far it moves in the shortest time that matters
+    at any of them; one that stands still by how far the largest friction stretches what holds it.
+    """
+    model, n = point.model, len(point.model.coordinates)
+    numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_coordinate_function(model))]
+    own, rest = numbers[:n], numbers[n:]
+    count = len(model.contacts)
+    stiff, areas = rest[n * count : n * count + n], rest[n * count + n :]
+    slips = [found["x"] for found, _ in each]
+    time: Any = np.inf
+    force: Any = 0.0
+    for i, (slip, speed) in enumerate(zip(slips, speeds, strict=True)):
+        time = np.minimum(time, slip / speed)
+        force = np.maximum(force, areas[i] * np.abs(weights(point, i).direct))
+    scales: dict[str, Any] = {}
+    for k, one in enumerate(model.coordinates):
+        x: Any = np.inf
+        for i in range(count):
+            share = np.abs(rest[n * i + k])
+            x = np.minimum(x, np.where(share > 0, slips[i] / np.where(share > 0, share, 1.0), np.inf))
+        x = np.where(x < np.inf, x, np.abs(own[k]) * time)
+        held = force / np.abs(stiff[k])
+        x = np.where(x > 0, x, np.where((held > 0) & (held < np.inf), held, np.min(slips)))
+        scales[f"{one.name}.x"] = x
+        scales[f"{one.name}.v"] = np.where(own[k] != 0, np.abs(own[k]), x / time)
+    for (found, _), contact in zip(each, model.contacts, strict=True):
+        scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.w": found["w"]}
+    for item, rate in zip(model.variables, model.rates, strict=True):
+        if item.kind == "integral":
+            sensed = [scales[f"{one.name}.x"] for one in model.coordinates if rate.has(one.displacement)]
+            scales[item.name] = time * np.minimum.reduce(np.broadcast_arrays(*sensed))
+    if reduction.restarts:
+        own_w = {
+            one.variable.w: found["w"] for one, (found, _) in zip(reduction.slidings, each, strict=True) if one.variable
+        }
+        wanted = [own_w[w] for w, _ in reduction.restarts]
+        return scales, np.minimum.reduce(np.broadcast_arrays(*wanted))
+    return scales, np.minimum.reduce(np.broadcast_arrays(*(unknown for _, unknown in each)))
+
+
+def shortest_time(scales: Mapping[str, Any]) -> Any:
+    """The shortest time that matters in a machine, s."""
+    own = [name.removesuffix(".x") for name in scales if name.endswith(".x")]
+    return np.minimum.reduce(np.broadcast_arrays(*(scales[f"{name}.x"] / scales[f"{name}.v"] for name in own)))
+
+
+def sizes(
+    found: Weights, drive: Any, reduction: Reduction, choose: Choose, index: int = 0
+) -> tuple[dict[str, Any], Any]:
+    """`natural_scales` at one contact in plain arithmetic, of arrays or of the nodes of a program.
 
     An acceleration matters where its force is worth an e-fold of velocity: of a light block smaller ones are lost in
     the rounding of the forces.
@@ -173,20 +320,24 @@ def sizes(found: Weights, drive: Any, reduction: Reduction, choose: Choose) -> t
     ----------
     choose : callable
         ``choose(condition, value, other)``: `numpy.where` for arrays.
+    index : int, optional
+        The contact.
     """
     direct, by_slip = abs(found.direct), abs(found.by_slip)
     x: Any = np.inf
     for distance in (*(drive / abs(n) for n in found.decay), direct / by_slip):
         x = choose((distance > 0) & (distance < x), distance, x)
     x = choose(x < np.inf, x, abs(drive))
-    scales: dict[str, Any] = {"x": x, "w": drive if reduction.velocity == "linear" else 1.0}
-    for item, weight, value in zip(reduction.model.memory, found.by_memory, found.memory, strict=True):
+    variable, contact = reduction.slidings[index].variable, reduction.model.contacts[index]
+    linear = variable is not None and variable.kind == "linear"
+    scales: dict[str, Any] = {"x": x, "w": drive if linear else 1.0}
+    for item, weight, value in zip(contact.memory, found.by_memory, found.memory, strict=True):
         own, scale = abs(value), direct / abs(weight)
         scale = choose((scale > 0) & (scale < np.inf), scale, choose(own > 0, own, 1.0))
         most = choose(own > 1e-3 * scale, own, 1e-3 * scale)
         scales[item.name] = choose((own > 0) & (most < scale), most, scale)
     scales |= {item.name: x * x / drive for item in reduction.model.integrals}
-    if not reduction.model.inertial:
+    if reduction.restarts:
         return scales, scales["w"]
     force = choose(direct > by_slip * x, direct, by_slip * x) / found.by_unknown
     return scales, choose(force > drive * drive / x, force, drive * drive / x)

@@ -15,6 +15,7 @@ from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W
+from steadyslip.model.scales import slip_rates
 
 
 @question
@@ -24,8 +25,9 @@ def _steady_memory(model: Model) -> Callable[..., list[Any]]:
 
 @question
 def _continuous_names(reduction: Reduction) -> tuple[str, ...]:
-    """Names of what a jump leaves alone; ``w`` is the velocity variable."""
-    by_symbol = {item.symbol: item.name for item in reduction.model.variables} | {W: "w"}
+    """Names of what a jump leaves alone; ``w`` and the number of the contact is a velocity variable."""
+    by_symbol = {item.symbol: item.name for item in reduction.model.variables}
+    by_symbol |= {one.variable.w: f"w {i}" for i, one in enumerate(reduction.slidings) if one.variable is not None}
     return tuple(by_symbol[symbol] for symbol in reduction.continuous)
 
 
@@ -41,9 +43,26 @@ def _number(value: Any) -> Any:
 
 
 @question
-def _velocity_variable(reduction: Reduction) -> Callable[..., list[Any]]:
-    model = reduction.model
-    return model.function([reduction.w_of_v], model.contact.velocity, *(item.symbol for item in model.memory))
+def _velocity_variable(reduction: Reduction, index: int) -> Callable[..., list[Any]]:
+    """The velocity variable of a contact from its velocity and the memory of all."""
+    model, variable = reduction.model, reduction.slidings[index].variable
+    if variable is None:
+        raise InternalError("variable is not None")
+    memory = (item.symbol for item in model.memory)
+    return model.function([variable.w_of_v], model.contacts[index].velocity, *memory)
+
+
+@question
+def _slip_rates(model: Model) -> Callable[..., list[Any]]:
+    """Velocities of the contacts from those of the coordinates, with the load point at that of steady sliding."""
+    steady = {model.inputs["load_velocity"]: model.steady[model.inputs["load_velocity"]]}
+    slips = (model.definitions.get(contact.velocity, contact.velocity) for contact in model.contacts)
+    return model.function([e.xreplace(steady) for e in slips], *(one.velocity for one in model.coordinates))
+
+
+@question
+def _steady_speeds(model: Model) -> Callable[..., list[Any]]:
+    return model.function(one.speed for one in model.coordinates)
 
 
 @question
@@ -53,11 +72,10 @@ def _balance(reduction: Reduction, index: int) -> tuple[Callable[..., list[Any]]
     """
     model = reduction.model
     memory = [item.symbol for item in model.memory]
-    if reduction.restart is None:
-        raise InternalError("reduction.restart is not None")
+    ((w, balance),) = reduction.restarts
     at_rest = {V_LP: model.parameters["drive.velocity"], Q: sp.Integer(0), P: sp.Integer(0), TIME: sp.Integer(0)}
     at_rest |= {item.symbol: sp.Integer(0) for item in model.integrals}
-    expression = reduction.restart.xreplace({W: reduction.w_of_v}).xreplace(at_rest)
+    expression = balance.xreplace({w: reduction.w_of_v}).xreplace(at_rest)
     slope = derivative(expression, memory[index])
     function = model.function([expression, slope], model.contact.slip, model.contact.velocity, *memory)
     return function, not slope.has(memory[index])
@@ -80,28 +98,48 @@ def initial_values(
     names = [item.name for item in model.memory]
     start = _checked_initial(given, model)
     memory = [_number(start.get(name, value)) for name, value in zip(names, _own_memory(point), strict=True)]
-    x, v = _number(start.get("x", 0.0)), _number(start.get("v", point.drive))
-    if reduction.velocity == "logarithm" and not np.all(v > 0):
-        raise ParameterError([Problem("initial.v", f"got {given.get('v')!r}; allowed: > 0 m/s with this law")])
+    own = [(item.name.removesuffix("x"), item) for item in model.variables if item.kind == "slip"]
+    places = [_number(start.get(item.name, 0.0)) for _, item in own]
+    steady = point.evaluate(_steady_speeds(model))
+    speeds = [_number(start.get(f"{name}v", speed)) for (name, _), speed in zip(own, steady, strict=True)]
+    slips = point.evaluate(_slip_rates(model), *speeds)
+    for i, (slip, sliding) in enumerate(zip(slips, reduction.slidings, strict=True)):
+        if sliding.variable is not None and sliding.variable.kind == "logarithm" and not np.all(slip > 0):
+            if model.is_single:
+                name = f"{own[0][0]}v"
+                raise ParameterError(
+                    [Problem(f"initial.{name}", f"got {given.get(name)!r}; allowed: > 0 m/s with this law")]
+                )
+            message = (
+                f"the velocities make {model.contacts[i].name} slip at {brief(slip)} m/s; allowed: > 0 with its law"
+            )
+            raise ParameterError([Problem("initial", message)])
     if not model.inertial and "v" in start:
         free = [i for i, name in enumerate(names) if name not in start]
         if not free:
             message = "cannot be given: without mass it follows from the memory; give the memory or the velocity"
             raise ParameterError([Problem("initial.v", message)])
-        memory[free[0]] = _matching_memory(reduction, point, x, v, memory, free[0])
-    order = _continuous_names(reduction)
-    values = {"x": x, **dict(zip(names, memory, strict=True))}
+        memory[free[0]] = _matching_memory(reduction, point, places[0], speeds[0], memory, free[0])
+    values = dict(zip((item.name for _, item in own), places, strict=True)) | dict(zip(names, memory, strict=True))
+    values |= {f"{name}v": speed for (name, _), speed in zip(own, speeds, strict=True)}
     values |= {item.name: start.get(item.name, 0.0) for item in model.integrals}
-    if "w" in order:
-        values["w"] = point.evaluate(_velocity_variable(reduction), v, *memory)[0]
+    order = _continuous_names(reduction)
+    for i in range(len(slips)):
+        if f"w {i}" in order:
+            values[f"w {i}"] = point.evaluate(_velocity_variable(reduction, i), slips[i], *memory)[0]
     columns = [values[name] for name in order]
     if not any(map(np.ndim, columns)):
-        return np.array([columns], dtype=float), np.atleast_1d(v)
-    return np.ascontiguousarray(np.column_stack(np.broadcast_arrays(*map(np.atleast_1d, columns)))), np.atleast_1d(v)
+        return np.array([columns], dtype=float), np.atleast_1d(slips[0])
+    return np.ascontiguousarray(np.column_stack(np.broadcast_arrays(*map(np.atleast_1d, columns)))), np.atleast_1d(
+        slips[0]
+    )
 
 
 def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.ndarray]:
-    known = ["x", "v", *(item.name for item in (*model.memory, *model.integrals))]
+    moving = [item.name for item in model.variables if item.kind in ("slip", "velocity")]
+    if model.is_single:  # without inertia the memory makes up for a velocity that is given
+        moving = [moving[0], f"{moving[0].removesuffix('x')}v"]
+    known = [*moving, *(item.name for item in (*model.memory, *model.integrals))]
     problems, found = [], {}
     for name, value in given.items():
         if name not in known:
@@ -133,13 +171,15 @@ def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any
     return current[index]
 
 
-def guess(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, velocity: Any) -> Any:
-    """Where Newton's method starts for the unknown that is left to solve for."""
-    model = reduction.model
-    if model.inertial:
-        return 0.0
+def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, velocity: Any) -> list[Any]:
+    """Where Newton's method starts for what is left to solve for: velocity variables that balances fix, or nothing."""
+    model, found = reduction.model, []
     memory = [initial[:, reduction.continuous.index(item.symbol)] for item in model.memory]
-    return point.evaluate(_velocity_variable(reduction), velocity, *memory)[0]
+    own = {one.variable.w: i for i, one in enumerate(reduction.slidings) if one.variable is not None}
+    for w, _ in reduction.restarts:
+        slip = velocity if model.is_single else slip_rates(point)[own[w]]
+        found.append(point.evaluate(_velocity_variable(reduction, own[w]), slip, *memory)[0])
+    return found or [0.0]
 
 
 @question

@@ -13,8 +13,10 @@ from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.files.output import FIGURES, write_by_ending
-from steadyslip.files.specifications import piece_from_text, read_protocol, read_slider
+from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
 from steadyslip.files.standalone import write_page
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.motion.result import History
 from steadyslip.motion.single import simulate
 from steadyslip.protocol import Protocol
@@ -38,7 +40,7 @@ def run_file(
     ----------
     path : path
     changes : iterable of str
-        As for `read_slider`.
+        As for `read_rig`.
     pieces : iterable of str
         Pieces in words, as for `piece_from_text`, after those of the file.
     start : iterable of str
@@ -56,9 +58,11 @@ def run_file(
         If anything is wrong; everything is listed.
     """
     changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
-    rig = read_slider(path, changes)
+    rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
-    added = [piece_from_text(text, rig.area) for text in pieces]
+    machine = rig if isinstance(rig, Machine) else None
+    area = rig.area if isinstance(rig, Slider) else None
+    added = [piece_from_text(text, area, machine) for text in pieces]
     for piece in added:
         protocol = protocol + piece
     end = protocol.until if until is None else _seconds(until)

@@ -74,7 +74,7 @@ class Call:
         self.cursor[[Cursor.LAST_JOB, Cursor.BUSY, Cursor.PAUSED]] = size, lanes, -1
         self.status = np.zeros(size, dtype=np.int64)
         self.final = np.full((size, Final.STATE + layout.size), np.nan)
-        self.tally = np.full((size, len(TALLY)), np.nan)
+        self.tally = np.full((size, layout.contacts * len(TALLY)), np.nan)
         self.samples = np.full((size, len(times), Sampled.STATE + layout.size), np.nan)
         self.log = np.zeros((0, LOG_COLUMNS))
         self.recorded = np.zeros((0, Recorded.STATE + layout.size))

@@ -9,8 +9,9 @@ import numpy as np
 
 from steadyslip.core.errors import unknown_name
 from steadyslip.core.results import ReadOnly
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.motion.events import Event
+from steadyslip.motion.events import AnyEvent
 from steadyslip.protocol import Protocol
 
 
@@ -18,17 +19,19 @@ from steadyslip.protocol import Protocol
 class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     """What a rig does under a protocol; ``history["v"]`` is an array over ``history["t"]``.
 
+    Observables of a machine have the names of bodies and contacts before them, ``history["table.v"]``.
+
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     protocol : Protocol
         With its end.
     data : dict of str to ndarray
         Time ``t`` (s) and every observable, SI units. Where a jump happens, its time occurs twice if the
         solver's own steps are kept.
     units : dict of str to str
-    events : tuple of Event
-        In the order of time.
+    events : tuple of Event or ContactEvent
+        In the order of time; the latter of a machine.
     status : str
         ``done``, ``contact lost``, ``blow-up``, ``stuck``, ``no velocity``, ``too many steps``,
         ``out of range`` (of floating point: the samples end before) or ``interrupted``.
@@ -39,21 +42,22 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     rtol : float
     steps, rejected : int
     velocities : tuple of float
-        Lowest and highest velocity of the run, m/s, which lie between samples as a rule.
+        Lowest and highest velocity of the run, m/s, which lie between samples as a rule; of a machine a dict, slip
+        rates by contact.
     """
 
-    rig: Slider
+    rig: Slider | Machine
     protocol: Protocol
     data: dict[str, np.ndarray] = field(repr=False)
     units: dict[str, str] = field(repr=False)
-    events: tuple[Event, ...] = field(repr=False)
+    events: tuple[AnyEvent, ...] = field(repr=False)
     status: str
     end: float
     method: str
     rtol: float
     steps: int
     rejected: int
-    velocities: tuple[float, float]
+    velocities: tuple[float, float] | dict[str, tuple[float, float]]
 
     def __getitem__(self, name: str) -> np.ndarray:
         try:

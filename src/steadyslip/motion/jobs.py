@@ -16,13 +16,17 @@ from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.runner import Runner, runner
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import in_range, require_range
 from steadyslip.model.reduction import Reduction, reduce_model
-from steadyslip.model.scales import eliminable, natural_scales, posed, resolved
-from steadyslip.model.start import guess, initial_values
+from steadyslip.model.scales import eliminable, natural_scales, posed, resolved, shortest_time, slip_rates
+from steadyslip.model.start import guesses, initial_values
 from steadyslip.protocol import Protocol, Segments, pack
+from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS
+from steadyslip.protocol.stress import OnBlock, OnNormalStress
 
 METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
@@ -93,14 +97,16 @@ class Jobs:
     initial: np.ndarray
     velocity: np.ndarray
     reduction: Reduction
-    eliminate: int | None
+    eliminate: int | tuple[int | None, ...] | None
     options: Options
     size: int
+    push: str = ""
+    press: str = ""
 
     @property
-    def sigma(self) -> np.ndarray:
-        """Steady normal stress, NaN where there is no steady sliding."""
-        return self.point.stresses
+    def exists(self) -> np.ndarray:
+        """Whether there is steady sliding to start from."""
+        return np.atleast_1d(np.asarray(self.point.exists))
 
     @property
     def posed(self) -> np.ndarray:
@@ -119,18 +125,20 @@ class Jobs:
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
 
     def runner(self, lanes: int, dense: bool) -> Runner:
-        return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate)
+        return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate, self.push, self.press)
 
     def tables(self, machine: Runner, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
         """Constants, initial, settings and segment rows of some jobs."""
         point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
         velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
-        at_start = guess(self.reduction, point, initial, velocity)
+        first, *further = guesses(self.reduction, point, initial, velocity)
         ask = _kept_settings if point.size == 1 else _settings
         settings = ask(point, machine, self.reduction, self.options)
-        settings = settings.repeat(max(len(settings), np.size(at_start)) // len(settings), axis=0)
-        settings[:, Setting.GUESS] = at_start
+        settings = settings.repeat(max(len(settings), np.size(first)) // len(settings), axis=0)
+        settings[:, Setting.GUESS] = first
+        for k, value in enumerate(reversed(further), start=1):
+            settings[:, -k] = value
         settings[:, Setting.WATCH], settings[:, Setting.RECORD] = watch, record
         return machine.constants(point), initial, settings, self.segments.rows(start, stop)
 
@@ -139,7 +147,9 @@ def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, opti
     """Rows of settings, but for what depends on the start and on what is wanted."""
     scales, unknown = natural_scales(point, reduction)
     sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))
-    own = numbers(point.drive, point.stresses, scales["x"], unknown, options)
+    speed = slip_rates(point)[0]
+    way = scales["x"] if "x" in scales else speed * shortest_time(scales)
+    own = numbers(speed, np.atleast_1d(point.sigmas[0]), way, unknown, options)
     return machine.settings(own | {"watch": 0.0, "record": 0.0, "guess": 0.0}, options.rtol * sizes)
 
 
@@ -167,13 +177,14 @@ def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
     less time for a given error where tolerances are tight (`benchmarks/methods.py`); where the balance has to be solved
     in each of its stages it takes minutes to compile.
     """
-    if reduction.model.inertial or reduction.velocity == "linear":
+    kinds = [one.variable.kind for one in reduction.slidings if one.variable is not None]
+    if any(one.inertial for one in reduction.model.coordinates) or "linear" in kinds:
         return "rodas4"
     return "dop853" if rtol <= TIGHT and reduction.unknown is None else "tsit5"
 
 
 def prepare(
-    rig: Slider,
+    rig: Slider | Machine,
     protocol: Any,
     until: Any,
     vary: Mapping[str, Any],
@@ -210,17 +221,60 @@ def prepare(
     if final is None:
         raise ParameterError([Problem("until", "missing; give the end of the run in s, such as until=200")])
     segments = pack(plan, point.drive, final)
-    if np.any(segments.jump) and (rig.damping or rig.drive.derivative()):
+    if np.any(segments.jump) and any(one.damping and LOAD_POINT in one.senses for one in rig.mechanism().elements):
         raise ParameterError(
             [Problem("protocol", "a displacement step through a dashpot (slider.damping, a derivative gain) is an "
                      "infinite force; use a short velocity step instead")]
         )  # fmt: skip
     eliminate = eliminable(point)
-    reduction = reduce_model(point.model, eliminate)
+    push, press = targets(rig, plan)
+    reduction = reduce_model(point.model, eliminate, push, press)
     _refuse_endless(reduction, options.method)
     start, velocity = initial_values(reduction, point, initial)
-    size = max(len(point.stresses), len(segments.start), len(start), point.size, 1)
-    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size)
+    size = max(*map(np.size, point.sigmas), len(segments.start), len(start), point.size, 1)
+    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, push, press)
+
+
+def targets(rig: Slider | Machine, plan: Protocol) -> tuple[str, str]:
+    """The coordinate that a protocol pushes, and the contact at which it presses; empty where it does neither.
+
+    Raises
+    ------
+    ParameterError
+        If it is open what a piece acts on, or several pieces act on different ones.
+    """
+    if not isinstance(rig, Machine):
+        problems = [
+            Problem(f"protocol.pieces.{i}.on", f"got {piece.on!r}; a slider is one block, leave it out")
+            for i, piece in enumerate(plan.pieces, start=1)
+            if isinstance(piece, OnBlock | OnNormalStress) and piece.on is not None
+        ]
+        if problems:
+            raise ParameterError(problems)
+        return "", ""
+    known = {DISTURBANCE: list(rig.bodies), NORMAL_STRESS: list(rig.contacts)}
+    found: dict[int, str] = {}
+    problems = []
+    for i, piece in enumerate(plan.pieces, start=1):
+        if not isinstance(piece, OnBlock | OnNormalStress):
+            continue
+        where, names = f"protocol.pieces.{i}.on", known[piece.channel]
+        kind = "body" if piece.channel == DISTURBANCE else "contact"
+        given = piece.on
+        if given is None and len(names) > 1:
+            problems.append(Problem(where, f"missing; name the {kind} that {piece.name} acts on: {', '.join(names)}"))
+        elif given is not None and given not in names:
+            problems.append(Problem(where, unknown_name(kind, given, names)))
+        else:
+            own = given or names[0]
+            if found.setdefault(piece.channel, own) != own:
+                message = (
+                    f"got {own!r}, but an earlier piece acts on {found[piece.channel]!r}; allowed: one {kind} a run"
+                )
+                problems.append(Problem(where, message))
+    if problems:
+        raise ParameterError(problems)
+    return found.get(DISTURBANCE, ""), found.get(NORMAL_STRESS, "")
 
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:
@@ -237,9 +291,13 @@ def _refuse_endless(reduction: Reduction, method: str) -> None:
         raise ParameterError([Problem("method", message)])
 
 
-def _refuse_singular(rig: Slider, point: OperatingPoint, varied: bool) -> None:
-    """What the friction law says cannot be followed beyond small motions."""
-    friction = (twin(rig, point.named()) if varied else rig).friction
-    for condition in friction.motion_conditions():
-        if (problem := condition.problem()) is not None:
-            raise NotAvailable(f"friction.{problem}")
+def _refuse_singular(rig: Slider | Machine, point: OperatingPoint, varied: bool) -> None:
+    """What the friction laws say cannot be followed beyond small motions."""
+    own = twin(rig, point.named()) if varied else rig
+    laws = {"friction": own.friction} if isinstance(own, Slider) else {}
+    if isinstance(own, Machine):
+        laws = {f"contacts.{name}.friction": surface.friction for name, surface in own.contacts.items()}
+    for where, friction in laws.items():
+        for condition in friction.motion_conditions():
+            if (problem := condition.problem()) is not None:
+                raise NotAvailable(f"{where}.{problem}")

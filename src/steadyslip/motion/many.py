@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,10 @@ from steadyslip.core.records import parameters, resolve
 from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.kernels.layout import Final, Sampled
 from steadyslip.kernels.runner import STATUSES, TALLY
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
+from steadyslip.model import Model
 from steadyslip.motion.engine import (
     ILL_POSED,
     INTERRUPTED,
@@ -31,7 +34,7 @@ from steadyslip.motion.engine import (
 )
 from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.motion.observe import observable_units, observe, out_of_range
-from steadyslip.motion.single import checked_times
+from steadyslip.motion.single import areas, checked_times
 from steadyslip.motion.status import WORDS
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.inputs import segment_of
@@ -39,6 +42,13 @@ from steadyslip.protocol.inputs import segment_of
 DONE = STATUSES.index("done")
 _UNITS = ("1", "m/s", "m/s", "s", "s", "m", "Pa", "m/s", "s", "s", "s", "1")
 EVENT_UNITS = {name: unit for name, unit in zip_longest(TALLY, _UNITS, fillvalue="1") if name}
+R = TypeVar("R", bound=Rig)
+
+
+def event_unit(name: str) -> str:
+    """Unit of a column of `Ensemble.events`."""
+    plain = name.rpartition(".")[2]
+    return "N" if plain == "force_drop" else EVENT_UNITS[plain]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +68,7 @@ class Ensemble(ReadOnly):
         complete event begin, duration, slip, stress drop, peak velocity and recurrence; number of arrests and velocity
         peaks, time of the last peak, the period between the last two, and the growth of |ln(peak velocity/drive)|.
         Where there is none, duration, slip and stress drop are 0, times and velocities NaN; empty unless asked for.
+        Of a machine all that for each contact, with its name before it, and a force drop, N.
     samples : dict of str to ndarray
         Observables at `times`, which is the last axis; NaN after the end of a run.
     times : ndarray
@@ -106,7 +117,7 @@ class Ensemble(ReadOnly):
             "rejected": (dims, self.rejected),
         }
         variables |= {f"final_{n}": (dims, a, {"units": self.units[n]}) for n, a in self.final.items()}
-        variables |= {f"event_{n}": (dims, a, {"units": EVENT_UNITS[n]}) for n, a in self.events.items()}
+        variables |= {f"event_{n}": (dims, a, {"units": event_unit(n)}) for n, a in self.events.items()}
         variables |= {n: ((*dims, "time"), a, {"units": self.units[n]}) for n, a in self.samples.items()}
         coords = dict(self._coords or {})
         if len(self.times):
@@ -116,7 +127,7 @@ class Ensemble(ReadOnly):
 
 @checked(until=finite(0), times=NUMBERS)
 def simulate_many(
-    rig: Slider,
+    rig: Slider | Machine,
     vary: Mapping[str, Any],
     protocol: Any = None,
     *,
@@ -140,7 +151,7 @@ def simulate_many(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     vary : mapping of str to array_like or xarray.DataArray
         Parameters by dotted name, in SI units: of the rig, or of the protocol as ``protocol.pieces.1.to``.
         Arrays broadcast against each other.
@@ -192,7 +203,7 @@ def simulate_many(
 
 
 def broadcast_arrays(
-    rig: Slider, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
+    rig: Slider | Machine, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any], Together]:
     """Flat arrays of equal length by full name, the starting values apart, and how they go together."""
     known = dict.fromkeys([*rig.parameters(), *parameters(plan, "protocol.")])
@@ -218,7 +229,7 @@ def _picked(array: Any, index: np.ndarray | None) -> Any:
     return array[index] if index is not None and np.ndim(array) else array
 
 
-def regimes(rig: Slider, flat: dict[str, Any], size: int) -> Iterator[tuple[Slider, dict[str, Any], np.ndarray | None]]:
+def regimes(rig: R, flat: dict[str, Any], size: int) -> Iterator[tuple[R, dict[str, Any], np.ndarray | None]]:
     """Split where a structural parameter (mass, B0, ...) is zero in some runs: those have other equations."""
     structural = [
         name
@@ -237,6 +248,19 @@ def regimes(rig: Slider, flat: dict[str, Any], size: int) -> Iterator[tuple[Slid
         absent = [name for name, is_zero in zip(structural, pattern, strict=True) if is_zero]
         rest = {name: value for name, value in flat.items() if name not in absent}
         yield rig.with_values(dict.fromkeys(absent, 0.0)), rest, np.flatnonzero(member.reshape(-1) == number)
+
+
+def _columns(model: Model) -> dict[str, tuple[int, int, bool]]:
+    """Columns of the tally by name, with the number of the contact and whether it is a force in place of a stress."""
+    found: dict[str, tuple[int, int, bool]] = {}
+    for i, contact in enumerate(model.contacts):
+        for k, name in enumerate(TALLY):
+            if name and contact.name:
+                own = name.replace("stress_drop", "force_drop")
+                found[f"{contact.name}.{own}"] = (i * len(TALLY) + k, i, own != name)
+            elif name:
+                found[name] = (k, 0, False)
+    return found
 
 
 class _Store:
@@ -260,15 +284,16 @@ class _Store:
         self.steps = np.zeros(size, dtype=np.int64)
         self.rejected = np.zeros(size, dtype=np.int64)
         self.final: dict[str, np.ndarray] = {name: np.full(size, np.nan) for name in wanted}
-        self.events = {name: np.full(size, np.nan) for name in EVENT_UNITS} if events else {}
+        self.columns = _columns(jobs.point.model) if events else {}
+        self.events = {name: np.full(size, np.nan) for name in self.columns}
         self.samples: dict[str, np.ndarray] = {}
         if len(times):
             self.samples = {name: np.full((size, len(times)), np.nan) for name in wanted}
 
     def put(self, where: Any, jobs: Jobs, machine: Any, first: int, outcome: Outcome) -> None:
         """Everything that a chunk of runs has to say."""
-        sigma = jobs.point.part(slice(first, first + len(outcome.status))).sigma
-        absent = np.broadcast_to(~(sigma > 0), outcome.status.shape)
+        own = jobs.point.part(slice(first, first + len(outcome.status)))
+        absent = np.broadcast_to(~np.asarray(own.exists), outcome.status.shape)
         posed = jobs.posed[first : first + len(outcome.status)] if len(jobs.posed) > 1 else jobs.posed
         known = jobs.in_range[first : first + len(outcome.status)] if len(jobs.in_range) > 1 else jobs.in_range
         ended = np.where(absent, NO_STEADY, np.where(posed, outcome.status, ILL_POSED))
@@ -276,9 +301,9 @@ class _Store:
         self.end[where] = np.where(absent, np.nan, outcome.final[:, Final.TIME])
         counts = np.nan_to_num(outcome.steps)  # NaN where a run was never finished
         self.steps[where], self.rejected[where] = counts.T
-        for name in self.events:
-            i = TALLY.index(name)
-            self.events[name][where] = np.where(absent, np.nan, outcome.tally[:, i])
+        for name, (column, contact, force) in self.columns.items():
+            area = own.evaluate(areas(own.model))[contact] if force else 1.0
+            self.events[name][where] = np.where(absent, np.nan, area * outcome.tally[:, column])
         if not self.final:
             return
         ran = np.flatnonzero(np.isfinite(outcome.state).all(axis=1) & ~absent)

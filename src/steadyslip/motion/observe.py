@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from steadyslip.core.questions import question
-from steadyslip.kernels.layout import Sampled
 from steadyslip.kernels.runner import Runner
-from steadyslip.model import Model
+from steadyslip.model import Model, OperatingPoint
 from steadyslip.motion.jobs import Jobs
 
 Array = np.ndarray
@@ -18,15 +18,37 @@ Tables = tuple[np.ndarray, ...]
 OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity", "disturbance",
             "load_displacement")  # fmt: skip
 """What the driver's `observe` gives, in this order."""
+STRESSES = ("normal_stress", "shear_stress", "spring_stress")
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s",
                "disturbance": "Pa"}  # fmt: skip
 
 
 def observable_units(model: Model) -> dict[str, str]:
     """Names and SI units of everything that a run can show."""
+    if model.contacts[0].name:
+        return _machine_units(model)
     units = {"x": "m", "v": "m/s"} | EXTRA_UNITS
     units |= {name: unit for name, (_, unit) in model.observables.items()}
     return units | {m.name: m.unit for m in model.variables}
+
+
+def _machine_units(model: Model) -> dict[str, str]:
+    """Of a machine: by body and by contact, in forces."""
+    units: dict[str, str] = {}
+    for one in model.coordinates:
+        units |= {
+            f"{one.name}.x": one.unit,
+            f"{one.name}.v": f"{one.unit}/s",
+            f"{one.name}.acceleration": f"{one.unit}/s^2",
+        }
+        if one.speed != 0:
+            units[f"{one.name}.displacement"] = one.unit
+    for contact in model.contacts:
+        units |= {f"{contact.name}.slip": "m", f"{contact.name}.slip_rate": "m/s"}
+    unit = model.roles["drive.velocity"].unit.removesuffix("/s")
+    units |= {"load_displacement": unit, "load_velocity": f"{unit}/s", "disturbance": "N"}
+    units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}
+    return units | {m.name: m.unit for m in model.variables if m.name not in units}
 
 
 def out_of_range(found: dict[str, Array]) -> Array:
@@ -39,13 +61,23 @@ def out_of_range(found: dict[str, Array]) -> Array:
 
 
 @question
-def _function(model: Model) -> tuple[list[str], Callable[..., list[Any]]]:
-    contact = model.contact
-    arguments = [contact.slip, contact.velocity, contact.normal, contact.friction, contact.spring]
-    arguments += [item.symbol for item in model.memory]
-    names = [n for n in model.observables if n not in ("x", "v", "shear_stress", "normal_stress", "spring_stress")]
-    function = model.function((model.observables[n][0] for n in names), *arguments)
-    return names, function
+def _function(model: Model) -> tuple[list[str], list[str], Callable[..., list[Any]]]:
+    """Observables that follow from others: their names, and the names and the function of what they follow from."""
+    given: dict[sp.Symbol, str] = {}
+    for one in model.coordinates:
+        own = f"{one.name}." if model.contacts[0].name else ""
+        given |= {one.displacement: f"{own}x", one.velocity: f"{own}v"}
+    for contact in model.contacts:
+        own = f"{contact.name}." if contact.name else ""
+        stresses = (contact.normal, contact.friction, contact.spring)
+        given |= {symbol: own + name for symbol, name in zip(stresses, STRESSES, strict=True)}
+        if contact.velocity not in given:
+            given[contact.velocity] = f"{own}slip_rate"
+    given |= {item.symbol: item.name for item in (*model.memory, *model.integrals)}
+    given[model.inputs["load_velocity"]] = "load_velocity"
+    known = set(given.values())
+    names = [n for n in model.observables if n not in known]
+    return names, list(given.values()), model.function((model.observables[n][0] for n in names), *given)
 
 
 def observe(
@@ -70,20 +102,65 @@ def observe(
     model = reduction.model
     last = first + (int(lane.max()) if len(lane) else 0) + 1
     constants, _, settings, segments = tables or jobs.tables(machine, first, last, False, False)
-    values = np.empty((len(OBSERVED) + len(reduction.continuous), len(time)))
+    count = len(model.contacts)
+    values = np.empty((len(OBSERVED) * count + len(reduction.continuous) + len(reduction.further), len(time)))
     machine.code.observe(
         constants, settings, segments, np.ascontiguousarray(points), np.ascontiguousarray(lane, dtype=np.int64),
         np.ascontiguousarray(segment, dtype=np.int64), np.ascontiguousarray(time), values,
     )  # fmt: skip
-    found = dict(zip(OBSERVED, values, strict=False))
-    found["x"] = points[:, Sampled.STATE]
-    continuous = dict(zip(reduction.continuous, values[len(OBSERVED) :], strict=True))
-    found |= {item.name: continuous[item.symbol] for item in (*model.memory, *model.integrals)}
-    found["slip"] = found["x"] + found["load_displacement"]
-    names, function = _function(model)
+    found = _at_contacts(model, values)
+    kept = values[len(OBSERVED) * count :]
+    continuous = dict(zip(reduction.continuous, kept, strict=False))
+    own = [item for item in model.variables if item.symbol in continuous and item.kind != "velocity"]
+    found |= {item.name: continuous[item.symbol] for item in own}
+    found |= dict(zip(reduction.further, kept[len(reduction.continuous) :], strict=True))
     point = jobs.point.part(slice(first, last)).part(lane)
-    stresses = [found["x"], found["v"], found["normal_stress"], found["shear_stress"], found["spring_stress"]]
-    own = [found[item.name] for item in model.memory]
-    for name, value in zip(names, point.evaluate(function, *stresses, *own), strict=True):
+    if reduction.further:
+        _of_the_drive(model, found, point)
+    else:
+        found["slip"] = found["x"] + found["load_displacement"]
+    names, given, function = _function(model)
+    for name, value in zip(names, point.evaluate(function, *(found[n] for n in given)), strict=True):
         found[name] = value if np.shape(value) == time.shape else np.full(time.shape, value, dtype=float)
     return found
+
+
+def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
+    """What the driver's `observe` gives of each contact."""
+    found: dict[str, Array] = {}
+    for i, contact in enumerate(model.contacts):
+        seen = dict(zip(OBSERVED, values[len(OBSERVED) * i :], strict=False))
+        if not contact.name:
+            return seen
+        found |= {f"{contact.name}.{name}": seen[name] for name in STRESSES}
+        found |= {f"{contact.name}.slip_rate": seen["v"], f"{contact.name}.way": seen["load_displacement"]}
+        found |= {f"{contact.name}.load": seen["load_velocity"], "disturbance": seen["disturbance"]}
+    return found
+
+
+@question
+def _shares(model: Model) -> Callable[..., list[Any]]:
+    """Slip rate of the contacts and speed of the coordinates in steady sliding, over the velocity of the drive."""
+    drive = model.steady[model.inputs["load_velocity"]]
+    speeds = [model.steady[contact.velocity] for contact in model.contacts]
+    return model.function(speed / drive for speed in (*speeds, *(one.speed for one in model.coordinates)))
+
+
+@question
+def _slips(model: Model) -> Callable[..., list[Any]]:
+    return model.function([c.slip for c in model.contacts], *(one.displacement for one in model.coordinates))
+
+
+def _of_the_drive(model: Model, found: dict[str, Array], point: OperatingPoint) -> None:
+    """Ways of bodies and contacts since the start: how far they are ahead of steady sliding, and the drive's way."""
+    shares = point.evaluate(_shares(model))
+    slips, speeds = shares[: len(model.contacts)], shares[len(model.contacts) :]
+    places = [found[f"{one.name}.x"] for one in model.coordinates]
+    ahead = point.evaluate(_slips(model), *places)
+    for contact, x in zip(model.contacts, ahead, strict=True):
+        found[f"{contact.name}.slip"] = x + found[f"{contact.name}.way"]
+    found["load_velocity"] = found[f"{model.contacts[0].name}.load"] / slips[0]
+    found["load_displacement"] = found[f"{model.contacts[0].name}.way"] / slips[0]
+    for one, x, speed in zip(model.coordinates, places, speeds, strict=True):
+        if one.speed != 0:
+            found[f"{one.name}.displacement"] = x + speed * found["load_displacement"]

@@ -12,8 +12,10 @@ import numpy as np
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name, totals
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
-from steadyslip.motion.events import SlipEvent, slip_events
+from steadyslip.motion.events import AnySlip, ContactEvent, ContactSlip, Event, SlipEvent, slip_events
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.status import remedy
 
@@ -30,37 +32,30 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     @property
     def message(self) -> str:
         """The status in a sentence, with what to do where the run ended early."""
-        head = f"{self.status} at {shown(self.end, 's')}"
+        where = f" ({self.contact})" if self.contact else ""
+        head = f"{self.status}{where} at {shown(self.end, 's')}"
         advice = remedy(self.status)
         return f"{head}: {advice}" if advice else head
 
+    @property
+    def contact(self) -> str:
+        """The contact of a machine at which a run ended that was to go on: lost, or the fastest; else empty."""
+        last = next((e for e in reversed(self.events) if e.kind == self.status), None)
+        if isinstance(last, ContactEvent):
+            return last.contact
+        if self.status != "contact lost" or not isinstance(self.rig, Machine) or not len(self.data["t"]):
+            return ""
+        forces = {name: self.data[f"{name}.normal_force"] for name in self.rig.contacts}
+        return str(min(forces, key=lambda name: float(forces[name][-1] / forces[name].max())))
+
     @cached_property
-    def slip_events(self) -> tuple[SlipEvent, ...]:
-        """Complete slip events; see `SlipEvent`."""
+    def slip_events(self) -> tuple[AnySlip, ...]:
+        """Complete slip events; see `SlipEvent` and, of machines, `ContactSlip`."""
         return slip_events(self.events)
 
     def summary(self) -> str:
         """What happened, in a few lines."""
-        v, area = self.data["v"], self.rig.area
-        lines = [f"{self.message}"]
-        if len(v):
-            lowest, highest = self.velocities
-            lines.append(
-                f"velocity        {shown(lowest, 'm/s')} to {shown(highest, 'm/s')}, at the end {shown(v[-1], 'm/s')}"
-            )
-            stress = [*self.data["normal_stress"], *(event.normal_stress for event in self.events)]
-            low, high = (shown(float(x), "Pa", area=area) for x in (min(stress), max(stress)))
-            lines.append(f"{stress_name('normal stress', area):<16}{low} to {high}")
-        slips = self.slip_events
-        if slips:
-            last = slips[-1]
-            lines.append(
-                f"slip events     {len(slips)}; the last: peak {shown(last.peak_velocity, 'm/s')}, "
-                f"{stress_name('stress drop', area)} {shown(last.stress_drop, 'Pa', area=area)}, "
-                f"slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
-            )
-            if np.isfinite(last.recurrence):
-                lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
+        lines = [f"{self.message}", *(self._contacts() if isinstance(self.rig, Machine) else self._block())]
         until = self.protocol.until or np.inf
         begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
         if late := [f"{name} at {shown(at, 's')}" for name, at in begins if at >= until]:
@@ -71,6 +66,54 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
         return "\n".join(lines)
 
+    def _contacts(self) -> list[str]:
+        """Of a machine: what its contacts do."""
+        lines: list[str] = []
+        velocities = self.velocities
+        for name, (lowest, highest) in velocities.items() if isinstance(velocities, dict) else ():
+            v, forces = self.data[f"{name}.slip_rate"], self.data[f"{name}.normal_force"]
+            if not len(v):
+                continue
+            rates = f"{shown(lowest, 'm/s')} to {shown(highest, 'm/s')}, at the end {shown(v[-1], 'm/s')}"
+            low, high = shown(float(forces.min()), "N"), shown(float(forces.max()), "N")
+            lines.append(f"{name:<15} slip rate {rates}; normal force {low} to {high}")
+            slips = [one for one in self.slip_events if isinstance(one, ContactSlip) and one.contact == name]
+            if slips:
+                last = slips[-1]
+                again = f", {shown(last.recurrence, 's')} after the one before" if np.isfinite(last.recurrence) else ""
+                lines.append(
+                    f"{'':<15} {len(slips)} slip events; the last: peak {shown(last.peak_velocity, 'm/s')}, force drop "
+                    f"{shown(last.force_drop, 'N')}, slip {shown(last.slip, 'm')}, lasting "
+                    f"{shown(last.duration, 's')}{again}"
+                )
+        return lines
+
+    def _block(self) -> list[str]:
+        """Of a slider: what its block does."""
+        lines: list[str] = []
+        if not isinstance(self.rig, Slider) or not isinstance(self.velocities, tuple):
+            return lines
+        v, area = self.data["v"], self.rig.area
+        if len(v):
+            lowest, highest = self.velocities
+            lines.append(
+                f"velocity        {shown(lowest, 'm/s')} to {shown(highest, 'm/s')}, at the end {shown(v[-1], 'm/s')}"
+            )
+            stress = [*self.data["normal_stress"], *(e.normal_stress for e in self.events if isinstance(e, Event))]
+            low, high = (shown(float(x), "Pa", area=area) for x in (min(stress), max(stress)))
+            lines.append(f"{stress_name('normal stress', area):<16}{low} to {high}")
+        slips = [one for one in self.slip_events if isinstance(one, SlipEvent)]
+        if slips:
+            last = slips[-1]
+            lines.append(
+                f"slip events     {len(slips)}; the last: peak {shown(last.peak_velocity, 'm/s')}, "
+                f"{stress_name('stress drop', area)} {shown(last.stress_drop, 'Pa', area=area)}, "
+                f"slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
+            )
+            if np.isfinite(last.recurrence):
+                lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
+        return lines
+
     def __str__(self) -> str:
         return self.summary()
 
@@ -79,6 +122,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         last = {name: float(values[-1]) for name, values in self.data.items() if len(values)}
         return {
             "status": self.status,
+            **({"contact": self.contact or None} if isinstance(self.rig, Machine) else {}),
             "end": self.end,
             "message": self.message,
             "method": self.method,
@@ -93,7 +137,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
 
     def _forces(self, last: dict[str, float]) -> dict[str, Any]:
         """With an area, the last values of the whole contact."""
-        found = totals(last, self.units, self.rig.area)
+        found = totals(last, self.units, self.rig.area) if isinstance(self.rig, Slider) else {}
         return {"forces": {"area": found["area"], "final": found["values"], "units": found["units"]}} if found else {}
 
     def to_xarray(self) -> Any:

@@ -12,12 +12,16 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import NUMBERS, checked, finite
+from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.model import Model
+from steadyslip.model.scales import slip_rates
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
-from steadyslip.motion.events import Event, events_of
+from steadyslip.motion.events import AnyEvent, ContactEvent, event_of, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
 from steadyslip.motion.observe import observable_units, observe, out_of_range
 from steadyslip.motion.result import History
@@ -31,7 +35,7 @@ OWN_STEPS = 500_000
 
 @checked(until=finite(0), times=NUMBERS)
 def simulate(
-    rig: Slider,
+    rig: Slider | Machine,
     protocol: Any = None,
     *,
     until: float | None = None,
@@ -49,7 +53,7 @@ def simulate(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     protocol : Protocol, Piece or sequence of Piece, optional
         What load point, normal stress and disturbance do; by default the drive's steady velocity.
     until : float, optional
@@ -97,7 +101,7 @@ def simulate(
     options = Options(method, rtol, most, arrest)
     plan = Protocol.of(protocol)
     jobs = prepare(rig, plan, until, {}, initial or {}, options, branch)
-    if not jobs.sigma[0] > 0:
+    if not jobs.exists[0]:
         steady_state(rig)  # raises, and says why
     if not jobs.posed[0]:
         raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
@@ -136,7 +140,13 @@ def checked_times(times: Any, until: float) -> np.ndarray:
 
 
 def _history(
-    rig: Slider, plan: Protocol, jobs: Jobs, machine: Runner, outcome: Outcome, requested: np.ndarray, own: bool
+    rig: Slider | Machine,
+    plan: Protocol,
+    jobs: Jobs,
+    machine: Runner,
+    outcome: Outcome,
+    requested: np.ndarray,
+    own: bool,
 ) -> History:
     status = WORDS[int(outcome.status[0])]
     steps, end = outcome.steps[0], float(outcome.final[0, Final.TIME])
@@ -150,10 +160,13 @@ def _history(
         segment = segment_of(jobs.segments, np.zeros(len(time), dtype=int), time)
     lane = np.zeros(len(time), dtype=int)
     found = observe(jobs, machine, 0, lane, segment, time, points, outcome.tables)
-    units = {"t": "s"} | observable_units(machine.reduction.model)
-    events = events_of(outcome.log)
+    model = machine.reduction.model
+    units = {"t": "s"} | observable_units(model)
+    contacts = tuple(contact.name for contact in model.contacts)
+    surfaces = tuple(float(area) for area in jobs.point.evaluate(areas(model)))
+    events = events_of(outcome.log, contacts, surfaces)
     if status == "blow-up":
-        events += (_last_event("blow-up", jobs, machine, outcome),)
+        events += (_last_event("blow-up", jobs, machine, outcome, surfaces),)
     if status in ("done", "blow-up") and np.any(bad := out_of_range(found)):
         first = int(np.argmax(bad))
         if status == "done":
@@ -173,23 +186,42 @@ def _history(
         rtol=jobs.options.rtol,
         steps=int(steps[0]),
         rejected=int(steps[1]),
-        velocities=_velocities(outcome, found["v"], events),
+        velocities=_velocities(outcome, contacts, found, events),
     )
 
 
-def _velocities(outcome: Outcome, samples: np.ndarray, events: tuple[Event, ...]) -> tuple[float, float]:
+@question
+def areas(model: Model) -> Callable[..., list[Any]]:
+    """Areas of the contacts, of which forces are stresses times."""
+    return model.function(contact.area for contact in model.contacts)
+
+
+def _velocities(
+    outcome: Outcome, contacts: tuple[str, ...], found: dict[str, np.ndarray], events: tuple[AnyEvent, ...]
+) -> tuple[float, float] | dict[str, tuple[float, float]]:
     """Lowest and highest velocity of a run: at samples and events, and of what is kept of it where it was watched."""
-    known = [float(outcome.tally[0, TALLY.index(name)]) for name in ("lowest_velocity", "peak_velocity")]
-    known += [float(samples.min()), float(samples.max())] if len(samples) else []
-    known += [event.velocity for event in events]
-    finite = [v for v in known if math.isfinite(v)]
-    return (min(finite), max(finite)) if finite else (math.nan, math.nan)
+    each: dict[str, tuple[float, float]] = {}
+    for i, name in enumerate(contacts):
+        first, samples = i * len(TALLY), found[f"{name}.slip_rate" if name else "v"]
+        known = [float(outcome.tally[0, first + TALLY.index(of)]) for of in ("lowest_velocity", "peak_velocity")]
+        known += [float(samples.min()), float(samples.max())] if len(samples) else []
+        known += [e.velocity for e in events if not isinstance(e, ContactEvent) or e.contact == name]
+        finite = [v for v in known if math.isfinite(v)]
+        each[name] = (min(finite), max(finite)) if finite else (math.nan, math.nan)
+    return each if contacts[0] else each[""]
 
 
-def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome) -> Event:
-    """The end of a run that could not go on, as an event."""
+def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome, surfaces: tuple[float, ...]) -> AnyEvent:
+    """The end of a run that could not go on, as an event: of a machine at the contact that is fastest."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
     segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]
     found = observe(jobs, machine, 0, zero, segment, time, outcome.point, outcome.tables)
-    names = ("v", "normal_stress", "shear_stress", "spring_stress", "slip")
-    return Event(kind, float(time[0]), *(float(found[name][0]) for name in names))
+    names = [contact.name for contact in machine.reduction.model.contacts]
+    if not names[0]:
+        wanted = ("v", "normal_stress", "shear_stress", "spring_stress", "slip")
+        return event_of(kind, "", 1.0, [float(time[0]), *(float(found[name][0]) for name in wanted)])
+    steady = [float(speed) for speed in slip_rates(jobs.point)]
+    fastest = max(range(len(names)), key=lambda i: abs(float(found[f"{names[i]}.slip_rate"][0])) / steady[i])
+    wanted = ("slip_rate", "normal_stress", "shear_stress", "spring_stress", "slip")
+    numbers = [float(found[f"{names[fastest]}.{name}"][0]) for name in wanted]
+    return event_of(kind, names[fastest], surfaces[fastest], [float(time[0]), *numbers])

@@ -15,7 +15,9 @@ from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.kernels.methods import METHODS
 from steadyslip.kernels.runner import LOG_KINDS
-from steadyslip.motion.events import Event
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.events import ContactEvent, Event
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.observe import observable_units
 from steadyslip.motion.status import WORDS
@@ -24,6 +26,9 @@ RUN = FileKind("run", 3, 2**29, "simulate again and save the run anew")
 MOST_EVENTS = 10**6
 _EVENT_UNITS = {
     "time": "s", "velocity": "m/s", "normal_stress": "Pa", "shear_stress": "Pa", "spring_stress": "Pa", "slip": "m",
+}  # fmt: skip
+_CONTACT_UNITS = {
+    "time": "s", "velocity": "m/s", "normal_force": "N", "friction_force": "N", "pull": "N", "slip": "m",
 }  # fmt: skip
 _ATTRIBUTES = {
     "rig": str, "status": str, "end": float, "method": str, "rtol": float, "steps": int, "rejected": int,
@@ -42,12 +47,18 @@ def to_dataset(history: HistoryData) -> Any:
     variables = {
         name: ("time", values, {"units": history.units[name]}) for name, values in history.data.items() if name != "t"
     }
-    events = history.events
+    events, numbers = history.events, _event_units(history.rig)
     variables |= {
         f"event_{name}": ("event", np.array([getattr(e, name) for e in events], dtype=float), {"units": unit})
-        for name, unit in _EVENT_UNITS.items()
+        for name, unit in numbers.items()
     }
     variables["event_kind"] = ("event", np.array([e.kind for e in events], dtype=object), {})
+    lowest, highest = history.velocities if isinstance(history.velocities, tuple) else _extremes(history.velocities)
+    if isinstance(history.velocities, dict):
+        contacts = [e.contact for e in events if isinstance(e, ContactEvent)]
+        variables["event_contact"] = ("event", np.array(contacts, dtype=object), {})
+        for i, name in enumerate(("lowest_velocity", "peak_velocity")):
+            variables[name] = ("contact", np.array([own[i] for own in history.velocities.values()]), {"units": "m/s"})
     attributes = {
         "rig": rig_to_text(history.rig, history.protocol),
         "status": history.status,
@@ -56,11 +67,20 @@ def to_dataset(history: HistoryData) -> Any:
         "rtol": history.rtol,
         "steps": history.steps,
         "rejected": history.rejected,
-        "lowest_velocity": history.velocities[0],
-        "peak_velocity": history.velocities[1],
+        "lowest_velocity": lowest,
+        "peak_velocity": highest,
         "steadyslip": __version__,
     }
     return xr.Dataset(variables, coords={"time": ("time", history.data["t"], {"units": "s"})}, attrs=attributes)
+
+
+def _extremes(velocities: dict[str, tuple[float, float]]) -> tuple[float, float]:
+    """Of all contacts."""
+    return min(low for low, _ in velocities.values()), max(high for _, high in velocities.values())
+
+
+def _event_units(rig: Slider | Machine) -> dict[str, str]:
+    return _CONTACT_UNITS if isinstance(rig, Machine) else _EVENT_UNITS
 
 
 def save(history: HistoryData, path: str | PathLike[str]) -> None:
@@ -87,7 +107,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
     """
-    from steadyslip.files.specifications import protocol_from_text, slider_from_text
+    from steadyslip.files.specifications import protocol_from_text, rig_from_text
     from steadyslip.model import build_model
     from steadyslip.protocol import Protocol
 
@@ -95,20 +115,33 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     attributes = table.attributes
     _check_words(table)
     try:
-        rig = slider_from_text(attributes["rig"], str(path))
+        rig = rig_from_text(attributes["rig"], str(path))
         protocol = protocol_from_text(attributes["rig"], str(path)) or Protocol()
         units = {"t": "s"} | observable_units(build_model(rig))
     except SteadyslipError as error:
         raise table.fault(f"its rig is refused: {error}") from error
     columns = {"time" if name == "t" else name: ColumnRule(("time",), unit) for name, unit in units.items()}
-    columns |= {f"event_{name}": ColumnRule(("event",), unit) for name, unit in _EVENT_UNITS.items()}
-    found = table.columns(columns | {"event_kind": ColumnRule(("event",), text=True)})
+    numbers = _event_units(rig)
+    columns |= {f"event_{name}": ColumnRule(("event",), unit) for name, unit in numbers.items()}
+    columns["event_kind"] = ColumnRule(("event",), text=True)
+    if isinstance(rig, Machine):
+        columns["event_contact"] = ColumnRule(("event",), text=True)
+        columns |= {name: ColumnRule(("contact",), "m/s") for name in ("lowest_velocity", "peak_velocity")}
+    found = table.columns(columns)
     if table.sizes["event"] > MOST_EVENTS:
         raise table.fault(f"it has {table.sizes['event']} events, allowed are {MOST_EVENTS}")
     kinds = found["event_kind"]
     if unknown := set(kinds) - set(LOG_KINDS[1:]):
         raise table.fault(f"it has an event of unknown kind, {unknown.pop()!r:.40}")
-    moments = zip(*(found[f"event_{name}"].tolist() for name in _EVENT_UNITS), strict=True)
+    moments = list(zip(*(found[f"event_{name}"].tolist() for name in numbers), strict=True))
+    velocities: Any = (attributes["lowest_velocity"], attributes["peak_velocity"])
+    if isinstance(rig, Machine):
+        velocities = _velocities(table, rig, found)
+    contacts = found.get("event_contact", [""] * len(kinds))
+    events = [
+        ContactEvent(kind, row[0], contact, *row[1:]) if contact else Event(kind, *row)
+        for kind, contact, row in zip(kinds, contacts, moments, strict=True)
+    ]
     data = {name: found["time" if name == "t" else name] for name in units}
     _check_samples(table, data)
     return {
@@ -116,10 +149,19 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
         "protocol": protocol,
         "data": data,
         "units": units,
-        "events": tuple(Event(kind, *row) for kind, row in zip(kinds, moments, strict=True)),
+        "events": tuple(events),
         **{name: attributes[name] for name in ("status", "end", "method", "rtol", "steps", "rejected")},
-        "velocities": (attributes["lowest_velocity"], attributes["peak_velocity"]),
+        "velocities": velocities,
     }
+
+
+def _velocities(table: ExpectedTable, rig: Machine, found: dict[str, Any]) -> dict[str, tuple[float, float]]:
+    """Lowest and highest slip rate of every contact."""
+    names = list(rig.contacts)
+    if table.sizes["contact"] != len(names) or set(found["event_contact"]) - set(names):
+        raise table.fault(f"its contacts are not those of its rig, {', '.join(names)}")
+    pairs = zip(found["lowest_velocity"].tolist(), found["peak_velocity"].tolist(), strict=True)
+    return dict(zip(names, pairs, strict=True))
 
 
 def _check_words(table: ExpectedTable) -> None:
@@ -153,7 +195,8 @@ def to_csv(history: HistoryData, path: str | PathLike[str]) -> None:
         If the file cannot be written.
     """
     names = list(history.data)
-    written = [outside(history.units[name], history.rig.area) for name in names]
+    area = history.rig.area if isinstance(history.rig, Slider) else None
+    written = [outside(history.units[name], area) for name in names]
     columns = {
         f"{name} ({unit})": history.data[name] * factor for name, (factor, unit) in zip(names, written, strict=True)
     }

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from steadyslip.core.records import setting
+from steadyslip.core.roles import Text
 from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS, Piece
 from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 
 
 class OnNormalStress(Piece):
-    """Base of what is added to the normal stress of the contact law."""
+    """Base of what is added to the normal stress of the contact law; of a machine, to the force on one contact."""
 
     channel: ClassVar[int] = NORMAL_STRESS
 
+    on: str | None = setting(Text("the contact, of a machine that has several"), default=None)
+
 
 class OnBlock(Piece):
-    """Base of the disturbance stress q, which pushes the block forward."""
+    """Base of the disturbance stress q, which pushes the block forward; of a machine, a force or torque on one body."""
 
     channel: ClassVar[int] = DISTURBANCE
+
+    on: str | None = setting(Text("the body, of a machine that has several"), default=None)
 
 
 class NormalStressStep(StressStep, OnNormalStress, name="normal-stress-step"):

@@ -19,6 +19,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps import MapResult, Sensitivity
 from steadyslip.motion import History
+from steadyslip.motion.events import ContactSlip
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports import machine as of_machine, rig as of_rig
@@ -173,19 +174,23 @@ def _analysis(result: Analysis) -> Parts:
 
 @parts_of.register
 def _history(result: History) -> Parts:
+    rig = result.rig if isinstance(result.rig, Slider) else None
     text = of_rig.as_file(result.rig, result.protocol)
+    plane = [] if rig is None else [
+        figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), PLANE)
+    ]  # fmt: skip
     body = [
-        *about_rig(result.rig),
+        *about_rig(rig),
         heading("What was done to it"), listing(text.partition("[protocol]")[2].strip()),
         heading("What it did"), *_words(result.summary()),
         figure(drawn(lambda: figures.history(result), "history", 7.0), "Velocity, friction, normal stress."),
-        figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), PLANE),
+        *plane,
         *_slips(result),
     ]  # fmt: skip
     slips = len(result.slip_events)
     head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {shown(result.end, 's')}"
     question = f"What does this rig do in {shown(result.protocol.until or result.end, 's')} under the protocol below?"
-    return Parts(head, sentence(result.message), question, body, result.rig, text)
+    return Parts(head, sentence(result.message), question, body, rig, text)
 
 
 def _slips(result: History) -> Iterator[str]:
@@ -193,15 +198,17 @@ def _slips(result: History) -> Iterator[str]:
     if not slips:
         return
     yield heading("Slip events", 3)
-    area = result.rig.area
+    area = result.rig.area if isinstance(result.rig, Slider) else None
     rows = [
-        (i, shown(one.begin, "s"), shown(one.duration, "s"), shown(one.slip, "m"), shown(one.peak_velocity, "m/s"),
-         shown(one.stress_drop, "Pa", area=area))
+        (one.contact if isinstance(one, ContactSlip) else i, shown(one.begin, "s"), shown(one.duration, "s"),
+         shown(one.slip, "m"), shown(one.peak_velocity, "m/s"),
+         shown(one.force_drop, "N") if isinstance(one, ContactSlip) else shown(one.stress_drop, "Pa", area=area))
         for i, one in enumerate(slips, start=1)
     ]  # fmt: skip
+    drop = "force drop" if isinstance(slips[0], ContactSlip) else "stress drop"
     if len(rows) > LISTED:
         yield paragraph(f"The last {LISTED} of {len(rows)}.", "small")
-    yield table(rows[-LISTED:], ("", "begins", "lasts", "slip", "peak velocity", "stress drop"))
+    yield table(rows[-LISTED:], ("", "begins", "lasts", "slip", "peak velocity", drop))
 
 
 @parts_of.register

@@ -13,6 +13,7 @@ from steadyslip.files.specifications.layout import selector
 from steadyslip.files.specifications.read import protocol_of, text_of
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import Table
+from steadyslip.machine.machine import Machine
 from steadyslip.protocol import Piece, Protocol
 
 
@@ -47,7 +48,7 @@ def protocol_from_text(text: str, source: str = "rig", changes: Iterable[str] = 
 
 
 @checked()
-def piece_from_text(text: str, area: float | None = None) -> Piece:
+def piece_from_text(text: str, area: float | None = None, machine: Machine | None = None) -> Piece:
     """Read one piece of a protocol from a line of words, the kind first.
 
     Parameters
@@ -56,6 +57,8 @@ def piece_from_text(text: str, area: float | None = None) -> Piece:
         Such as ``"velocity-step at=10s to='2 um/s'"``; quotes keep words together as in a shell.
     area : float, optional
         Contact area of the rig, m^2: with it stresses are given as forces, as in a rig file.
+    machine : Machine, optional
+        In place of it: what is done to a machine is in forces, and in angles where its load point turns.
 
     Raises
     ------
@@ -83,7 +86,8 @@ def piece_from_text(text: str, area: float | None = None) -> Piece:
             reader.problem(name, "is given twice")
         else:
             table[name] = value_of(raw, name)
-    piece = reader.record(Piece, table, "")
+    with reader.of_machine(machine):
+        piece = reader.record(Piece, table, "")
     if reader.problems:
         raise ParameterError(reader.problems, title=repr(text))
     if not isinstance(piece, Piece):

@@ -215,7 +215,7 @@ def read_tables(
         changed.add(full_name(split(change)[0], tables)[0])
         reader.problems += apply(change, tables, lines)
     found_rig = None if not rig_needed and set(tables) == {PROTOCOL.name} else reader.rig(names)
-    protocol = reader.protocol()
+    protocol = reader.protocol(found_rig if isinstance(found_rig, Machine) else None)
     found = {section.name: reader.settings(section) for section in further}
     said = {name: one for name, one in found.items() if one is not None}
     rig = found_rig if isinstance(found_rig, Slider) else None
@@ -281,7 +281,7 @@ class _SpecificationReader(TableReader):
             return None
         return self._built(Slider, {**arguments, **parts}, "slider.")  # type: ignore[return-value]
 
-    def protocol(self) -> Protocol | None:
+    def protocol(self, machine: Machine | None = None) -> Protocol | None:
         """The protocol, None if the file has none; comes after the rig, whose area it needs."""
         if PROTOCOL.name not in self.tables:
             return None
@@ -289,7 +289,8 @@ class _SpecificationReader(TableReader):
         table = self._table(PROTOCOL.name)
         if len(self.problems) > before:
             return None
-        return self._complete(Protocol, table, f"{PROTOCOL.name}.")  # type: ignore[return-value]
+        with self.of_machine(machine):
+            return self._complete(Protocol, table, f"{PROTOCOL.name}.")  # type: ignore[return-value]
 
     def settings(self, section: Section) -> FrozenRecord | None:
         """A further table; its quantities have the unit that they are declared with, whatever the rig's area."""

@@ -25,6 +25,9 @@ from steadyslip.core.records import (
 from steadyslip.core.roles import Parameter, Value, positive
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
 from steadyslip.files.specifications.toml import Table
+from steadyslip.machine.machine import Machine
+
+_TURNING = {"m": "rad", "m/s": "rad/s", "m/s^2": "rad/s^2"}
 
 
 class TableReader:
@@ -33,6 +36,8 @@ class TableReader:
     def __init__(self) -> None:
         self.problems: list[Problem] = []
         self.area: float | None = None
+        self.turning = False
+        """Whether the load point turns, so that its ways are angles."""
         self.in_totals = False
 
     def problem(self, name: str, message: str) -> None:
@@ -75,6 +80,15 @@ class TableReader:
                 self.area = None if "area" not in table else Parameter("m^2", positive, "area").checked(table["area"])
         yield
         self.area, self.in_totals = outside
+
+    @contextmanager
+    def of_machine(self, machine: Machine | None) -> Iterator[None]:
+        """Read what is done to a machine: in forces, and in angles where its load point turns; None for a slider."""
+        outside = self.in_totals, self.turning
+        if machine is not None:
+            self.in_totals, self.turning = True, machine.drive.turns
+        yield
+        self.in_totals, self.turning = outside
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
         """Tables by names that the user gives."""
@@ -164,13 +178,19 @@ class TableReader:
             return self._part(role, raw, name)
         if isinstance(role, Named):
             return self._named(role, raw, name)
-        if self.in_totals and self.area is None and isinstance(role, Parameter) and is_per_area(role.unit):
-            role = replace(role, unit=total_unit(role.unit))  # a contact without area is described in forces
+        if isinstance(role, Parameter):
+            role = self._outside(role)
         try:
             return role.read(raw, self.area)
         except ParameterError as error:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
+
+    def _outside(self, role: Parameter) -> Parameter:
+        """A parameter in the unit in which it is described here."""
+        if self.in_totals and self.area is None and is_per_area(role.unit):
+            return replace(role, unit=total_unit(role.unit))  # a contact without area is described in forces
+        return replace(role, unit=_TURNING[role.unit]) if self.turning and role.unit in _TURNING else role
 
     def _part(self, role: Part, raw: Any, name: str) -> Any:
         if role.keyed:

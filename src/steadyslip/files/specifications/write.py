@@ -63,7 +63,8 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
             first = [] if word == default else [f'{key} = "{word}"']
         blocks.append(_table(f"[{section.name}]", record, first, section.name, area))
     if protocol is not None:
-        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, area))
+        own = 1.0 if isinstance(rig, Machine) else area  # in forces
+        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, own))
     return "\n".join(blocks)
 
 

@@ -1,23 +1,51 @@
-"""The balance of forces, solved for the velocity variable where a jump or a start leaves it open."""
+"""Balances of forces, solved for the velocity variables where a jump or a start leaves them open."""
 
 from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.layout import Array, Routines, Row, call
+from steadyslip.kernels.driver.places import guess_at
+from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
 
 FIRST_REACH = 0.01  # natural sizes of w within which a balance is looked for first
+ROUNDS = 300  # of several balances that depend on each other, solved in turn
 
 
-def solve_balance(R: Array, routines: Routines, guess: float, y: Array) -> float:
-    """The w that balances forces, nearest to the guess: bracketed outwards, then safeguarded Newton.
+def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> None:
+    """All velocity variables that balances fix, in place of the guesses; NaN where there is none.
+
+    Each is solved for with the others as they are, until none moves: friction that rises with velocity and dashpots
+    make that converge.
+    """
+    for _ in range(ROUNDS):
+        moved = False
+        for k in range(layout.massless):
+            place = guess_at(layout, k)
+            near = R[place]
+            w = solve_balance(R, layout, routines, k, y)
+            R[place] = w
+            if not math.isfinite(w):
+                return
+            moved = moved or abs(w - near) > 1e-14 * (1.0 + abs(w))
+        if not moved or layout.massless == 1:
+            return
+
+
+def residual(R: Array, layout: Layout, routines: Routines, k: int, w: float, y: Array) -> float:
+    """Of balance k at a velocity variable; its slope is in y[2 k + 1]."""
+    R[guess_at(layout, k)] = w
+    call(routines.balance, R, 0.0, y)
+    return float(y[2 * k])
+
+
+def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array) -> float:
+    """The w that fulfils balance k, nearest to the guess: bracketed outwards, then safeguarded Newton.
 
     Forces may balance at several w. A block without mass takes the first on the side to which forces drive it, so
     the search begins with steps much smaller than the natural size of w.
     """
-    w = guess
-    call(routines.balance, R, w, y)
-    value = y[0]
+    w = float(R[guess_at(layout, k)])
+    value = residual(R, layout, routines, k, w, y)
     if value == 0.0:
         return w
     if not math.isfinite(value):
@@ -27,8 +55,7 @@ def solve_balance(R: Array, routines: Routines, guess: float, y: Array) -> float
     found = False
     for _ in range(200):
         trial = w + step
-        call(routines.balance, R, trial, y)
-        other = y[0]
+        other = residual(R, layout, routines, k, trial, y)
         if math.isfinite(other):
             if (other > 0.0) != (value > 0.0) or other == 0.0:
                 low, high = min(w, trial), max(w, trial)
@@ -44,8 +71,8 @@ def solve_balance(R: Array, routines: Routines, guess: float, y: Array) -> float
         return math.nan
     w = 0.5 * (low + high)
     for _ in range(200):
-        call(routines.balance, R, w, y)
-        value, slope = y[0], y[1]
+        value = residual(R, layout, routines, k, w, y)
+        slope = y[2 * k + 1]
         if value == 0.0:
             break
         if value > 0.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from steadyslip.kernels.driver.looking import look_back, look_now
+from steadyslip.kernels.driver.places import kinds, marks_at, outputs_at, tally_at, velocity_at
 from steadyslip.kernels.driver.slip import note, outrun, quicken
 from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
 
@@ -10,7 +11,7 @@ from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layou
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
     """Positive before the event of a kind, not after."""
     look_back(R, layout, routines, theta, y)
-    value = y[layout.size + Out.COUNT + (kind - 1) // 2]
+    value = y[marks_at(layout) + (kind - 1) // 2]
     return float(value if kind % 2 == 1 else -value)
 
 
@@ -48,11 +49,11 @@ def follow(
     R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array, order: Array
 ) -> bool:  # fmt: skip
     """Events within the step just taken, in the order of time. True if the contact is lost in it."""
-    tau_old, h, v = R[Row.TAU_OLD], R[Row.DONE], R[Row.V]
-    count = 0
+    tau_old, h = R[Row.TAU_OLD], R[Row.DONE]
+    each, count = kinds(layout), 0
     for e in range(layout.events if R[Row.HAPPENED] > 0.0 else 0):
         change = R[layout.happened + e]
-        if change != 0.0 and (e <= EventPlace.CONTACT or log.shape[0] > 0):
+        if change != 0.0 and (e % each <= EventPlace.CONTACT or log.shape[0] > 0):
             kind = 2 * e + (2 if change > 0.0 else 1)
             order[count, 0], order[count, 1] = located(R, layout, routines, kind, y), kind
             count += 1
@@ -66,7 +67,7 @@ def follow(
         look_back(R, layout, routines, theta, y)
         tau = tau_old + theta * h
         note(R, layout, kind, tau, y, log, cursor)
-        if kind == Kind.LOST:
+        if kind % (2 * each) == Kind.LOST:
             R[Row.TAU] = tau
             R[Row.Z] = y[layout.size + Out.UNKNOWN]
             for i in range(layout.size):
@@ -76,27 +77,36 @@ def follow(
                     R[layout.counted + int(order[i, 1]) - 1] -= 1.0
             return True
     R[Row.HAPPENED] = 0.0
-    R[Row.PEAK_VELOCITY] = max(R[Row.PEAK_VELOCITY], v)
-    R[Row.LOWEST_VELOCITY] = min(R[Row.LOWEST_VELOCITY], v)
-    R[Row.NOW_PEAK] = max(R[Row.NOW_PEAK], v)
-    if R[Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.END] and v >= SLIP_EVENT * R[Row.NOW_FROM]:
-        look_now(R, layout, routines, R[Row.TAU], y)
-        quicken(R, layout, y, log, cursor)
+    for c in range(layout.contacts):
+        own, v = tally_at(layout, c), velocity_at(R, layout, c)
+        R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
+        R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)
+        R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], v)
+        if R[own + Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.END] and v >= SLIP_EVENT * R[own + Row.NOW_FROM]:
+            look_now(R, layout, routines, R[Row.TAU], y)
+            quicken(R, layout, c, y, log, cursor)
     return False
 
 
-def crossed(
-    R: Array, layout: Layout, routines: Routines, before: float, was_slipping: bool, cursor: Array, log: Array,
-    y: Array,
-) -> None:  # fmt: skip
-    """A jump from the velocity `before` can begin or end a slip event at once."""
+def before_jump(R: Array, layout: Layout) -> None:
+    """Keep velocities and which contacts slip, for `crossed`."""
+    for c in range(layout.contacts if layout.events > 0 else 0):
+        R[layout.jumped + 2 * c] = velocity_at(R, layout, c)
+        R[layout.jumped + 2 * c + 1] = R[layout.mark + kinds(layout) * c + EventPlace.SLIP]
+
+
+def crossed(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
+    """A jump can begin or end a slip event at once."""
     look_now(R, layout, routines, 0.0, y)
-    v = y[layout.size + Out.V]
-    slipping = R[layout.mark + EventPlace.SLIP] > 0.0
-    if slipping != was_slipping:
-        note(R, layout, Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS, 0.0, y, log, cursor)
-    if slipping and R[Row.NOW_EVENT] == 0.0 and before < min(v, R[Row.NOW_FROM]):
-        outrun(R, layout, before, 0.0, y)
-        quicken(R, layout, y, log, cursor)
-    R[Row.PEAK_VELOCITY] = max(R[Row.PEAK_VELOCITY], v)
-    R[Row.LOWEST_VELOCITY] = min(R[Row.LOWEST_VELOCITY], v)
+    for c in range(layout.contacts):
+        own, each, v = tally_at(layout, c), kinds(layout), y[outputs_at(layout, c) + Out.V]
+        before, was_slipping = R[layout.jumped + 2 * c], R[layout.jumped + 2 * c + 1] > 0.0
+        slipping = R[layout.mark + each * c + EventPlace.SLIP] > 0.0
+        if slipping != was_slipping:
+            kind = Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS
+            note(R, layout, kind + 2 * each * c, 0.0, y, log, cursor)
+        if slipping and R[own + Row.NOW_EVENT] == 0.0 and before < min(v, R[own + Row.NOW_FROM]):
+            outrun(R, layout, c, before, 0.0, y)
+            quicken(R, layout, c, y, log, cursor)
+        R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
+        R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)

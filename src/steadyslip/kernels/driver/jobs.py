@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.driver.crossings import crossed, follow
+from steadyslip.kernels.driver.crossings import before_jump, crossed, follow
 from steadyslip.kernels.driver.looking import look_now
+from steadyslip.kernels.driver.places import guess_at, kinds, tally_at, velocity_at
 from steadyslip.kernels.driver.samples import await_sample, record_now, record_step, take_samples
 from steadyslip.kernels.driver.segments import clock, enter_segment
 from steadyslip.kernels.driver.slip import note
@@ -63,6 +64,8 @@ def load_job(
     S[Row.H * lanes + lane] = own[Setting.FIRST_STEP]
     for i in range(layout.size):
         S[(layout.atol + i) * lanes + lane] = own[Setting.ATOL + i]
+    for k in range(1, layout.massless):
+        S[guess_at(layout, k) * lanes + lane] = own[Setting.ATOL + layout.size + k - 1]
     S[Row.ACTIVE * lanes + lane] = 1.0
 
 
@@ -85,20 +88,44 @@ def start_job(
         return False
     await_sample(R, times)
     R[Row.H] = first_step(R, layout)
-    v = R[Row.V]
-    R[Row.PEAK_VELOCITY] = v
-    R[Row.LOWEST_VELOCITY] = v
-    for i in (Row.EVENT_BEGIN, Row.EVENT_PEAK_VELOCITY, Row.RECURRENCE, Row.LAST_PEAK_TIME):  # there is none so far
-        R[i] = math.nan
-    R[Row.PEAK_PERIOD] = math.nan
-    R[Row.PEAK_GROWTH] = math.nan
-    R[Row.NOW_BEGIN] = math.nan
     R[Row.LOG] = 1.0 if log.shape[0] > 0 else 0.0
-    R[Row.NOW_FROM] = math.inf
-    if R[Row.WATCH] > 0.0 and R[layout.mark + EventPlace.SLIP] > 0.0:
-        look_now(R, layout, routines, 0.0, y)
-        note(R, layout, Kind.SLIP_BEGINS, 0.0, y, log, cursor)
+    for c in range(layout.contacts):
+        start_tally(R, layout, routines, c, log, cursor, y)
     return True
+
+
+def start_tally(
+    R: Array, layout: Layout, routines: Routines, contact: int, log: Array, cursor: Array, y: Array
+) -> None:
+    """There has been no event so far; slip may be going on."""
+    own, v = tally_at(layout, contact), velocity_at(R, layout, contact)
+    R[own + Row.PEAK_VELOCITY] = v
+    R[own + Row.LOWEST_VELOCITY] = v
+    for i in (Row.EVENT_BEGIN, Row.EVENT_PEAK_VELOCITY, Row.RECURRENCE, Row.LAST_PEAK_TIME):
+        R[own + i] = math.nan
+    R[own + Row.PEAK_PERIOD] = math.nan
+    R[own + Row.PEAK_GROWTH] = math.nan
+    R[own + Row.NOW_BEGIN] = math.nan
+    R[own + Row.NOW_FROM] = math.inf
+    if R[Row.WATCH] > 0.0 and R[layout.mark + kinds(layout) * contact + EventPlace.SLIP] > 0.0:
+        look_now(R, layout, routines, 0.0, y)
+        note(R, layout, Kind.SLIP_BEGINS + 2 * kinds(layout) * contact, 0.0, y, log, cursor)
+
+
+def fastest(R: Array, layout: Layout) -> float:
+    """The highest velocity of the contacts, each as a share of its own."""
+    found = abs(R[Row.V])
+    for c in range(1, layout.contacts):
+        found = max(found, abs(R[layout.elsewhere + 3 * (c - 1) + 2]))
+    return float(found)
+
+
+def least_pressed(R: Array, layout: Layout) -> float:
+    """The lowest normal stress of the contacts, each as a share of its own."""
+    found = R[Row.SIGMA]
+    for c in range(1, layout.contacts):
+        found = min(found, R[layout.elsewhere + 3 * (c - 1) + 1])
+    return float(found)
 
 
 def finish(R: Array, layout: Layout, row: int, status: int, results: Results) -> None:
@@ -112,11 +139,13 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
     final[row, Final.POINT] = R[Row.Z]
     for i in range(layout.size):
         final[row, Final.STATE + i] = R[layout.state + i]
-    first = Row.PEAK_SIZE - Row.EVENTS
-    for i in range(first):
-        tally[row, i] = R[Row.EVENTS + i]
-    for i in range(2 * layout.events):
-        tally[row, first + i] = R[layout.counted + i]
+    first, counted = Row.PEAK_SIZE - Row.EVENTS, 2 * kinds(layout)
+    for c in range(layout.contacts):
+        place = c * (tally.shape[1] // layout.contacts)
+        for i in range(first):
+            tally[row, place + i] = R[tally_at(layout, c) + Row.EVENTS + i]
+        for i in range(counted):
+            tally[row, place + first + i] = R[layout.counted + counted * c + i]
     R[Row.ACTIVE] = 0.0
     R[Row.FLAG] = 0.0
 
@@ -130,8 +159,9 @@ def go_on(
     segments, times = arrays[3], arrays[4]
     samples, log, recorded = results[3], results[4], results[5]
     good = R[Row.GOOD] > 0.0
-    if layout.massless and layout.w >= 0:
-        R[Row.Z] = R[layout.state + layout.w]  # a guess for after the next jump
+    if layout.massless > 0 and layout.w >= 0:
+        for k in range(layout.massless):
+            R[guess_at(layout, k)] = R[layout.state + layout.w + k]  # for after the next jump
     if layout.stages > 0 and good:
         lost = R[Row.WATCH] > 0.0 and follow(R, layout, routines, cursor, log, y, order)
         take_samples(R, layout, routines, j - j0, times, samples, False, y)
@@ -141,9 +171,9 @@ def go_on(
             record_step(R, layout, routines, cursor, recorded, y)
         if lost:
             return Status.CONTACT_LOST
-    if abs(R[Row.V]) >= R[Row.V_HIGH]:
+    if fastest(R, layout) >= R[Row.V_HIGH]:
         return Status.BLOW_UP
-    if R[Row.SIGMA] <= R[Row.SIGMA_LOW]:
+    if least_pressed(R, layout) <= R[Row.SIGMA_LOW]:
         return Status.CONTACT_LOST
     status = exhausted(R, 1, 0)
     if status != Status.RUNNING:
@@ -153,7 +183,8 @@ def go_on(
         s = j if segments.shape[0] > 1 else 0
         if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
             return Status.DONE
-        h, before, slipping = R[Row.H], R[Row.V], R[layout.mark + EventPlace.SLIP]
+        h = R[Row.H]
+        before_jump(R, layout)
         if not enter_segment(R, layout, routines, j, k, segments, y):
             return Status.NO_VELOCITY
         await_sample(R, times)
@@ -161,7 +192,7 @@ def go_on(
         if R[Row.RECORD] > 0.0:
             record_now(R, layout, cursor, recorded)
         if R[Row.WATCH] > 0.0:
-            crossed(R, layout, routines, before, slipping > 0.0, cursor, log, y)
+            crossed(R, layout, routines, cursor, log, y)
     return Status.RUNNING
 
 

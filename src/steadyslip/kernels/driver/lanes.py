@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.kernels.driver.jobs import attend
+from steadyslip.kernels.driver.places import width
 from steadyslip.kernels.driver.samples import BETWEEN
-from steadyslip.kernels.layout import Array, Cursor, Layout, Out, Routines, Row, Setting, call
+from steadyslip.kernels.layout import Array, Cursor, Layout, Routines, Row, Setting, call
 
 
 def flagged(S: Array, lanes: int) -> int:
@@ -32,7 +33,7 @@ def advance(
     arrays = (constants, initial, settings, segments, times)
     results = (statuses, final, tally, samples, log, recorded)
     lanes = layout.lanes
-    y, order = np.empty(layout.size + Out.COUNT + layout.events), np.empty((layout.events, 2))
+    y, order = np.empty(width(layout)), np.empty((layout.events, 2))
     R = S if lanes == 1 else np.zeros(layout.rows)
     together = layout.watched > 0 and log.shape[0] == 0 and settings[0, Setting.WATCH] > 0.0
     steps = 0
@@ -51,7 +52,7 @@ def advance(
             call(routines.watch_lanes, S, 0.0, y)
             attention = flagged(S, lanes)
         if attention > 0:
-            if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes > log.shape[0]) or (
+            if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes * layout.contacts > log.shape[0]) or (
                 recorded.shape[0] > 0 and cursor[Cursor.RECORDED] + (4 + BETWEEN) * lanes > recorded.shape[0]
             ):
                 cursor[Cursor.PAUSED] = 1

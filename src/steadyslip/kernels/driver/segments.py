@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.driver.balance import solve_balance
+from steadyslip.kernels.driver.balance import solve_balances
 from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, call
 
 
@@ -42,13 +42,11 @@ def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, 
     row = segments[s, k]
     R[Row.SEGMENT] = k
     begin_segment(R, layout, 1, 0, row)
-    R[layout.continuous] -= row[2]
+    call(routines.shift, R, row[2], y)
     R[Row.LOAD_MOVED] += row[2]
-    w = R[Row.Z]  # the velocity variable before the jump, as a guess
-    if layout.massless:
-        w = solve_balance(R, routines, w, y)
-        R[Row.Z] = w
-    call(routines.place, R, w, y)
+    if layout.massless > 0:  # velocity variables before the jump are the guesses
+        solve_balances(R, layout, routines, y)
+    call(routines.place, R, 0.0, y)
     call(routines.rates, R, 0.0, y)
     good = math.isfinite(R[Row.V])
     for i in range(layout.size):

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from steadyslip.kernels.driver.balance import solve_balance
+from steadyslip.kernels.driver.balance import solve_balances
+from steadyslip.kernels.driver.places import outputs_at, width
 from steadyslip.kernels.driver.segments import begin_segment, set_inputs
 from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Sampled, Setting, call
 
@@ -33,7 +34,7 @@ def place_point(R: Array, layout: Layout, routines: Routines, points: Array, m: 
         for i in range(layout.kept):
             R[layout.continuous + i] = points[m, Sampled.STATE + i]
         near = R[Row.Z]
-        R[Row.Z] = solve_balance(R, routines, near, y)
+        solve_balances(R, layout, routines, y)
         if not math.isfinite(R[Row.Z]):
             R[Row.Z] = near
         for i in range(layout.size):  # what `solve_balance` left there
@@ -60,10 +61,11 @@ def observe(
     """Outputs and continuous variables at given points.
 
     `points` is (m, 1 + size); `own` (m,) the rig's row, `segment` and `times` where and when in its protocol, since the
-    start of the run. `values` is (8 + kept, m): `Out` up to ADVANCE, which is here the way of the load point since the
-    start of the run, and the variables that jumps leave alone.
+    start of the run. `values` is (8 contacts + kept + further, m): `Out` up to ADVANCE of each contact, which is
+    here the way of the load point since the start of the run, the variables that jumps leave alone, and what else is
+    observed.
     """
-    R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
+    R, y = np.zeros(layout.rows), np.empty(width(layout))
     rig = -1
     for m in range(points.shape[0]):
         if own[m] != rig:
@@ -80,14 +82,18 @@ def observe(
         R[Row.TAU] = times[m] - R[Row.START]
         place_point(R, layout, routines, points, m, y)
         call(routines.outputs, R, R[Row.TAU], y)
-        for i in range(Out.W_SLOPE):
-            values[i, m] = y[layout.size + i]
         moved = R[Row.LOAD_MOVED]
-        values[Out.ADVANCE, m] += moved
+        for c in range(layout.contacts):
+            for i in range(Out.W_SLOPE):
+                values[Out.W_SLOPE * c + i, m] = y[outputs_at(layout, c) + i]
+            values[Out.W_SLOPE * c + Out.ADVANCE, m] += moved
+        place = Out.W_SLOPE * layout.contacts + layout.kept
+        for i in range(layout.further):
+            values[place + i, m] = y[width(layout) - layout.further + i]
         call(routines.restore, R, 0.0, y)
         R[Row.LOAD_MOVED] = moved
         for i in range(layout.kept):
-            values[Out.W_SLOPE + i, m] = R[layout.continuous + i]
+            values[Out.W_SLOPE * layout.contacts + i, m] = R[layout.continuous + i]
 
 
 def field(
@@ -98,7 +104,7 @@ def field(
 
     `inputs` (m, 7) holds v_lp, q, p, their slopes and the time, `own` the rig.
     """
-    R, y = np.zeros(layout.rows), np.empty(layout.size + Out.COUNT + layout.events)
+    R, y = np.zeros(layout.rows), np.empty(width(layout))
     for m in range(points.shape[0]):
         place_rig(R, layout, constants, settings, own[m])
         set_inputs(R, 1, 0, inputs[m], 0)

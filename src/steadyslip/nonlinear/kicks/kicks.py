@@ -129,7 +129,7 @@ class Kicked:
         named = values.named()
         self.drive = np.broadcast_to(np.asarray(named["drive.velocity"], dtype=float), (self.size,))
         self.mass = np.broadcast_to(np.asarray(named.get("slider.mass", 0.0), dtype=float), (self.size,))
-        self.sigma = np.broadcast_to(self.jobs.sigma, (self.size,))
+        self.sigma = np.broadcast_to(self.jobs.point.stresses, (self.size,))
         self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))
         self.near = Neighbourhood(self.rest)
         self.exists = self.rest.exists & self.jobs.in_range

@@ -1,0 +1,223 @@
+"""Which velocities of a Model are variables of their own, and how all others follow from them.
+
+Every contact wants a velocity variable w, because its friction law is smooth in that and not in its velocity. It takes
+the place of the velocity of one coordinate that moves with it; where all of these are taken (a body on two contacts),
+its velocity follows from those of others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from steadyslip.core.errors import InternalError
+from steadyslip.core.expressions import asinh_exp, derivative
+from steadyslip.core.questions import question
+from steadyslip.model.equations import Contact, Coordinate, Model
+
+W = sp.Symbol("w", real=True)
+_FIRST = ("logarithm", "asinh", "linear")
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityVariable:
+    """What is integrated in place of a contact's velocity.
+
+    Attributes
+    ----------
+    kind : str
+        ``logarithm``, ``asinh`` or ``linear``.
+    w : sympy.Symbol
+    of_w : sympy.Expr
+        The velocity from w and the memory.
+    w_of_v : sympy.Expr
+        The other way round.
+    scale : sympy.Expr
+        Velocity in steady sliding.
+    regularised : sympy.Expr or None
+        The regularised law's primitive, of kind ``asinh``.
+    """
+
+    kind: str
+    w: sp.Symbol
+    of_w: sp.Expr
+    w_of_v: sp.Expr
+    scale: sp.Expr
+    regularised: sp.Expr | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Velocities of contacts and coordinates.
+
+    Attributes
+    ----------
+    variables : tuple of VelocityVariable or None
+        Of each contact; None where its velocity follows from others.
+    coordinates : tuple of Coordinate or None
+        Whose velocity each contact's takes the place of.
+    speeds : dict of sympy.Symbol to sympy.Expr
+        Velocities that are no variables, of coordinates and contacts: in terms of those of contacts and coordinates
+        that are, and of the load point.
+    """
+
+    variables: tuple[VelocityVariable | None, ...]
+    coordinates: tuple[Coordinate | None, ...]
+    speeds: Mapping[sp.Symbol, sp.Expr]
+
+    def contact_at(self, coordinate: Coordinate) -> int | None:
+        """The contact whose velocity stands for that of a coordinate."""
+        return next((i for i, one in enumerate(self.coordinates) if one is coordinate), None)
+
+
+@question
+def kinematics(model: Model) -> Kinematics:
+    """Choose the velocity variables of a model."""
+    wanted = [_variable(model, i) for i in range(len(model.contacts))]
+    chosen: list[Coordinate | None] = [None] * len(wanted)
+    free = {one.velocity: one for one in model.coordinates}
+    speeds: dict[sp.Symbol, sp.Expr] = {}
+    for i in sorted(range(len(wanted)), key=lambda i: _FIRST.index(wanted[i].kind)):
+        velocity = model.contacts[i].velocity
+        slip = sp.sympify(model.definitions.get(velocity, velocity)).xreplace(speeds)
+        slip = sp.expand(slip) if slip is not velocity else slip
+        moving = sorted((v for v in free if slip.has(v)), key=lambda v: free[v].inertial)
+        if not moving:
+            speeds[velocity] = slip
+            continue
+        chosen[i] = free.pop(moving[0])
+        if moving[0] is not velocity:
+            share = derivative(slip, moving[0])
+            found = {moving[0]: (velocity - slip.xreplace({moving[0]: sp.Integer(0)})) / share}
+            speeds = {v: e.xreplace(found) for v, e in speeds.items()} | found
+    own = tuple(one if place is not None else None for one, place in zip(wanted, chosen, strict=True))
+    return Kinematics(own, tuple(chosen), speeds)
+
+
+def _variable(model: Model, index: int) -> VelocityVariable:
+    """The kind of w of a contact, v as a function of it, and the other way round."""
+    contact = model.contacts[index]
+    w = W if len(model.contacts) == 1 else sp.Symbol(f"w_{index}", real=True)
+    v, scale = contact.velocity, sp.sympify(model.steady[contact.velocity])
+    everything = [contact.balance, *model.rates, *model.definitions.values()]
+    for expression in (contact.balance, *model.definitions.values()):
+        if _singular_at_rest(expression, v):
+            return VelocityVariable("logarithm", w, scale * sp.exp(w), sp.log(v / scale), scale)
+    primitives = {primitive for e in everything for primitive in e.atoms(asinh_exp) if primitive.has(v)}
+    if len(primitives) == 1:
+        own = primitives.pop()
+        scaled, exponent = own.args
+        factor = scaled / v
+        reference = at_steady_stress(exponent, contact, model)
+        memory = {item.symbol for item in contact.memory}
+        if not factor.has(v) and not exponent.has(v) and reference.free_symbols & memory:
+            of_w = sp.sinh(w) * sp.exp(-reference) / factor
+            return VelocityVariable("asinh", w, of_w, asinh_exp(scaled, reference), scale, own)
+    return VelocityVariable("linear", w, w, v, scale)
+
+
+def at_steady_stress(exponent: sp.Expr, contact: Contact, model: Model) -> sp.Expr:
+    """The exponent of the regularised law with memory as it is, stresses as in steady sliding."""
+    return exponent.xreplace({stress: model.steady[stress] for stress in (contact.friction, contact.normal)})
+
+
+def _singular_at_rest(expression: sp.Expr, v: sp.Symbol) -> bool:
+    """Whether an expression has ln v or a negative or fractional power of v in it."""
+    for logarithm in expression.atoms(sp.log):
+        if logarithm.has(v) and logarithm.args[0].xreplace({v: sp.Integer(0)}) == 0:
+            return True
+    return any(
+        power.base.xreplace({v: sp.Integer(0)}) == 0 and not (power.exp.is_integer and power.exp.is_positive)
+        for power in expression.atoms(sp.Pow)
+        if power.base.has(v)
+    )
+
+
+def in_variables(expression: sp.Expr, found: Kinematics, model: Model) -> sp.Expr:
+    """Write an expression in the velocity variables, so that ln v and the regularised law become linear in them."""
+    expression = expression.xreplace(dict(found.speeds))
+    for variable, contact in zip(found.variables, model.contacts, strict=True):
+        if variable is not None:
+            expression = _in_w(expression, variable, contact, model)
+    return expression
+
+
+def _in_w(expression: sp.Expr, variable: VelocityVariable, contact: Contact, model: Model) -> sp.Expr:
+    v, w = contact.velocity, variable.w
+    if variable.kind == "logarithm":
+
+        def log_of(argument: sp.Expr) -> sp.Expr:
+            rest = argument / v
+            return sp.log(argument) if rest.has(v) else w + sp.log(variable.scale * rest)
+
+        expression = expression.replace(sp.log, log_of).replace(sp.Abs, lambda a: a if (a / v).is_positive else abs(a))
+        expression = expression.replace(
+            lambda e: _is_product_with_sum(e, w), lambda product: sp.expand_mul(product, deep=False)
+        )
+    elif variable.regularised is not None:
+        own, reference = variable.regularised.args
+
+        def regularised(x: sp.Expr, y: sp.Expr) -> sp.Expr:
+            if x != own:
+                return asinh_exp(x, y)
+            rest = y - at_steady_stress(reference, contact, model)
+            return w if rest == 0 else asinh_exp(sp.sinh(w), rest)
+
+        expression = expression.replace(asinh_exp, regularised)
+    return expression.xreplace({v: variable.of_w})
+
+
+def _is_product_with_sum(expression: sp.Expr, w: sp.Symbol) -> bool:
+    """Whether this is a plain factor times (w + constant), which has to be spread for terms to cancel."""
+    if not expression.is_Mul or sum(factor.is_Add for factor in expression.args) != 1:
+        return False
+    return any(factor.is_Add and w in factor.args for factor in expression.args)
+
+
+def solved_for(residual: sp.Expr, unknown: sp.Symbol) -> sp.Expr | None:
+    """The unknown, if the residual is linear in it and depends on it."""
+    slope = derivative(residual, unknown)
+    if slope.has(unknown) or slope == 0:
+        return None
+    return -residual.xreplace({unknown: sp.Integer(0)}) / slope
+
+
+def solved_in_turn(
+    equations: Iterable[tuple[sp.Expr, sp.Symbol]],
+) -> tuple[dict[sp.Symbol, sp.Expr], list[tuple[sp.Expr, sp.Symbol]]]:
+    """Unknowns of linear equations, each from its own with those before put in; and equations that are not linear."""
+    found: dict[sp.Symbol, sp.Expr] = {}
+    left: list[tuple[sp.Expr, sp.Symbol]] = []
+    for residual, unknown in equations:
+        here = residual.xreplace(found)
+        solution = solved_for(here, unknown)
+        if solution is None:
+            left.append((here, unknown))
+            continue
+        found = {symbol: e.xreplace({unknown: solution}) for symbol, e in found.items()} | {unknown: solution}
+    return found, [(residual.xreplace(found), unknown) for residual, unknown in left]
+
+
+def solved_together(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
+    """Unknowns of linear equations; each equation is solved for the first unknown that is left in it."""
+    found: dict[sp.Symbol, sp.Expr] = {}
+    left = list(unknowns)
+    for residual in equations:
+        here = residual.xreplace(found)
+        unknown = next((one for one in left if derivative(here, one) != 0), None)
+        solution = None if unknown is None else solved_for(here, unknown)
+        if unknown is None or solution is None:
+            raise InternalError("as many independent linear equations as unknowns")
+        left.remove(unknown)
+        found = {symbol: e.xreplace({unknown: solution}) for symbol, e in found.items()} | {unknown: solution}
+    return found
+
+
+def only(variables: Iterable[VelocityVariable | None]) -> VelocityVariable:
+    """The velocity variable of a single contact."""
+    (one,) = variables
+    if one is None:
+        raise InternalError("a single contact has its own velocity variable")
+    return one

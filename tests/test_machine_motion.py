@@ -1,0 +1,291 @@
+"""Motion of machines: against equations typed by hand, energy, eigenvalues, one-body machines, names, idle bodies."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import steadyslip as ss
+from machines import brake, coulomb, rate_state, surface, two_blocks, two_mass
+
+FINE = {"rtol": 1e-10}
+
+
+def radau(right, start, times):
+    done = solve_ivp(right, (0.0, times[-1]), start, method="Radau", t_eval=times, rtol=1e-9, atol=1e-11)
+    assert done.success
+    return done.y
+
+
+def agree(history, name, values, size=1.0):
+    assert np.max(np.abs(history[name] - values)) < 2e-6 * size
+
+
+TIMES = np.linspace(0.0, 20.0, 201)
+
+
+def law(machine, contact="guide"):
+    own = machine.contacts[contact]
+    return own.friction, own.contact.preload
+
+
+def friction(own, load, v, theta):
+    """Rate and state in terms of Θ = ln(v* θ/d_c), the slip law of the fixtures."""
+    return load * (own.mu_ref + own.a * np.log(v / own.v_ref) + own.b * theta)
+
+
+def aging(own, v, theta):
+    return -v / own.d_c * (np.log(v / own.v_ref) + theta)
+
+
+@pytest.fixture(scope="module")
+def axis():
+    return two_mass(kp=1.0)
+
+
+def test_a_two_mass_axis_with_a_step_of_the_drive_and_a_push(axis):
+    own, load = law(axis)
+    pieces = [ss.VelocityStep(at=0.0, to=1.2), ss.DisturbanceStep(at=0.0, by=0.05, on="table")]
+    run = ss.simulate(axis, pieces, times=TIMES, until=20.0, **FINE)
+    resting = friction(own, load, 1.0, 0.0)
+
+    def right(t, y):
+        motor, table, v, w, theta = y
+        ahead = motor - (1.2 - 1.0) * t, table - (1.2 - 1.0) * t  # of what the drive asks
+        screw = 100.0 * (motor - table) + 0.5 * (v - w)
+        control = -1.0 * ahead[0] - 0.1 * (v - 1.2)
+        return [v - 1, w - 1, (control - screw) / 2, (screw + resting - friction(own, load, w, theta) + 0.05) / 5,
+                aging(own, w, theta)]  # fmt: skip
+
+    motor, table, v, w, theta = radau(right, [0, 0, 1, 1, 0], TIMES)
+    agree(run, "motor.displacement", motor + TIMES)
+    agree(run, "table.displacement", table + TIMES)
+    agree(run, "motor.v", v)
+    agree(run, "table.v", w)
+    agree(run, "guide.slip_rate", w)
+    agree(run, "guide.Theta", theta)
+    agree(run, "guide.friction_force", friction(own, load, w, theta))
+    agree(run, "guide.slip", table + TIMES)
+    assert run.units["guide.friction_force"] == "N"
+
+
+def test_two_unlike_blocks_on_a_load_point_that_jumps():
+    machine = two_blocks(0.5, -0.1, 0.1)
+    laws = [machine.contacts[name].friction for name in ("one", "two")]
+    run = ss.simulate(machine, ss.DisplacementStep(at=0.0, by=0.1), times=TIMES, until=20.0, **FINE)
+    resting = [friction(own, 1.0, 1.0, 0.0) for own in laws]
+
+    def right(t, y):
+        x, v, theta = y[:2], y[2:4], y[4:]
+        spring = -0.5 * (x - 0.1) - 0.1 * (x - x[::-1])
+        push = [(spring[i] + resting[i] - friction(laws[i], 1.0, v[i], theta[i])) / 0.1 for i in range(2)]
+        return [*(v - 1), *push, *(aging(laws[i], v[i], theta[i]) for i in range(2))]
+
+    found = radau(right, [0, 0, 1, 1, 0, 0], TIMES)
+    for i, name in enumerate(("one", "two")):
+        agree(run, f"{name}.v", found[2 + i])
+        agree(run, f"{name}.x", found[i] - 0.1)  # behind the load point that jumped
+        agree(run, f"{name}.Theta", found[4 + i])
+
+
+def test_flutter_of_a_pad_on_coulomb_friction_that_is_regularised():
+    machine = brake(coulomb(1.1 * 0.4166666666666667))
+    times = np.linspace(0.0, 30.0, 301)
+    run = ss.simulate(machine, ss.NormalStressStep(at=0.0, by=0.01), times=times, until=30.0, **FINE)
+    assert run.status == "done"
+    mu = 1.1 * 0.4166666666666667
+    stiff = np.array([[1.0, 0.3], [0.3, 1.2]])
+
+    def right(t, y):
+        x, v = y[:2], y[2:]
+        normal = -0.8 * x[1] + 0.01
+        force = -(stiff - np.diag([0, 0.8])) @ x + np.array([-mu * normal, normal])
+        return [*(v - np.array([0, 0])), *force]
+
+    found = radau(right, [0, 0, 0, 0], times)
+    size = np.abs(found[0]).max()
+    assert size < 0.9  # the pad never stops: friction keeps its sign
+    agree(run, "pad.x", found[0], size)
+    agree(run, "pad.normal.x", found[1], size)
+    steady = ss.steady_state(machine).contacts["disc"].normal_force
+    agree(run, "disc.normal_force", steady + 0.01 - 0.8 * found[1], size)
+
+
+def test_the_friction_of_a_gear_grows_with_the_torque_it_carries():
+    tilt = -0.3
+    own = rate_state(0.5, -0.1, 1.0, mu=0.3)
+    teeth = ss.InclinedSpring(preload=1.0, angle=tilt)
+    machine = ss.Machine(
+        bodies={"motor": ss.SlidingBody(mass=1.0), "load": ss.SlidingBody(mass=2.0, force=-0.1)},
+        links={"gear": ss.Spring(between=("motor", "load"), stiffness=20.0, damping=0.3)},
+        contacts={
+            "mesh": ss.Surface(body="motor", friction=own, contact=teeth, loaded_by="gear"),
+            "guide": surface("load", rate_state(0.4, 0.1, 2.0, mu=0.2)),
+        },
+        drive=ss.PositionPD(velocity=1.0, body="motor", kp=3.0, kd=0.4),
+    )
+    guide = machine.contacts["guide"].friction
+    run = ss.simulate(machine, initial={"load.v": 1.3}, times=TIMES, until=20.0, **FINE)
+    carried = friction(guide, 1.0, 1.0, 0.0) + 0.1  # by the teeth in steady sliding
+
+    def pressed(force):  # that of the teeth on the motor is -force
+        return 1.0 + force * np.tan(tilt)
+
+    at_rest = friction(own, pressed(carried), 1.0, 0.0)
+
+    def right(t, y):
+        x, z, v, w, theta, phi = y
+        force = carried + 20.0 * (x - z) + 0.3 * (v - w)
+        control = carried + at_rest - 3.0 * x - 0.4 * (v - 1)
+        rub = friction(own, pressed(force), v, theta)
+        return [v - 1, w - 1, control - force - rub, (force - 0.1 - friction(guide, 1.0, w, phi)) / 2,
+                aging(own, v, theta), aging(guide, w, phi)]  # fmt: skip
+
+    x, z, v, w, theta, _ = radau(right, [0, 0, 1, 1.3, 0, 0], TIMES)
+    agree(run, "motor.v", v)
+    agree(run, "load.v", w)
+    agree(run, "mesh.Theta", theta)
+    agree(run, "mesh.normal_force", pressed(carried + 20.0 * (x - z) + 0.3 * (v - w)))
+    agree(run, "links.gear.force", carried + 20.0 * (x - z) + 0.3 * (v - w))
+
+
+# -- what follows from the machine as a whole
+
+
+def test_the_work_of_the_drive_is_dissipated_or_stored():
+    """Two blocks on springs: what the load point does equals friction, dashpots, springs and kinetic energy."""
+    machine = two_blocks(0.6, -0.1, 0.3)
+    damped = {**machine.links, "hose": ss.Spring(between=("one", "two"), damping=0.2)}
+    machine = dataclasses.replace(machine, links=damped)
+    times = np.linspace(0.0, 15.0, 6001)
+    run = ss.simulate(machine, ss.VelocityStep(at=0.0, to=1.5), times=times, until=15.0, **FINE)
+    one, two, load = run["one.displacement"], run["two.displacement"], run["load_displacement"]
+    resting = [run[f"{name}.friction_force"][0] for name in ("one", "two")]
+
+    def work(power):
+        return np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(times))])
+
+    # what springs are stretched by in steady sliding, from the balance of each block
+    stretch = np.linalg.solve([[0.9, -0.3], [-0.3, 0.9]], resting)
+    pulls = [0.6 * (stretch[i] + load - place) for i, place in enumerate((one, two))]
+    stored = sum(0.5 * pull**2 / 0.6 for pull in pulls) + 0.15 * (stretch[0] - stretch[1] - (one - two)) ** 2
+    moving = 0.05 * (run["one.v"] ** 2 + run["two.v"] ** 2)
+    rubbed = sum(work(run[f"{name}.friction_force"] * run[f"{name}.slip_rate"]) for name in ("one", "two"))
+    damped_away = work(0.2 * (run["one.v"] - run["two.v"]) ** 2)
+    driven = work(sum(pulls) * run["load_velocity"])
+    energy = stored + moving
+    lost = driven - rubbed - damped_away - (energy - energy[0])
+    assert np.max(np.abs(lost)) < 1e-5 * driven[-1]
+    assert np.max(np.abs(energy - energy[0])) > 1e-2 * driven[-1] / 15
+
+
+def test_growth_and_period_of_small_motion_are_those_of_the_eigenvalues():
+    for machine, contact in ((two_mass(kp=1.0), "guide"), (brake(rate_state(0.02, -0.01, 0.5)), "disc")):
+        leading = max(ss.eigenvalues(machine), key=lambda one: (one.real, one.imag))
+        period = 2 * np.pi / leading.imag
+        times = np.linspace(0.0, 8 * period, 1601)
+        body = next(iter(machine.bodies))
+        run = ss.simulate(machine, initial={f"{body}.x": 1e-7}, times=times, until=times[-1], rtol=1e-11)
+        tail = times > 2 * period  # what dies out faster is gone
+        x = run[f"{body}.x"][tail]
+        waves = np.exp(leading * times[tail])
+        columns = np.column_stack([waves.real, waves.imag])
+        fitted = columns @ np.linalg.lstsq(columns, x, rcond=None)[0]
+        others = [one.real for one in ss.eigenvalues(machine) if abs(abs(one.imag) - leading.imag) > 1e-9]
+        gap = leading.real - max(others)
+        assert np.max(np.abs(fitted - x)) < (1e-3 + np.exp(-gap * 2 * period)) * np.max(np.abs(x))
+        assert run[f"{contact}.slip_rate"].min() > 0
+
+
+def test_names_do_not_matter():
+    machine = two_blocks(0.45, -0.1, 0.2)
+    turned = ss.Machine(
+        bodies={"zwei": machine.bodies["two"], "eins": machine.bodies["one"]},
+        links={
+            "c": ss.Spring(between=("eins", "zwei"), stiffness=0.2),
+            "b": ss.Spring(between=("drive", "zwei"), stiffness=0.45),
+            "a": ss.Spring(between=("drive", "eins"), stiffness=0.45),
+        },
+        contacts={
+            "y": dataclasses.replace(machine.contacts["two"], body="zwei"),
+            "x": dataclasses.replace(machine.contacts["one"], body="eins"),
+        },
+        drive=machine.drive,
+    )
+    step = ss.VelocityStep(at=1.0, to=1.3)
+    first, second = (ss.simulate(m, step, times=TIMES, until=20.0, **FINE) for m in (machine, turned))
+    for own, other in (("one", "eins"), ("two", "zwei")):
+        assert second[f"{other}.v"] == pytest.approx(first[f"{own}.v"], abs=1e-8)
+    for own, other in (("one", "x"), ("two", "y")):
+        assert second[f"{other}.friction_force"] == pytest.approx(first[f"{own}.friction_force"], abs=1e-8)
+    kinds = [(e.kind, round(e.time, 5)) for e in first.events]
+    assert sorted(kinds) == sorted((e.kind, round(e.time, 5)) for e in second.events)
+    assert kinds
+
+
+def test_an_idle_body_changes_nothing_and_a_stiff_link_little():
+    machine, step = two_mass(kp=1.0), ss.VelocityStep(at=1.0, to=1.2)
+    alone = ss.simulate(machine, step, times=TIMES, until=20.0, **FINE)
+    idle = dataclasses.replace(
+        machine,
+        bodies={**machine.bodies, "lamp": ss.SlidingBody(mass=0.0)},
+        links={**machine.links, "hook": ss.Spring(between=("table", "lamp"), stiffness=3.0)},
+    )
+    hung = ss.simulate(idle, step, times=TIMES, until=20.0, **FINE)
+    assert hung["table.v"] == pytest.approx(alone["table.v"], abs=1e-9)
+    assert hung["lamp.v"] == pytest.approx(alone["table.v"], abs=1e-9)
+    apart, ends = [], ("table", "load")
+    for size in (1e4, 1e5):  # half of the table's mass beyond a link that hardly gives
+        split = dataclasses.replace(
+            machine,
+            bodies={**machine.bodies, "table": ss.SlidingBody(mass=2.0), "load": ss.SlidingBody(mass=3.0)},
+            links={**machine.links, "bolts": ss.Spring(between=ends, stiffness=size, damping=0.05 * size)},
+        )
+        run = ss.simulate(split, step, times=TIMES, until=20.0, **FINE)
+        apart.append(np.max(np.abs(run["table.v"] - alone["table.v"])))
+    assert apart[1] < 1e-4
+    assert apart[0] / apart[1] == pytest.approx(10, rel=0.1)
+
+
+def same_block(seed):
+    """A slider, and the machine of one body that it is."""
+    random = np.random.default_rng(seed)
+
+    def size(low=-1.0, high=1.0):
+        return float(10 ** random.uniform(low, high))
+
+    mu, load = 0.3 + 0.3 * random.random(), size(0, 1)
+    own = rate_state(size(-1.5, -0.5), -size(-2, -1), size(), mu, load, regularised=seed % 4 == 1)
+    tilt = float(random.uniform(-0.4, 0.4)) if seed % 3 else 0.0
+    contact = ss.InclinedSpring(steady_normal_stress=load, angle=tilt) if tilt else ss.Constant(preload=load)
+    mass, damping, k = (0.0 if seed % 5 == 2 else size()), size(-2, 0), size(0, 2)
+    block = ss.Slider(
+        friction=own, contact=contact, stiffness=k, damping=damping, mass=mass, drive=ss.Steady(1.0)
+    )  # fmt: skip
+    machine = ss.Machine(
+        bodies={"block": ss.SlidingBody(mass=mass)},
+        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
+        contacts={"base": ss.Surface(body="block", friction=own, contact=contact)},
+        drive=ss.Pull(velocity=1.0),
+    )
+    return block, machine
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_machine_of_one_body_moves_as_a_slider(seed):
+    block, machine = same_block(seed)
+    pieces = [
+        ss.VelocityStep(at=0.5, to=1.3),
+        ss.DisturbanceStep(at=1.0, by=0.02),
+        ss.NormalStressStep(at=2.0, by=0.05),
+    ]
+    own, other = (ss.simulate(rig, pieces, times=TIMES, until=20.0) for rig in (block, machine))
+    assert own.status == other.status
+    assert own.steps == pytest.approx(other.steps, abs=2)
+    names = {"v": "block.v", "x": "block.x", "slip": "base.slip", "shear_stress": "base.friction_force",
+             "normal_stress": "base.normal_force", "acceleration": "block.acceleration"}  # fmt: skip
+    for name, machine_name in names.items():
+        assert other[machine_name] == pytest.approx(own[name], rel=1e-9, abs=1e-9), name
+    assert [e.kind for e in own.events] == [e.kind for e in other.events]
+    assert [e.time for e in own.events] == pytest.approx([e.time for e in other.events], rel=1e-8)

@@ -289,3 +289,120 @@ def test_a_machine_of_one_body_moves_as_a_slider(seed):
         assert other[machine_name] == pytest.approx(own[name], rel=1e-9, abs=1e-9), name
     assert [e.kind for e in own.events] == [e.kind for e in other.events]
     assert [e.time for e in own.events] == pytest.approx([e.time for e in other.events], rel=1e-8)
+
+
+# -- which contact does what
+
+
+def two_tables(**changes):
+    """Two tables on one belt, each on its own guide; the second one's law goes through rest."""
+    return ss.Machine(
+        bodies={"front": ss.SlidingBody(mass=1.0), "back": ss.SlidingBody(mass=1.0)},
+        links={
+            "belt": ss.Spring(between=("drive", "front"), stiffness=5.0, damping=0.2),
+            "bar": ss.Spring(between=("front", "back"), stiffness=8.0, damping=0.2),
+        },
+        contacts={
+            "dry": surface("front", rate_state(0.3, 0.1, 1.0), load=2.0),
+            "oiled": surface("back", rate_state(0.1, 0.05, 1.0, regularised=True), load=1.0),
+        },
+        drive=ss.Pull(velocity=1.0),
+    )
+
+
+def test_the_contact_that_lifts_off_is_named():
+    lift = ss.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled")
+    run = ss.simulate(two_tables(), lift, until=20.0)
+    assert run.status == "contact lost"
+    assert run.contact == "oiled"
+    assert run.message.startswith("contact lost (oiled) at 4.33")
+    assert run.end == pytest.approx(1 + 10 / 3, rel=1e-6)
+    assert run.events[-1].kind == "contact lost"
+    assert run.to_dict()["contact"] == "oiled"
+    silent = ss.simulate(two_tables(), lift, until=20.0, events=False)
+    assert (silent.status, silent.contact) == ("contact lost", "oiled")
+    assert run.events[-1].normal_force == pytest.approx(0.0, abs=1e-6)
+    assert ss.simulate(two_tables(), dataclasses.replace(lift, on="dry"), until=20.0).contact == "dry"
+
+
+def test_the_contact_that_sticks_is_named_and_one_may_reverse():
+    back = ss.DisturbancePulse(at=1.0, by=-6.0, duration=0.5, on="back")
+    run = ss.simulate(two_tables(), back, until=20.0)
+    assert run.status == "done"
+    kinds = [(e.contact, e.kind) for e in run.events if e.kind in ("arrest", "restart")]
+    assert kinds.count(("oiled", "arrest")) == kinds.count(("oiled", "restart")) >= 2
+    assert ("dry", "arrest") not in kinds
+    assert run.velocities["oiled"][0] < -0.1
+    assert run.velocities["dry"][0] > 0
+    slips = run.slip_events
+    assert {one.contact for one in slips} == {"dry", "oiled"}
+    for one in slips:
+        inside = (run["t"] >= one.begin) & (run["t"] <= one.end)
+        assert run[f"{one.contact}.slip_rate"][inside].max() == pytest.approx(one.peak_velocity, rel=1e-3)
+        ends = np.interp([one.begin, one.end], run["t"], run[f"{one.contact}.slip"])
+        assert ends[1] - ends[0] == pytest.approx(one.slip, rel=1e-3)
+
+
+def test_many_machines_move_as_each_alone():
+    pulse = ss.DisturbancePulse(at=1.0, by=-6.0, duration=0.5, on="back")
+    stiff = [3.0, 8.0, 30.0]
+    many = ss.simulate_many(two_tables(), {"links.bar.stiffness": stiff}, pulse, until=20.0, times=TIMES)
+    for i, k in enumerate(stiff):
+        alone = ss.simulate(two_tables().with_values({"links.bar.stiffness": k}), pulse, until=20.0, times=TIMES)
+        assert many.status[i] == alone.status
+        for name in ("front.v", "oiled.slip_rate", "dry.normal_force", "links.bar.force"):
+            assert many.samples[name][i] == pytest.approx(alone[name], rel=1e-9, abs=1e-9)
+        for contact in ("dry", "oiled"):
+            own = [one for one in alone.slip_events if one.contact == contact]
+            assert many.events[f"{contact}.events"][i] == len(own)
+            if not own:
+                continue
+            assert many.events[f"{contact}.event_force_drop"][i] == pytest.approx(own[-1].force_drop, rel=1e-6)
+            assert many.events[f"{contact}.event_slip"][i] == pytest.approx(own[-1].slip, rel=1e-6)
+            arrests = [e for e in alone.events if e.contact == contact and e.kind == "arrest"]
+            assert many.events[f"{contact}.arrests"][i] == len(arrests)
+    assert many.events["dry.events"].sum() > 0
+    assert many.to_xarray()["event_dry.event_force_drop"].attrs["units"] == "N"
+
+
+def test_runs_of_machines_in_files(tmp_path):
+    run = ss.simulate(two_tables(), ss.DisturbancePulse(at=1.0, by=-4.0, duration=0.5, on="back"), until=5.0)
+    run.save(tmp_path / "run.nc")
+    again = ss.load_history(tmp_path / "run.nc")
+    assert (again.rig, again.protocol, again.events, again.velocities) == (
+        run.rig, run.protocol, run.events, run.velocities,
+    )  # fmt: skip
+    assert str(again) == str(run)
+    for name, values in run.items():
+        assert np.array_equal(again[name], values)
+    run.to_csv(tmp_path / "run.csv")
+    header = (tmp_path / "run.csv").read_text().splitlines()[0]
+    assert "oiled.friction_force (N)" in header
+    assert "Pa" not in header
+    assert "oiled" in ss.report(run).html
+
+
+@pytest.mark.parametrize(
+    ("pieces", "said"),
+    [
+        ([ss.DisturbanceStep(at=1, by=1.0)], "pieces.1.on: missing; name the body that disturbance-step acts on"),
+        ([ss.NormalStressStep(at=1, by=1.0, on="belt")], "unknown contact 'belt'"),
+        (
+            [ss.DisturbanceStep(at=1, by=1.0, on="front"), ss.DisturbanceStep(at=2, by=1.0, on="back")],
+            "allowed: one body a run",
+        ),
+        ([ss.DisplacementStep(at=1, by=1.0)], "a displacement step through a dashpot"),
+    ],
+)
+def test_what_cannot_be_done_to_a_machine(pieces, said):
+    with pytest.raises(ss.ParameterError, match=said):
+        ss.simulate(two_tables(), pieces, until=5.0)
+
+
+def test_starting_values_of_machines():
+    with pytest.raises(ss.ParameterError, match=r"initial\.table\.w.*front\.v"):
+        ss.simulate(two_tables(), until=1.0, initial={"table.w": 1.0})
+    with pytest.raises(ss.ParameterError, match="make dry slip at -1 m/s"):
+        ss.simulate(two_tables(), until=1.0, initial={"front.v": -1.0})
+    with pytest.raises(ss.ParameterError, match="a slider is one block"):
+        ss.simulate(same_block(0)[0], ss.DisturbanceStep(at=1, by=1.0, on="front"), until=5.0)

@@ -110,9 +110,8 @@ def initial_values(
                 raise ParameterError(
                     [Problem(f"initial.{name}", f"got {given.get(name)!r}; allowed: > 0 m/s with this law")]
                 )
-            message = (
-                f"the velocities make {model.contacts[i].name} slip at {brief(slip)} m/s; allowed: > 0 with its law"
-            )
+            where = model.contacts[i].name
+            message = f"the velocities make {where} slip at {np.min(slip):.4g} m/s; allowed: > 0 with its law"
             raise ParameterError([Problem("initial", message)])
     if not model.inertial and "v" in start:
         free = [i for i, name in enumerate(names) if name not in start]

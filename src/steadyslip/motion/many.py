@@ -48,7 +48,7 @@ R = TypeVar("R", bound=Rig)
 def event_unit(name: str) -> str:
     """Unit of a column of `Ensemble.events`."""
     plain = name.rpartition(".")[2]
-    return "N" if plain == "force_drop" else EVENT_UNITS[plain]
+    return "N" if plain == "event_force_drop" else EVENT_UNITS[plain]
 
 
 @dataclass(frozen=True, eq=False)

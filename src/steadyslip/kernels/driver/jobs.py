@@ -112,7 +112,7 @@ def start_tally(
         note(R, layout, Kind.SLIP_BEGINS + 2 * kinds(layout) * contact, 0.0, y, log, cursor)
 
 
-def fastest(R: Array, layout: Layout) -> float:
+def highest_velocity(R: Array, layout: Layout) -> float:
     """The highest velocity of the contacts, each as a share of its own."""
     found = abs(R[Row.V])
     for c in range(1, layout.contacts):
@@ -120,7 +120,7 @@ def fastest(R: Array, layout: Layout) -> float:
     return float(found)
 
 
-def least_pressed(R: Array, layout: Layout) -> float:
+def lowest_stress(R: Array, layout: Layout) -> float:
     """The lowest normal stress of the contacts, each as a share of its own."""
     found = R[Row.SIGMA]
     for c in range(1, layout.contacts):
@@ -171,9 +171,9 @@ def go_on(
             record_step(R, layout, routines, cursor, recorded, y)
         if lost:
             return Status.CONTACT_LOST
-    if fastest(R, layout) >= R[Row.V_HIGH]:
+    if highest_velocity(R, layout) >= R[Row.V_HIGH]:
         return Status.BLOW_UP
-    if least_pressed(R, layout) <= R[Row.SIGMA_LOW]:
+    if lowest_stress(R, layout) <= R[Row.SIGMA_LOW]:
         return Status.CONTACT_LOST
     status = exhausted(R, 1, 0)
     if status != Status.RUNNING:

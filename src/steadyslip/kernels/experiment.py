@@ -57,19 +57,34 @@ class ExperimentProgram:
         return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
 
     @cached_property
+    def unsettled(self) -> dict[str, sp.Symbol]:
+        """How far a motion begins from steady sliding, by name: friction (the spring's pull), then the memory."""
+        model = self.reduction.model
+        own = [item for item in model.memory if item.unit == "1"]  # a memory of the stress has settled
+        return {"friction": sp.Symbol("initial_friction", real=True)} | {
+            item.name: sp.Symbol(f"initial_{item.name}", real=True) for item in own
+        }
+
+    @cached_property
     def _start(self) -> list[sp.Expr]:
         model = self.reduction.model
         steady = model.steady | {W: self.reduction.w_of_v.xreplace(model.steady)}
-        return [steady[symbol] for symbol in self.reduction.continuous]
+        away = {
+            model.contact.slip: -self.unsettled["friction"]
+            * model.contact.sigma_ss
+            / model.parameters["slider.stiffness"]
+        }
+        away |= {item.symbol: self.unsettled[item.name] for item in model.memory if item.name in self.unsettled}
+        return [steady[symbol] + away.get(symbol, 0) for symbol in self.reduction.continuous]
 
     @cached_property
     def _values(self) -> Any:
         constants = list(self.kernel.constants.symbols)
-        return self.reduction.model.function([*constants, *self._start])
+        return self.reduction.model.function([*constants, *self._start], *self.unsettled.values())
 
     @cached_property
     def _slopes(self) -> Any:
-        """Derivatives of constants and starting values in every parameter, σss following the parameters."""
+        """Derivatives of constants and starting values in every parameter, σss following, and in what is unsettled."""
         model = self.reduction.model
         expressions = [*self.kernel.constants.symbols, *self._start]
         sigma = model.contact.sigma_ss
@@ -79,22 +94,25 @@ class ExperimentProgram:
             stress = -derivative(residual, symbol) / derivative(residual, sigma)
             for expression in expressions:
                 found.append(derivative(expression, symbol) + derivative(expression, sigma) * stress)
-        return model.function(found)
+        found += [derivative(expression, symbol) for symbol in self.unsettled.values() for expression in expressions]
+        return model.function(found, *self.unsettled.values())
 
-    def arrays(self, point: OperatingPoint, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def arrays(self, point: OperatingPoint, chain: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constants with their rates of change, and starting states with theirs.
 
         Parameters
         ----------
         point : OperatingPoint
             Of every job.
-        chain : ndarray (jobs, directions, parameters)
-            How fast the parameters change in each direction.
+        chain : ndarray (jobs, directions, parameters + unsettled)
+            How fast the parameters, and then how far it begins from steady sliding, change in each direction.
+        away : ndarray (jobs, unsettled)
+            How far that is.
         """
         jobs, _, count = chain.shape
         with np.errstate(all="ignore"):
-            values = _stacked(point.evaluate(self._values), jobs)
-            slopes = _stacked(point.evaluate(self._slopes), jobs).reshape(jobs, count, -1)
+            values = _stacked(point.evaluate(self._values, *away.T), jobs)
+            slopes = _stacked(point.evaluate(self._slopes, *away.T), jobs).reshape(jobs, count, -1)
         rates = np.matmul(chain, slopes)
         table, size = self.kernel.constants, len(self.kernel.constants.symbols)
         constants = table.with_rates(values[:, :size], rates[:, :, :size], {})

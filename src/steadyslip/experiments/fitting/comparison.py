@@ -38,8 +38,8 @@ class RecordPart:
         What was observed.
     weights : ndarray (n,)
         One over the standard deviation of each sample, up to a common factor.
-    rig_places, time_places, trend_places : tuple of int
-        Where the parameters of the rig, free times and the trend lie among the unknowns.
+    rig_places, time_places, begin_places, trend_places : tuple of int
+        Where the parameters of the rig, free times, where it begins and the trend lie among the unknowns.
     trend : ndarray (terms, n)
         What multiplies the coefficients of the trend.
     """
@@ -52,6 +52,7 @@ class RecordPart:
     weights: Array
     rig_places: tuple[int, ...]
     time_places: tuple[int, ...]
+    begin_places: tuple[int, ...]
     trend_places: tuple[int, ...]
     trend: Array
 
@@ -64,7 +65,7 @@ class RecordPart:
     def plain(self) -> Forward:
         """The same without derivatives, several times as fast."""
         own = self.forward
-        return Forward(own.rig, own.names, own.rtol, own.shifts, sensitive=False, effort=own.effort)
+        return Forward(own.rig, own.names, own.rtol, own.shifts, own.unsettled, sensitive=False, effort=own.effort)
 
 
 class Comparison:
@@ -111,11 +112,12 @@ class Comparison:
         jacobian = np.zeros((count, len(self.space), self.size))
         for part, where in zip(self.parts, self.slices, strict=True):
             places = list(part.rig_places)
-            found = part.forward.run(part.table(values), values[:, places], slopes[:, places])
+            begin = list(part.begin_places)
+            found = part.forward.run(part.table(values), values[:, places], slopes[:, places], values[:, begin])
             seen[:, where] = found[:, 0]
             for k, place in enumerate(places):
                 jacobian[:, place, where] = found[:, 1 + k]
-            for k, place in enumerate(part.time_places, start=len(places)):
+            for k, place in enumerate((*part.time_places, *begin), start=len(places)):
                 jacobian[:, place, where] = found[:, 1 + k] * slopes[:, place, None]
             for row, place in zip(part.trend, part.trend_places, strict=True):
                 seen[:, where] += values[:, place, None] * row
@@ -147,7 +149,8 @@ class Comparison:
         total = np.zeros(len(coordinates))
         for part in self.parts:
             own = values[:, list(part.rig_places)]
-            seen = part.plain.run(part.table(values, sensitive=False), own, own)[:, 0]
+            begin = values[:, list(part.begin_places)]
+            seen = part.plain.run(part.table(values, sensitive=False), own, own, begin)[:, 0]
             seen += values[:, list(part.trend_places)] @ part.trend
             r = (part.data - seen) * part.weights
             if self.loss != "linear":
@@ -211,6 +214,18 @@ def start_unknowns(record: int | None, loading: Loading, span: float, lag: bool)
             Unknown(f"start.hold{label}", "start.hold", "s", record, True, 1.0, LEAST_HOLD * span, LONGEST_HOLD * span)
         )
     return found
+
+
+FARTHEST = 30.0  # natural sizes that a motion may begin away from steady sliding
+
+
+def initial_unknowns(record: int | None, sizes: dict[str, float]) -> list[Unknown]:
+    """How far from steady sliding the motion begins: friction that the spring pulls with, and each memory of it."""
+    label = "" if record is None else f"@{record + 1}"
+    return [
+        Unknown(f"initial.{n}{label}", f"initial.{n}", "1", record, False, size, -FARTHEST * size, FARTHEST * size)
+        for n, size in sizes.items()
+    ]
 
 
 def trend_unknowns(record: int | None, order: int, offset: bool) -> list[Unknown]:

@@ -41,6 +41,7 @@ def fit(
     trend_axis: str = "displacement",
     offset: bool = False,
     lag: bool = False,
+    initial: str = "steady",
     loss: str = "linear",
     width: float | None = None,
     weights: Any = None,
@@ -87,6 +88,11 @@ def fit(
     lag : bool, optional
         Let friction come later than what drives it, every record by a time of its own (``lag``): for channels whose
         filters or clocks differ.
+    initial : str, optional
+        ``steady``: a record begins with steady sliding at the first rate and normal stress; ``free``: it slides at that
+        rate but not steadily, and how far friction (``initial.friction``, by the spring's pull) and each memory of it
+        (``initial.Theta``, e-folds of state) are from steady sliding is fitted, each record's own. A record that begins
+        at rest has ``start.hold`` in any case.
     loss : str, optional
         ``linear`` (least squares), or ``soft-l1``, ``huber``, ``cauchy``, in which outliers weigh less.
     width : float, optional
@@ -120,8 +126,8 @@ def fit(
     """
     plan = make_plan(
         rig, records, free, fixed=fixed, separate=separate, drive=drive, protocol=protocol, trend=trend,
-        trend_axis=trend_axis, offset=offset, lag=lag, loss=loss, width=width, weights=weights, errors=errors,
-        starts=starts, effort=effort,
+        trend_axis=trend_axis, offset=offset, lag=lag, initial=initial, loss=loss, width=width, weights=weights,
+        errors=errors, starts=starts, effort=effort,
     )  # fmt: skip
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())

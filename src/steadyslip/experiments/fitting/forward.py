@@ -87,6 +87,8 @@ class Forward:
         Error allowed per step.
     shifts : int
         How many free times of the table there are besides.
+    unsettled : sequence of str
+        Which of `ExperimentProgram.unsettled` are free as well: their directions come last.
     sensitive : bool
         Whether derivatives are wanted.
     effort : Effort, optional
@@ -94,16 +96,16 @@ class Forward:
     """
 
     def __init__(
-        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0,
+        self, rig: Slider, names: Sequence[str], rtol: float = 1e-7, shifts: int = 0, unsettled: Sequence[str] = (),
         sensitive: bool = True, effort: Effort | None = None,
     ) -> None:  # fmt: skip
-        self.rig, self.names, self.rtol, self.shifts = rig, tuple(names), rtol, shifts
+        self.rig, self.names, self.rtol, self.shifts, self.unsettled = rig, tuple(names), rtol, shifts, tuple(unsettled)
         self.effort = effort or Effort()
         own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
         self._base = operating_point(rig, own)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
-        self.directions = len(names) + shifts if sensitive else 0
+        self.directions = len(names) + shifts + len(unsettled) if sensitive else 0
         self.size = next((n for n in (0, *SIZES) if n >= self.directions), SIZES[-1])
         self.program = experiment_program(self.model, self.size, automatic_method(reduction))
 
@@ -116,11 +118,14 @@ class Forward:
         return self._base.with_arguments(named.values(), (len(parameters),))
 
     def _chain(self, parameters: Array, values: OperatingPoint) -> Array:
-        """How the model's parameters change with the free ones."""
+        """How the model's parameters and where it begins change with the free ones."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
-        chain = np.zeros((len(parameters), self.directions, len(order)))
+        begins = {name: len(order) + i for i, name in enumerate(self.program.unsettled)}
+        chain = np.zeros((len(parameters), self.directions, len(order) + len(begins)))
         if not self.directions:
             return chain
+        for i, name in enumerate(self.unsettled, start=self.directions - len(self.unsettled)):
+            chain[:, i, begins[name]] = 1.0
         for i, name in enumerate(self.names):
             if name in order:
                 chain[:, i, order[name]] = 1.0
@@ -140,7 +145,7 @@ class Forward:
         slope: Array = (ends[0] - ends[1]) / (2 * step)
         return slope
 
-    def run(self, table: InputTable, parameters: Array, units: Array) -> Array:
+    def run(self, table: InputTable, parameters: Array, units: Array, begin: Array | None = None) -> Array:
         """The friction coefficient that would be observed.
 
         Parameters
@@ -150,6 +155,8 @@ class Forward:
         parameters : ndarray (jobs, names)
         units : ndarray (jobs, names)
             Change of each parameter that its derivative refers to.
+        begin : ndarray (jobs, unsettled), optional
+            How far from steady sliding the motion begins.
 
         Returns
         -------
@@ -159,17 +166,22 @@ class Forward:
         """
         values = self.values(parameters)
         chain = self._chain(parameters, values)
+        away = np.zeros((len(parameters), len(self.program.unsettled)))
+        if begin is not None:
+            away[:, [list(self.program.unsettled).index(name) for name in self.unsettled]] = begin
         if not self.directions:
-            return self._run(table, values, chain)
+            return self._run(table, values, chain, away)
         chain[:, : len(self.names)] *= units[:, :, None]
         parts = [slice(k, k + self.size) for k in range(0, self.directions, self.size)]
-        found = [self._run(table.along(part, self.size), values, _padded(chain[:, part], self.size)) for part in parts]
+        found = [
+            self._run(table.along(part, self.size), values, _padded(chain[:, part], self.size), away) for part in parts
+        ]
         return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
 
-    def _run(self, table: InputTable, values: OperatingPoint, chain: Array) -> Array:
+    def _run(self, table: InputTable, values: OperatingPoint, chain: Array, away: Array) -> Array:
         """One pass, with as many directions as the kernel has."""
         jobs, sigma = len(chain), values.stresses
-        constants, start = self.program.arrays(values, chain)
+        constants, start = self.program.arrays(values, chain, away)
         settings = self._settings(table, values, jobs)
         good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
         seen = np.full((jobs, 1 + chain.shape[1], table.count), np.nan)
@@ -203,7 +215,7 @@ class Forward:
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
-        richer = 1 + RICHER * (len(self.names) + self.shifts)
+        richer = 1 + RICHER * (len(self.names) + self.shifts + len(self.unsettled))
         settings[:, Setting.MOST_STEPS] = int(self.effort.patience * richer * table.samples.shape[1]) + 1000
         settings[:, Setting.FIRST_STEP] = np.inf
         for i, name in enumerate(reduction.names):

@@ -61,9 +61,12 @@ class Simpler:
 
 
 def simpler(plan: Plan) -> Iterator[Simpler]:
-    """The models that lack the last order of a trend, the offset, the last member of a list, or one part of a law."""
+    """The models that lack the last order of a trend, its own beginning, the last of a list, or a part of a law."""
     if plan.trend:
         yield Simpler(replace(plan, trend=plan.trend - 1), {f"trend.{plan.trend}": 0.0}, ())
+    if plan.initial == "free":
+        away = [one.parameter for one in plan.space().unknowns if one.parameter.startswith("initial.")]
+        yield Simpler(replace(plan, initial="steady"), dict.fromkeys(away, 0.0), ())
     if plan.offset:
         yield Simpler(replace(plan, offset=False), {"offset": 0.0}, ())
     addresses, seen = plan.rig.parameters(), set()

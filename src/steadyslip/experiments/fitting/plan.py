@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.comparison import (
     Comparison,
     RecordPart,
+    initial_unknowns,
     jump_unknowns,
     start_unknowns,
     step_unknowns,
@@ -29,14 +31,18 @@ from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
+from steadyslip.kernels.experiment import experiment_program
 from steadyslip.laws.contact import pressed_at
 from steadyslip.machine.slider import Slider
+from steadyslip.model.point import operating_point
+from steadyslip.model.scales import natural_scales
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
 
 Array = np.ndarray
 MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
 """Samples of a record beyond which a fit works with means of them, and how many."""
+FRICTION = 0.01  # of friction: what matters
 NEVER_FREE = ("drive.velocity", "slider.area")
 
 
@@ -66,6 +72,8 @@ class Plan:
         Whether a constant is added to friction, besides mu_ref.
     lag : bool
         Whether friction may come later than what drives it, each record by a time of its own.
+    initial : str
+        Whether the motion begins with ``steady`` sliding, or with a friction and a memory of its own that are ``free``.
     loss : str
     width : float or None
         Residual from which on outliers weigh less.
@@ -88,6 +96,7 @@ class Plan:
     trend_axis: str = "displacement"
     offset: bool = False
     lag: bool = False
+    initial: str = "steady"
     loss: str = "linear"
     width: float | None = None
     weights: tuple[Array, ...] | None = field(default=None, repr=False)
@@ -119,8 +128,22 @@ class Plan:
                 found += start_unknowns(label, self.loading[i], float(np.ptp(self.records[i].time)), self.lag)
             else:
                 found += jump_unknowns(label, self.sharp[i])
+            if self.initial == "free" and not self.rests(i):
+                found += initial_unknowns(label, self._natural_sizes)
             found += trend_unknowns(i if several else None, self.trend, self.offset)
         return Space(tuple(found))
+
+    def rests(self, i: int) -> bool:
+        """Whether a record begins at rest, so that a hold of free length leads to where it begins."""
+        return self.follows and resting_rate(self.loading[i]) is not None
+
+    @cached_property
+    def _natural_sizes(self) -> dict[str, float]:
+        """Of how far from steady sliding a motion may begin: 0.01 of friction, an e-fold of each state."""
+        point = operating_point(self.rig, {})
+        program = experiment_program(point.model, 0, "tsit5")
+        scales, _ = natural_scales(point, program.reduction)
+        return {name: float(np.max(scales.get(name, FRICTION))) for name in program.unsettled}
 
     def _unknown(self, name: str, record: int | None) -> Unknown:
         if name.startswith("protocol."):
@@ -138,15 +161,16 @@ class Plan:
 
     def _part(self, i: int, record: Record, space: Space, effort: Effort) -> RecordPart:
         rig, pressed = self.driven(record, i)
-        places: dict[str, list[int]] = {"rig": [], "time": [], "trend": []}
+        places: dict[str, list[int]] = {"rig": [], "time": [], "initial": [], "trend": []}
         for place, one in enumerate(space.unknowns):
             if one.record in (None, i):
                 kinds = dict.fromkeys(("protocol", "jump", "step", "lag", "start"), "time")
-                kinds |= {"trend": "trend", "offset": "trend"}
+                kinds |= {"trend": "trend", "offset": "trend", "initial": "initial"}
                 places[kinds.get(one.parameter.partition(".")[0], "rig")].append(place)
         names = [space.unknowns[place].parameter for place in places["rig"]]
         times = [space.unknowns[place].parameter for place in places["time"]]
-        forward = Forward(rig, names, self.rtol, shifts=len(times), effort=effort)
+        begins = [space.unknowns[place].parameter.partition(".")[2] for place in places["initial"]]
+        forward = Forward(rig, names, self.rtol, len(times), begins, effort=effort)
         inputs: Any
         moved: Array | None = None
         if self.follows:
@@ -163,7 +187,8 @@ class Plan:
         weights = np.ones(len(record)) if self.weights is None else self.weights[i]
         return RecordPart(
             record, rig, forward, inputs, record.friction, weights, tuple(places["rig"]), tuple(places["time"]),
-            tuple(places["trend"]), trend_rows(record, self.trend, self.offset, self.trend_axis, moved),
+            tuple(places["initial"]), tuple(places["trend"]),
+            trend_rows(record, self.trend, self.offset, self.trend_axis, moved),
         )  # fmt: skip
 
     def driven(self, record: Record, i: int) -> tuple[Slider, Array | None]:
@@ -340,7 +365,7 @@ def _check_records(plan: Plan) -> None:
             problems.append(
                 Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
             )
-        needed = len(plan.free) + plan.trend + plan.offset
+        needed = len(plan.free) + plan.trend + plan.offset + (plan.initial == "free")
         if len(record) <= needed:
             problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))
     if problems:

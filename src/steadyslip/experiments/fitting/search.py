@@ -62,7 +62,7 @@ class Found:
     bounds: tuple[Array, Array]
 
 
-Known = dict[tuple[tuple[str, ...], int, bool], Found | None]
+Known = dict[tuple[tuple[str, ...], int, bool, str], Found | None]
 """Fits of simpler models that are there already, by what is free."""
 
 
@@ -239,7 +239,7 @@ class _Search:
         for model in simpler(self.plan):
             if not self.cut and not self._near(model):
                 continue
-            key = model.plan.free, model.plan.trend, model.plan.offset
+            key = model.plan.free, model.plan.trend, model.plan.offset, model.plan.initial
             if key not in known:
                 known[key] = _tried(model.plan, self.starts, self.effort, self.progress, known)
             if (other := known[key]) is None:

@@ -42,6 +42,11 @@ class FitSettings(Settings):
         False, True, default=False,
         doc="friction may come later than what drives it, each record by a time of its own, `lag`",
     )  # fmt: skip
+    initial: str = option(
+        "steady", "free", default="steady",
+        doc="`steady`: the record begins with steady sliding; `free`: it slides, but not steadily: friction and memory "
+        "at its beginning are fitted, as differences from steady sliding (`initial.friction`, `initial.Theta`)",
+    )  # fmt: skip
     loss: str = option(*LOSSES, doc="of residuals; all but `linear` let outliers weigh less", default="linear")
     width: float | None = parameter(
         "1", _width, "residual from which on they do; 1.345 standard deviations of most unless given", default=None

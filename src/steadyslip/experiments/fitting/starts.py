@@ -217,6 +217,8 @@ def _start(unknown: Unknown, part: RecordPart, own: Features, design: tuple[Arra
         return steepness * _stress(part)
     if name.startswith(("trend.", "offset")):
         return np.zeros_like(a)
+    if name.startswith("initial."):
+        return 0.5 * (spare - 0.5) * unknown.size
     if name == "lag":
         return 0.5 * (spare - 0.5) * (unknown.high - unknown.low)
     if name == "start.hold":

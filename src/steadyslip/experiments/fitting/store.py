@@ -27,7 +27,7 @@ _ATTRIBUTES = {
 }  # fmt: skip
 _OPTIONS = {
     "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "lag": bool,
-    "loss": str, "width": {float, None}, "rtol": float,
+    "initial": str, "loss": str, "width": {float, None}, "rtol": float,
 }  # fmt: skip
 _COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int)
 _FORMS = {

@@ -16,6 +16,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 WIDTH = 100
+AWAY = 3.0  # root mean squares of the residuals by which the first of them, on average, may be off
 SURE = 9.0  # fall of the sum of squares, in variances of an independent sample, that tells a ramp from a step
 VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
 
@@ -62,7 +63,8 @@ def short_names(names: tuple[str, ...]) -> list[str]:
     found = []
     for name in names:
         first, *_, last = name.split(".")
-        brief = f"{first}.{last}" if first not in ("protocol", "step", "start") and ".states." not in name else name
+        whole = first in ("protocol", "step", "start", "initial") or ".states." in name
+        brief = name if whole else f"{first}.{last}"
         found.append(brief if sum(n.split(".")[-1] == last and n.startswith(first) for n in names) == 1 else name)
     return found
 
@@ -92,7 +94,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _vague_jumps(fit) + _untold_ramps(fit)
+    found += list(fit.at_bounds) + _unsettled(fit) + _vague_jumps(fit) + _untold_ramps(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
@@ -105,6 +107,20 @@ def _cut_off(fit: FitNumbers) -> str:
         f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
         "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
     )
+
+
+def _unsettled(fit: FitNumbers) -> list[str]:
+    """Records whose friction begins elsewhere than the model, which begins with steady sliding."""
+    found = []
+    for i, record in enumerate(fit.plan.records):
+        own = fit.part(fit.residuals, i)
+        first = float(np.mean(own[: max(5, len(own) // 200)]))
+        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(first) > AWAY * fit.rms:
+            found.append(
+                f"{record.source}: friction begins {first:+.2g} beside the model, which begins with steady sliding; "
+                "where the record does not, let its beginning be free (initial = 'free'), or cut it off (between)"
+            )
+    return found
 
 
 def _vague_jumps(fit: FitNumbers) -> list[str]:
@@ -199,6 +215,8 @@ def drive_line(fit: FitNumbers) -> str:
     text += f", {free} of {'its' if count == 1 else 'their'} times and durations fitted" if free else ""
     if any(one.parameter == "start.hold" for one in fit.space.unknowns):
         text += "; at rest at first, how long is fitted (start.hold)"
+    if plan.initial == "free" and any(one.parameter.startswith("initial.") for one in fit.space.unknowns):
+        text += "; not steady at first, how far is fitted (initial)"
     slips, glitches = sum(c.slips for c in loads), sum(c.glitches for c in loads)
     if slips or glitches:
         text += f"; {slips} slips and {glitches} glitches of the sensor left out"

@@ -59,6 +59,9 @@ def test_forces_and_stresses_of_a_contact():
     for other in (spread, ss.rig_from_text(text)):
         assert other.value("preload") == pytest.approx(6e5)
         assert ss.eigenvalues(other) == pytest.approx(ss.eigenvalues(force), rel=1e-9)
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(text.replace('"50 cm^2"', "0"))
+    assert [problem.name for problem in caught.value.problems] == ["contacts.guide.area"]
     with pytest.raises(ss.RigFileError, match="wrong dimension; expected a quantity in N,"):
         ss.rig_from_text(TEXT.replace('"3 kN"', '"600 kPa"'))
     with pytest.raises(ss.RigFileError, match=r"expected a quantity in kg, for example '2 kg'$"):

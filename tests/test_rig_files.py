@@ -253,7 +253,10 @@ def test_with_an_area_the_file_is_in_newtons():
         assert again.value(name) == pytest.approx(address.value, rel=1e-15)
     found = problems(text.replace('"18 MN/m"', '"18 m"'))
     assert "N/m" in found["slider.stiffness"][1]
-    assert "> 0" in problems(text.replace('"20 cm^2"', "0"))["slider.area"][1]
+    for wrong in ("0", '"nothing"', "-1"):  # and nothing is said of forces that are right with an area
+        found = problems(text.replace('"20 cm^2"', wrong))
+        assert list(found) == ["slider.area"]
+        assert "m^2" in found["slider.area"][1]
 
 
 def test_a_law_without_name_cannot_be_written():

@@ -18,6 +18,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
+from steadyslip.model.range import require_range
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,10 @@ def boundary(
     ------
     UnknownNameError, ParameterError
         If the name is unknown or the range is not inside the parameter's domain.
+    NotAvailable
+        If the numbers of the rig leave the range of floating point.
     """
+    require_range(operating_point(rig, branch=branch))
     full = rig.resolve(name)
     role = _role(rig, full)
     limits = None if between is None else _checked_range(full, role, between)
@@ -93,7 +97,14 @@ def _kept(rig: Rig, name: str) -> tuple[str, ...]:
 
 @checked()
 def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
-    """Distance of every parameter to its nearest edge of stability, the most critical first."""
+    """Distance of every parameter to its nearest edge of stability, the most critical first.
+
+    Raises
+    ------
+    NotAvailable
+        If the numbers of the rig leave the range of floating point.
+    """
+    require_range(operating_point(rig, branch=branch))
     present = present_zeros(rig)
     found = []
     for name, address in rig.parameters().items():

@@ -17,7 +17,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.linearisation import characteristic_terms
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.range import quasi
+from steadyslip.model.range import quasi, require_range
 
 _APART = 1e6  # factor between the values at which the polynomial is looked at
 _LEFT = 1e-13  # share of its terms that rounding leaves of a difference that is zero
@@ -57,7 +57,9 @@ def stable_values(rig: Slider | Machine, name: str) -> Array:
     if not late and (not value or value < 0):
         message = "has no positive value to start from; give it one first"
         raise ParameterError([Problem(full, message)])
-    found = linear_set(operating_point(rig, None, (full,) if late else ()), full)
+    point = operating_point(rig, None, (full,) if late else ())
+    require_range(point)
+    found = linear_set(point, full)
     if found is None:
         raise NotAvailable(
             f"the equations do not depend on {full} linearly, so that its stable set has no exact form; boundary(rig, "

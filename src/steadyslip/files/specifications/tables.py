@@ -75,8 +75,8 @@ class TableReader:
         """Read what is below a contact with an area of its own, or with none, in totals."""
         outside = self.area, self.in_totals
         if law.in_totals:
-            self.area, self.in_totals = None, True
-            with suppress(ParameterError):  # reported when its own keys are read
+            self.area, self.in_totals = 1.0 if "area" in table else None, True
+            with suppress(ParameterError):  # reported when its own keys are read; totals are no faults beside it
                 self.area = None if "area" not in table else Parameter("m^2", positive, "area").checked(table["area"])
         yield
         self.area, self.in_totals = outside

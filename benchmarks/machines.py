@@ -15,7 +15,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import numpy as np
 
 import steadyslip as ss
+from delays import some, spectral, winding
 from machines import at_random, three_bodies
+from steadyslip.linear import quasi
+from steadyslip.linear.spectrum import unstable_roots
+from steadyslip.model import operating_point
 
 SINGULAR = 1e-8  # smallest over largest singular value of the matrix at an eigenvalue
 
@@ -51,6 +55,33 @@ def campaign(count, first):
     print(f"{count} random machines: {right} eigenvalues right, {wrong} wrong")
 
 
+def delays(count, first):
+    """Delay equations at random against discretised ones; late machines against how their matrix turns."""
+    right = wrong = unclear = 0
+    for seed in range(first, first + count):
+        c, h = some(seed, 2 + seed % 2)
+        found = spectral(c, h, 50)
+        if np.min(np.abs(found.real[:12])) < 1e-6:
+            unclear += 1
+            continue
+        good = int(quasi.count_right(c, h)) == np.sum(found.real > 0)
+        good &= all(np.min(np.abs(found - s)) < 1e-6 * max(1.0, abs(s)) for s in quasi.rightmost(c, h, 3))
+        right, wrong = right + good, wrong + (not good)
+        if not good:
+            print(f"equation {seed}")
+    print(f"{count} delay equations: {right} right, {wrong} wrong, {unclear} on the edge")
+    right = wrong = 0
+    for seed in range(first, first + count // 5):
+        machine, matrix = at_random(seed, delay=float(10 ** np.random.default_rng(seed).uniform(-2, 0.3)))
+        good = int(unstable_roots(operating_point(machine))) in (winding(matrix, 300.0), quasi.INFINITE)
+        inside = [sum(w for w in pair if np.isfinite(w)) / 2 for pair in ss.stable_values(machine, "drive.delay")]
+        good &= set(ss.stability(machine, {"drive.delay": inside}).tolist() if inside else ["stable"]) == {"stable"}
+        right, wrong = right + good, wrong + (not good)
+        if not good:
+            print(f"late machine {seed}")
+    print(f"{count // 5} late machines: {right} right, {wrong} wrong")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=50)
@@ -58,3 +89,4 @@ if __name__ == "__main__":
     chosen = parser.parse_args()
     times()
     campaign(chosen.count, chosen.first)
+    delays(chosen.count, chosen.first)

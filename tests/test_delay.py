@@ -10,6 +10,7 @@ from scipy.special import lambertw
 
 import steadyslip as ss
 from command import run
+from delays import some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
 from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
@@ -38,38 +39,6 @@ def lagging(k, damping=0.05, slope=0.1, lag=1.0):
         contacts={"guide": surface("block", friction)},
         drive=ss.Pull(velocity=1.0),
     )
-
-
-def spectral(c, h, nodes=40):
-    """Rightmost eigenvalues of Σ c_j(d/dt) x(t − h_j) = 0, c_0 the highest, by collocation at Chebyshev's points."""
-    n, longest = len(c[0]) - 1, max(h)
-    i = np.arange(nodes + 1)
-    x = np.cos(np.pi * i / nodes)
-    weights = np.where((i == 0) | (i == nodes), 0.5, 1.0) * (-1.0) ** i
-    difference = x[:, None] - x[None, :] + np.eye(nodes + 1)
-    slopes = weights[None, :] / weights[:, None] / difference
-    slopes -= np.diag(slopes.sum(axis=1))
-    whole = np.kron(slopes * 2 / longest, np.eye(n)).astype(float)
-    whole[:n] = 0.0
-    whole[: n - 1, 1:n] = np.eye(n - 1)
-    for row, delay in zip(c, h, strict=True):
-        at = 1 - 2 * delay / longest
-        near = np.abs(at - x) < 1e-14
-        share = near.astype(float) if near.any() else weights / (at - x) / np.sum(weights / (at - x))
-        for k in range(n):
-            whole[n - 1, k::n] -= share * row[k] / c[0][n]
-    found = np.linalg.eigvals(whole)
-    return found[np.argsort(-found.real)]
-
-
-def some(seed, terms=2):
-    """A quasi-polynomial of degree 1 to 6 at random, its delays up to a few turns of its roots."""
-    random = np.random.default_rng(seed)
-    n = int(random.integers(1, 7))
-    c = random.normal(size=(terms, n + 1))
-    c[1:, n] = 0.0
-    c[0, n] = 1.0
-    return c, np.concatenate([[0.0], 10 ** random.uniform(-1, 0.6, terms - 1)])
 
 
 # --- closed forms -----------------------------------------------------------------------------------
@@ -173,15 +142,6 @@ def test_windows_of_what_enters_linearly_are_those_of_counting():
         assert np.array_equal(inside[known], stable[known]), seed
         both += 0 < stable.sum() < len(stable)
     assert both > 10
-
-
-def winding(matrix, fast):
-    """Zeros to the right of the axis of a determinant without poles there, by how it turns from 0 to beyond `fast`."""
-    omega = np.concatenate([np.geomspace(1e-5, 1.0, 1000), np.geomspace(1.0, fast, 4000)[1:]])
-    turns = np.unwrap([np.angle(np.linalg.det(matrix(1j * w))) for w in omega])
-    far = [np.log(abs(np.linalg.det(matrix(1j * w)))) for w in (fast, 2 * fast)]
-    degree = round((far[1] - far[0]) / np.log(2))
-    return round((degree * np.pi / 2 - (turns[-1] - turns[0])) / np.pi)
 
 
 @pytest.mark.parametrize("seed", range(4))

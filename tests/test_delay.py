@@ -1,7 +1,6 @@
 """Delay in controllers and friction: closed forms, a discretised delay equation, windings of a matrix typed by hand."""
 
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -257,7 +256,7 @@ def test_what_is_not_offered_with_delay_says_so(tmp_path):
     done = run("simulate", str(path), "--until", "1 s")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert re.search("delay|machine", done.stderr)
+    assert "delay" in done.stderr
     with pytest.raises(ss.NotAvailable, match="motion with a delay is not offered"):
         reduce_model(build_model(late_axis("0.1 s")))
     with pytest.raises(ss.ParameterError, match="describe it as a machine"):

@@ -1,8 +1,20 @@
 // The verdict: a sentence, why, and a bar of the stable stiffnesses.
-import { make, svg, tell } from "./dom.js";
+import { make, put, svg, tell } from "./dom.js";
 import { ABSENT } from "./linear.js";
 import { ticks } from "./plot.js";
 import { headline, kindOf, quantity, reason } from "./words.js";
+
+/** Marks or labels of a bar: class, place in per cent and text; only what is new is written. */
+function placed(box, rows, name) {
+  while (box.children.length > rows.length) box.lastChild.remove();
+  while (box.children.length < rows.length) box.append(make(name, {}));
+  rows.forEach(([kind, place, text], n) => {
+    const one = box.children[n];
+    put(one, "class", kind);
+    put(one, "style", `left: ${place.toFixed(2)}%`);
+    tell(one, text);
+  });
+}
 
 export class Banner {
   /** @param {any} data @param {string[]} differs what this browser computes otherwise than Python did */
@@ -10,7 +22,10 @@ export class Banner {
     this.data = data;
     this.sentence = make("h1", {});
     this.reason = make("p", {});
-    this.bar = make("div", { className: "bar", role: "img" });
+    this.paths = ["unstable", "stable"].map((name) => svg("path", { class: name }));
+    this.marks = make("div", {});
+    this.labels = make("div", {});
+    this.bar = make("div", { className: "bar", role: "img" }, svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, ...this.paths), this.marks, this.labels);
     this.notice = make("p", { className: "notice", role: "status" });
     if (differs.length) this.notice.textContent = `This browser computes otherwise than Python did (${differs.slice(0, 3).join("; ")}): do not rely on this page.`;
     this.box = make("section", { className: "verdict", "aria-label": "verdict" }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), this.bar, this.notice);
@@ -31,21 +46,23 @@ export class Banner {
     const ends = answer.intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k)).map((k) => k + gain);
     const marks = [...ends, own].filter((k) => k > 0);
     if (!marks.length || answer.status === ABSENT) {
-      this.bar.replaceChildren();
+      this.bar.hidden = true;
       this.bar.setAttribute("aria-label", "no stiffness is stable");
       return;
     }
+    this.bar.hidden = false;
     const low = Math.log(Math.min(...marks) / 10), high = Math.log(Math.max(...marks) * 10);
     const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
-    const parts = intervals.map((one) => svg("rect", { class: "stable", x: x(one.low), width: x(one.high) - x(one.low), y: 0, height: 10 }));
-    const drawing = svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, svg("rect", { class: "unstable", x: 0, y: 0, width: 100, height: 10 }), ...parts);
-    const within = (place) => `left: ${Math.min(80, Math.max(20, place))}%`, at = (k, name) => make("i", { className: name, style: `left: ${x(k)}%` });
-    const begins = new Set(intervals.map((one) => one.low)), labels = ends.map((k) => make("span", { textContent: `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`, style: within(x(k)) }));
-    const now = make("span", { className: "now", textContent: `stiffness now ${stiffness(own)}`, style: within(x(own)) });
-    const per = this.data.area ?? 1, scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).filter((k) => x(k / per) > 6 && x(k / per) < 94);
-    const ruled = scale.flatMap((k) => [at(k / per, "tick"), make("span", { className: "tick", textContent: stiffness(k / per), style: `left: ${x(k / per)}%` })]);
-    this.bar.replaceChildren(drawing, ...ruled, at(own, "own"), ...ends.map((k) => at(k, "edge")), now, ...labels);
+    const drawn = `M0 0H100V10H0Z|${intervals.map((one) => `M${x(one.low)} 0H${x(one.high)}V10H${x(one.low)}Z`).join("")}`.split("|");
+    this.paths.forEach((path, n) => put(path, "d", drawn[n]));
+    const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low)), per = this.data.area ?? 1;
+    const scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).map((k) => k / per).filter((k) => x(k) > 6 && x(k) < 94);
+    const marked = [...scale.map((k) => ["tick", x(k), ""]), ["own", x(own), ""], ...ends.map((k) => ["edge", x(k), ""])];
+    const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `stiffness now ${stiffness(own)}`],
+      ...ends.map((k) => ["", within(k), `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`])];
+    placed(this.marks, marked, "i");
+    placed(this.labels, labels, "span");
     const words = intervals.map(({ low: a, high: b }) => (b === Infinity ? `above ${stiffness(a)}` : `${stiffness(a)} to ${stiffness(b)}`));
-    this.bar.setAttribute("aria-label", `stable stiffness: ${words.join(", or ") || "none"}`);
+    put(this.bar, "aria-label", `stable stiffness: ${words.join(", or ") || "none"}`);
   }
 }

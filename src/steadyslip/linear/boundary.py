@@ -84,7 +84,7 @@ def boundary(
     require_range(operating_point(rig, branch=branch))
     full = rig.resolve(name)
     role = _role(rig, full)
-    limits = None if between is None else _checked_range(full, role, between)
+    limits = None if between is None else _checked_range(full, role, [rig.read(full, one) for one in between])
     if limits is not None:
         operating_point(rig, {full: np.asarray(limits)}, _kept(rig, full), branch)  # refuses what breaks a condition
     return Search(rig, full, _kept(rig, full), branch).boundaries(limits)

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import shown, unit
+from steadyslip.core.quantities import Dimension, shown, unit
 from steadyslip.linear.polynomials import Array, StableSet
 from steadyslip.linear.spectrum import is_ill_posed, nearness, spectrum, static_sum
 from steadyslip.linear.stable_values import linear_set
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import set_of_one
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -130,6 +131,8 @@ class Search:
         sigma, v0 = float(point.sigmas[0]), point.drive
         length = v0 / (_decay_rate(point) or 1.0)
         _, d = unit(self.role.unit)
+        if isinstance(self.rig, Machine) and self.rig.area_of(self.name) is None:
+            d = d.times(Dimension(length=-2 * d.mass))  # a total: of forces, not stresses
         by_velocity = -2 * d.mass - d.time
         sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
         size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)

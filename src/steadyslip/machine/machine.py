@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from steadyslip.core.errors import Problem, unknown_name
-from steadyslip.core.records import Condition, Members, members, part
+from steadyslip.core.quantities import is_per_area, total_unit
+from steadyslip.core.records import Address, Condition, Members, members, part
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
@@ -196,8 +198,17 @@ class Machine(Rig):
         kind, _, rest = name.partition(".")
         if kind != "contacts":
             return None
-        area = self.contacts[rest.partition(".")[0]].area
-        return 1.0 if area is None else area
+        area: float | None = self.contacts[rest.partition(".")[0]].area
+        return area
+
+    def declared(self) -> dict[str, Address]:
+        """Laws of contacts without an area are in forces."""
+        return {name: self._in_forces(one) for name, one in super().declared().items()}
+
+    def _in_forces(self, one: Address) -> Address:
+        if not one.name.startswith("contacts.") or self.area_of(one.name) or not is_per_area(one.role.unit):
+            return one
+        return replace(one, role=replace(one.role, unit=total_unit(one.role.unit)))
 
     # -- how it is assembled
 

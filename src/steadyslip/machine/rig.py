@@ -29,12 +29,16 @@ class Rig(FrozenRecord, Keeper):
         raise NotImplementedError
 
     def area_of(self, name: str) -> float | None:
-        """Area (m²) for which people give and get a parameter as a total; None where it is what it is inside."""
+        """Area (m²) for which people give and get a parameter as a total; None where it is in its own unit."""
         raise NotImplementedError
 
     def parameters(self) -> dict[str, Address]:
-        """Every parameter of the rig by dotted name: declaration and present value."""
+        """Every parameter of the rig by dotted name: declaration, in the unit of its user, and present value."""
         return dict(_parameters(self))
+
+    def declared(self) -> dict[str, Address]:
+        """The same, worked out."""
+        return parameters(self)
 
     def resolve(self, name: str) -> str:
         """The full dotted name of a parameter.
@@ -45,6 +49,21 @@ class Rig(FrozenRecord, Keeper):
             If `name` is unknown or ambiguous; the message lists the nearest valid names.
         """
         return resolve(name, self.parameters())
+
+    def read(self, name: str, value: Any) -> Any:
+        """A value of a parameter of this name in SI units; text as its user writes it, in totals where it has an area.
+
+        Raises
+        ------
+        ParameterError
+            If text is none of its quantities.
+        """
+        if not isinstance(value, str):
+            return value
+        try:
+            return self.parameters()[name].role.read(value, self.area_of(name))
+        except ParameterError as error:
+            raise ParameterError([problem.under(name) for problem in error.problems]) from error
 
     def of_kind(self, kind: str) -> tuple[str, ...]:
         """Dotted names of the given parameters whose laws declare them to be of a `kind`, in order."""
@@ -70,9 +89,11 @@ class Rig(FrozenRecord, Keeper):
         problems, full = [], {}
         for name, value in changes.items():
             try:
-                full[self.resolve(name)] = value
+                full[self.resolve(name)] = self.read(self.resolve(name), value)
             except UnknownNameError as error:
                 problems.append(Problem(name, str(error)))
+            except ParameterError as error:
+                problems += error.problems
         if problems:
             raise ParameterError(problems)
         return replaced(self, full)
@@ -80,4 +101,4 @@ class Rig(FrozenRecord, Keeper):
 
 @question
 def _parameters(rig: Rig) -> dict[str, Address]:
-    return parameters(rig)
+    return rig.declared()

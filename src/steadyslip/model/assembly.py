@@ -415,5 +415,7 @@ class _Assembly:
         for element in self.mechanism.elements:
             if element.name:
                 resting = self._known(self._tension(element, self.statics.displacement, {}))
-                found[f"{element.name}.force"] = (-resting - self._tension(element, self.x, self.moving), "N")
+                twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
+                force = -resting - self._tension(element, self.x, self.moving)
+                found[f"{element.name}.force"] = (force, "N m" if twisted else "N")
         return found

@@ -68,7 +68,7 @@ def _build_cached(structure: _Structure) -> Model:
     given = {name: symbol for name, symbol in symbols.items() if isinstance(symbol, sp.Symbol)}
     for name in rig.instead:
         given.pop(name, None)
-    roles = {name: address.role for name, address in parameters(rig).items()}
+    roles = {name: address.role for name, address in rig.parameters().items()}
     taken = set(RESERVED) | {str(symbol) for symbol in given.values()}
     return assemble(twin(rig, symbols).mechanism(), given, roles, lambda name: _unused_letter(name, taken))
 

@@ -220,7 +220,7 @@ def _varied(rig: Rig, vary: Vary) -> Together:
     for name, value in vary.items():
         try:
             full = rig.resolve(name)
-            checked[full] = checked_array(full, known[full].role, value)
+            checked[full] = checked_array(full, known[full].role, rig.read(full, value))
             if known[full].role.adds_state and np.any(np.asarray(checked[full]) == 0):
                 raise ParameterError(
                     [Problem(full, "got 0; without this term the rig has fewer states, ask for it apart")]

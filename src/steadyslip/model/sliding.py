@@ -111,6 +111,7 @@ class SteadyMachine(Displayed):
                 f"  {name} slides at {shown(one.slip_rate, 'm/s')}: normal force {shown(one.normal_force, 'N')}, "
                 f"friction force {shown(one.friction_force, 'N')}, friction {one.friction:.4g}"
             )
+        rows += [f"  {name} carries {shown(f, self.units[f'links.{name}'])}" for name, f in self.links.items()]
         return "\n".join(rows)
 
 
@@ -165,6 +166,7 @@ def steady_machine(rig: Machine) -> SteadyMachine:
     links = {n: numbers[f"links.{n}.force"] for n in rig.links}
     units = {n: "rad/s" if body.turns else "m/s" for n, body in rig.bodies.items()}
     units |= {"drive": "rad/s" if rig.drive.turns else "m/s"}
+    units |= {f"links.{n}": model.observables[f"links.{n}.force"][1] for n in rig.links}
     speeds = {n: float(speed) for n, speed in rig.speeds().items()}
     return SteadyMachine(float(point.drive), speeds, contacts, links, units)
 
@@ -228,7 +230,7 @@ def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
     missing = next(place for place, sigma in enumerate(point.sigmas) if not np.isfinite(sigma))
     contact = point.model.contacts[missing]
     law = rig.contacts[contact.name].contact if isinstance(rig, Machine) else rig.contact  # type: ignore[attr-defined]
-    area = rig.area_of(f"contacts.{contact.name}") if isinstance(rig, Machine) else rig.area  # type: ignore[attr-defined]
+    area = (rig.contacts[contact.name].area or 1.0) if isinstance(rig, Machine) else rig.area  # type: ignore[attr-defined]
     return _absent(point, missing, law, area)
 
 

@@ -136,7 +136,7 @@ def _record(record: FrozenRecord) -> Iterator[str]:
     if isinstance(record, Machine):
         yield figure(drawn(lambda: draw(record), "sketch of the machine"), _SKETCHED)
     rows = []
-    for path, one in parameters(record).items():
+    for path, one in (record.parameters() if isinstance(record, Machine) else parameters(record)).items():
         if one.value is not None:
             values = np.asarray(one.value)
             area = record.area_of(path) if isinstance(record, Machine) else None

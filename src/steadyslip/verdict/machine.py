@@ -175,7 +175,10 @@ def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:
         }
         for name, one in steady.contacts.items()
     }  # fmt: skip
-    return {"velocity": steady.velocity, "speeds": steady.speeds, "contacts": contacts, "links": steady.links}
+    return {
+        "velocity": steady.velocity, "speeds": steady.speeds, "contacts": contacts, "links": steady.links,
+        "units": steady.units,
+    }  # fmt: skip
 
 
 def _mode(mode: Mode | None) -> dict[str, Any] | None:

@@ -94,6 +94,21 @@ def initial_values(
     ParameterError
         Listing what is given and cannot be.
     """
+    if given:
+        return _initial_values(reduction, point, given)
+    columns, velocity = _steady_start(point, reduction)
+    return columns.copy(), velocity.copy()
+
+
+@question
+def _steady_start(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
+    """That of steady sliding."""
+    return _initial_values(reduction, point, {})
+
+
+def _initial_values(
+    reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any]
+) -> tuple[np.ndarray, np.ndarray]:
     model = reduction.model
     names = [item.name for item in model.memory]
     start = _checked_initial(given, model)

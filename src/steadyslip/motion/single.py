@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model import Model
+from steadyslip.model import Model, OperatingPoint
 from steadyslip.model.scales import slip_rates
 from steadyslip.model.sliding import steady_state
 from steadyslip.motion.engine import Outcome, run_single
@@ -163,7 +163,7 @@ def _history(
     model = machine.reduction.model
     units = {"t": "s"} | observable_units(model)
     contacts = tuple(contact.name for contact in model.contacts)
-    surfaces = tuple(float(area) for area in jobs.point.evaluate(areas(model)))
+    surfaces = _surfaces(jobs.point)
     events = events_of(outcome.log, contacts, surfaces)
     if status == "blow-up":
         events += (_last_event("blow-up", jobs, machine, outcome, surfaces),)
@@ -188,6 +188,11 @@ def _history(
         rejected=int(steps[1]),
         velocities=_velocities(outcome, contacts, found, events),
     )
+
+
+@question
+def _surfaces(point: OperatingPoint) -> tuple[float, ...]:
+    return tuple(float(area) for area in point.evaluate(areas(point.model)))
 
 
 @question

@@ -17,6 +17,9 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> No
     Each is solved for with the others as they are, until none moves: friction that rises with velocity and dashpots
     make that converge.
     """
+    if layout.massless == 1:
+        R[Row.Z] = solve_balance(R, layout, routines, 0, y)
+        return
     for _ in range(ROUNDS):
         moved = False
         for k in range(layout.massless):
@@ -27,15 +30,8 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> No
             if not math.isfinite(w):
                 return
             moved = moved or abs(w - near) > 1e-14 * (1.0 + abs(w))
-        if not moved or layout.massless == 1:
+        if not moved:
             return
-
-
-def residual(R: Array, layout: Layout, routines: Routines, k: int, w: float, y: Array) -> float:
-    """Of balance k at a velocity variable; its slope is in y[2 k + 1]."""
-    R[guess_at(layout, k)] = w
-    call(routines.balance, R, 0.0, y)
-    return float(y[2 * k])
 
 
 def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array) -> float:
@@ -44,8 +40,10 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
     Forces may balance at several w. A block without mass takes the first on the side to which forces drive it, so
     the search begins with steps much smaller than the natural size of w.
     """
-    w = float(R[guess_at(layout, k)])
-    value = residual(R, layout, routines, k, w, y)
+    place, own = guess_at(layout, k), 2 * k
+    w = float(R[place])
+    call(routines.balance, R, 0.0, y)
+    value = y[own]
     if value == 0.0:
         return w
     if not math.isfinite(value):
@@ -55,7 +53,9 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
     found = False
     for _ in range(200):
         trial = w + step
-        other = residual(R, layout, routines, k, trial, y)
+        R[place] = trial
+        call(routines.balance, R, 0.0, y)
+        other = y[own]
         if math.isfinite(other):
             if (other > 0.0) != (value > 0.0) or other == 0.0:
                 low, high = min(w, trial), max(w, trial)
@@ -71,8 +71,9 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
         return math.nan
     w = 0.5 * (low + high)
     for _ in range(200):
-        value = residual(R, layout, routines, k, w, y)
-        slope = y[2 * k + 1]
+        R[place] = w
+        call(routines.balance, R, 0.0, y)
+        value, slope = y[own], y[own + 1]
         if value == 0.0:
             break
         if value > 0.0:

@@ -33,7 +33,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
-from steadyslip.kernels.driver import lanes, states, table
+from steadyslip.kernels.driver import lanes, places, states, table
 from steadyslip.kernels.driver_text import numbered, text_of, texts
 from steadyslip.kernels.layout import Layout, Routines
 from steadyslip.kernels.nodes import Program
@@ -66,6 +66,7 @@ _FAST: dict[str, Any] = {"fastmath": {"contract", "nsz"}, "error_model": "numpy"
 OPTIONS = {
     "inner": _FAST | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True},
     "entry": _FAST | {"nogil": True},
+    "place": _FAST | {"inline": "always"},  # a line each, which would take as long to compile as any
 }
 """How numba compiles drivers."""
 KERNEL = FileKind("kernel", 3, 2**26, "it is compiled again")
@@ -308,7 +309,8 @@ def _compiled_entry(name: str, source: ModuleType, signature: str, key: str) -> 
         exec(compile(numbered(text), f"<{part}>", "exec"), module.__dict__)
     for own, function in list(vars(module).items()):
         if isinstance(function, FunctionType) and function.__module__ == module.__name__:
-            module.__dict__[own] = numba.njit(**OPTIONS["entry" if own in ENTRIES else "inner"])(function)
+            kind = "entry" if own in ENTRIES else "place" if hasattr(places, own) else "inner"
+            module.__dict__[own] = numba.njit(**OPTIONS[kind])(function)
     module.__dict__["call"] = jump
     arguments, result = normalize_signature(signature)  # type: ignore[no-untyped-call]
     numbers = numba.int64[::1]

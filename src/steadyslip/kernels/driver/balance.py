@@ -17,11 +17,8 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> No
     Each is solved for with the others as they are, until none moves: friction that rises with velocity and dashpots
     make that converge.
     """
-    if layout.massless == 1:
-        R[Row.Z] = solve_balance(R, layout, routines, 0, y)
-        return
     for _ in range(ROUNDS):
-        moved = False
+        moved = 0.0
         for k in range(layout.massless):
             place = guess_at(layout, k)
             near = R[place]
@@ -29,8 +26,8 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> No
             R[place] = w
             if not math.isfinite(w):
                 return
-            moved = moved or abs(w - near) > 1e-14 * (1.0 + abs(w))
-        if not moved:
+            moved = max(moved, abs(w - near) / (1.0 + abs(w)))
+        if moved <= 1e-14 or layout.massless == 1:
             return
 
 

@@ -50,7 +50,7 @@ SHAKEN = ss.Protocol(
 )
 
 
-def columns(source: ss.Slider, protocol: ss.Protocol, count: int = 2000, uniform: bool = True) -> dict[str, np.ndarray]:
+def columns(source: ss.Slider, protocol: ss.Protocol, count: int = 1000, uniform: bool = True) -> dict[str, np.ndarray]:
     """Time, friction, normal stress and displacement of the load point, without noise."""
     times = np.linspace(0.0, protocol.until, count)
     if not uniform:

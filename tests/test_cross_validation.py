@@ -11,7 +11,7 @@ import steadyslip as ss
 
 @pytest.fixture(scope="module")
 def record():
-    return lab.record(lab.rig(), lab.STEP, 4, count=400)
+    return lab.record(lab.rig(), lab.STEP, 4, count=250)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.effort import MODELS, Budget, work_of_search
+from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.kernels.layout import Setting
 
@@ -63,6 +64,13 @@ def test_a_search_ends_when_its_work_is_done(record, monkeypatch):
     assert budget.spent < allowed + 8 * once
     longer = ss.fit(ss.lab_rig(states=2), record, effort=5 * effort)
     assert longer.ssq <= fit.ssq * (1 + 1e-9)
+
+
+def test_a_model_that_follows_from_no_start_is_refused(record, monkeypatch):
+    monkeypatch.setattr(Forward, "run", lambda self, table, parameters, units, begin=None: np.full(
+        (len(parameters), 1 + self.directions, table.count), np.nan))  # fmt: skip
+    with pytest.raises(ss.NotAvailable, match="from any start"):
+        ss.fit(ss.lab_rig(), record)
 
 
 def test_typical_fits_are_far_from_the_end_of_their_work(monkeypatch):

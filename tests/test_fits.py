@@ -371,7 +371,7 @@ def test_a_prediction_keeps_the_memory_of_normal_stress_that_the_fit_has_not():
 
 def test_promised_precision_is_what_a_fit_has():
     rig = lab.rig()
-    promise = ss.precision(rig, lab.STEP, noise=lab.NOISE, samples=2000)
+    promise = ss.precision(rig, lab.STEP, noise=lab.NOISE, samples=1000)
     for name, error in promise.errors.items():
         assert error == pytest.approx(lab.stepped().errors[name], rel=0.1)
 

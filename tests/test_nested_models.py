@@ -46,7 +46,7 @@ def test_orders_of_a_trend():
 
 
 def test_fits_of_other_laws_are_tried_as_starts():
-    record = made(lab.STEP, 2, lab.two_states())
+    record = lab.record(lab.two_states(), lab.STEP, 2, count=200)
     compared = ss.compare_laws(ss.lab_rig(), record, ("slip", "slip, two states"), starts=2)
     assert compared.fits["slip, two states"].ssq <= compared.fits["slip"].ssq * ALLOWED
 

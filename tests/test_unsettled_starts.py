@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ STEPS = ss.Protocol(
 CUT = 22.0  # s: 2 s, half a slip distance, after a step, where friction and state are far from steady
 
 
-def cut(seed, evolution=None, noise=lab.NOISE, rig=None, count=800):
+def cut(seed, evolution=None, noise=lab.NOISE, rig=None, count=600):
     """A record that begins soon after a step of the rate, and the state it begins with."""
     found = lab.columns(rig or lab.rig(evolution), STEPS, count)
     friction = found["friction"] + noise * np.random.default_rng(seed).standard_normal(count)
@@ -108,6 +110,21 @@ def test_a_memory_of_the_normal_stress_has_settled():
     plan = make_plan(ss.lab_rig(normal_memory="prakash-clifton"), cut(3), initial="free")
     begins = [one.name for one in plan.space().unknowns if one.name.startswith("initial.")]
     assert begins == ["initial.friction", "initial.Theta"]  # not sigma_e
+
+
+def test_the_drive_may_be_the_spring():
+    """A servo that pushes in proportion to what the load point lacks, behind no spring of its own."""
+    base = lab.rig()
+    plain = make_plan(base, cut(3), ["friction.a", "slider.stiffness"], initial="free")
+    servo = replace(base, stiffness=0.0, drive=ss.PID(velocity=lab.SLOW, kp=lab.STIFFNESS))
+    other = make_plan(servo, cut(3), ["friction.a", "drive.kp"], initial="free")
+    names = [one.name for one in plain.space().unknowns]
+    values = [{"friction.a": 0.01, "slider.stiffness": 1e10, "initial.friction": 0.004}.get(n, 0.3) for n in names]
+    z = plain.space().coordinates(np.array(values))
+    own = other.space().coordinates(
+        np.array([dict(zip(names, values, strict=True)).get(one.name, 1e10) for one in other.space().unknowns])
+    )
+    np.testing.assert_allclose(other.comparison().model(own[None])[0], plain.comparison().model(z[None])[0], rtol=1e-6)
 
 
 def test_every_record_begins_on_its_own_and_a_file_keeps_that(tmp_path):

@@ -32,11 +32,14 @@ class ExperimentProgram:
         Without sensitivities.
     directions : int
     method : str
+    settled : bool
+        Whether motions begin with steady sliding.
     """
 
     reduction: Reduction
     directions: int
     method: str
+    settled: bool = True
     plain: bool = False
 
     @cached_property
@@ -59,6 +62,8 @@ class ExperimentProgram:
     @cached_property
     def unsettled(self) -> dict[str, sp.Symbol]:
         """How far a motion begins from steady sliding, by name: friction (the spring's pull), then the memory."""
+        if self.settled:
+            return {}
         model = self.reduction.model
         own = [item for item in model.memory if item.unit == "1"]  # a memory of the stress has settled
         return {"friction": sp.Symbol("initial_friction", real=True)} | {
@@ -69,11 +74,10 @@ class ExperimentProgram:
     def _start(self) -> list[sp.Expr]:
         model = self.reduction.model
         steady = model.steady | {W: self.reduction.w_of_v.xreplace(model.steady)}
-        away = {
-            model.contact.slip: -self.unsettled["friction"]
-            * model.contact.sigma_ss
-            / model.parameters["slider.stiffness"]
-        }
+        if not self.unsettled:
+            return [steady[symbol] for symbol in self.reduction.continuous]
+        pull = derivative(model.definitions[model.contact.spring], model.contact.slip)
+        away = {model.contact.slip: self.unsettled["friction"] * model.contact.sigma_ss / pull}
         away |= {item.symbol: self.unsettled[item.name] for item in model.memory if item.name in self.unsettled}
         return [steady[symbol] + away.get(symbol, 0) for symbol in self.reduction.continuous]
 
@@ -128,6 +132,6 @@ def _stacked(columns: list[Any], jobs: int) -> np.ndarray:
 
 
 @question
-def experiment_program(model: Model, directions: int, method: str) -> ExperimentProgram:
+def experiment_program(model: Model, directions: int, method: str, settled: bool = True) -> ExperimentProgram:
     """The kernel for a model; made once per process."""
-    return ExperimentProgram(reduce_model(model, None), directions, method, plain=interpreting())
+    return ExperimentProgram(reduce_model(model, None), directions, method, settled, plain=interpreting())

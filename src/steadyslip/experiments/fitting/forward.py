@@ -107,7 +107,7 @@ class Forward:
         reduction = experiment_program(self.model, 0, "tsit5").reduction
         self.directions = len(names) + shifts + len(unsettled) if sensitive else 0
         self.size = next((n for n in (0, *SIZES) if n >= self.directions), SIZES[-1])
-        self.program = experiment_program(self.model, self.size, automatic_method(reduction))
+        self.program = experiment_program(self.model, self.size, automatic_method(reduction), not unsettled)
 
     def values(self, parameters: Array) -> OperatingPoint:
         """The model's parameters for rows of the free ones, (jobs, names)."""

@@ -141,7 +141,7 @@ class Plan:
     def _natural_sizes(self) -> dict[str, float]:
         """Of how far from steady sliding a motion may begin: 0.01 of friction, an e-fold of each state."""
         point = operating_point(self.rig, {})
-        program = experiment_program(point.model, 0, "tsit5")
+        program = experiment_program(point.model, 0, "tsit5", settled=False)
         scales, _ = natural_scales(point, program.reduction)
         return {name: float(np.max(scales.get(name, FRICTION))) for name in program.unsettled}
 

@@ -104,7 +104,7 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
         if last or upto >= starts or not _leaves_structure(search.whole, found.coordinates[0]):
             break
     else:
-        found = search.polished()
+        found = search.polished() if search.any_followed else Minima.none(len(search.whole.space))
     if not search.any_followed:
         raise NotAvailable(
             "the model cannot follow these records from any start; are law and drive those of the experiment?"

@@ -97,3 +97,43 @@ def test_what_is_zero_is_searched_around_a_size_of_its_own():
         one, two = ss.boundary(slider, mine), ss.boundary(machine, other)
         assert [e.value for e in two] == pytest.approx([e.value for e in one], rel=1e-8)
     assert np.isfinite(ss.boundary(machine, "links.spring.damping")[0].value)
+
+
+def test_constructors_take_text_in_the_units_of_their_user():
+    """Forces of a contact without area; with one, forces and stresses alike; sliders with an area too."""
+    rock = ss.RateState(a=0.01, b=0.015, d_c="5 um", mu_ref=0.6, v_ref="1 um/s")
+
+    def surface(preload, **area):
+        return ss.Surface(body="block", friction=rock, contact=ss.Constant(preload=preload), **area)
+
+    assert surface("3 kN") == surface(3e3)
+    assert surface("3 kN", area="50 cm^2") == surface("600 kPa", area="50 cm^2") == surface(6e5, area=50e-4)
+    assert type(surface("3 kN").contact.preload) is float
+    soft = ss.Surface(
+        body="pad", friction=rock, contact=ss.Compliant(normal_stiffness="8 N/um", normal_damping="2 N s/m")
+    )
+    assert (soft.contact.normal_stiffness, soft.contact.normal_damping) == (8e6, 2.0)
+
+    def slider(**further):
+        return ss.Slider(
+            friction=rock, contact=ss.Constant(preload="600 N"), mass="8 kg", damping="5 N s/m",
+            drive=ss.PD("20 um/s", kp="0.6 N/um"), **further,
+        )  # fmt: skip
+
+    rig = slider(area="40 cm^2")
+    assert (rig.contact.preload, rig.mass, rig.damping, rig.drive.kp) == pytest.approx((1.5e5, 2e3, 1250.0, 1.5e8))
+    assert {type(one.value) for one in rig.parameters().values() if one.value is not None} == {float}
+    assert replace(rig, stiffness="1 N/um").stiffness == pytest.approx(2.5e8)
+    with pytest.raises(ss.ParameterError) as caught:
+        slider()
+    assert {p.name for p in caught.value.problems} == {"contact.preload", "slider.mass", "slider.damping", "drive.kp"}
+    assert "give the contact's area" in str(caught.value)
+    for wrong in ("-3 kN", "3 m", "3 kN kN"):
+        with pytest.raises(ss.ParameterError, match="preload"):
+            surface(wrong)
+
+
+def test_a_law_that_waits_for_its_area_says_its_numbers():
+    waiting = ss.Constant(preload="3 kN")
+    assert repr(waiting) == "Constant(preload=3000.0)"
+    assert replace(waiting, preload="4 kN").preload == 4e3

@@ -21,7 +21,8 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came, one
 from steadyslip.core.pages import Displayed
-from steadyslip.core.roles import Domain, Option, Parameter, Role, Series, Value, fault
+from steadyslip.core.quantities import total_unit
+from steadyslip.core.roles import Domain, Option, Parameter, Role, Series, Total, Value, fault
 
 
 @dataclass(frozen=True)
@@ -239,6 +240,8 @@ class FrozenRecord(Displayed):
     registry: ClassVar[dict[str, type[FrozenRecord]]] = {}
     chosen_by: ClassVar[tuple[str, str | None]] = ("law", None)
     """Of a family: the key of its tables that names the law, and the law meant where it is absent."""
+    has_area: ClassVar[bool] = False
+    """Whether it is all of a contact, with an `area` or none."""
     in_totals: ClassVar[bool] = False
     """Whether its table is about a contact of its own `area`: per-area quantities in it are totals for people."""
 
@@ -269,10 +272,27 @@ class FrozenRecord(Displayed):
                 object.__setattr__(self, item.name, checked(item, value))
             except ParameterError as error:
                 problems += [p.under(item.name) for p in error.problems]
+        problems = problems or list(self._settled())
         problems = problems or list(self.inconsistencies())
         problems = problems or [p for condition in self.conditions() if (p := condition.problem()) is not None]
         if problems:
             raise ParameterError(problems, title=type(self).__name__)
+
+    def _settled(self) -> Iterator[Problem]:
+        """Where a contact ends: what was given for the whole of it becomes what it is per unit area."""
+        if not self.has_area:
+            return
+        totals = {name: found for name, found in parameters(self).items() if isinstance(found.value, Total)}
+        area = getattr(self, "area", None) or (1.0 if self.in_totals else None)
+        for name, address in totals.items():
+            if area is None:
+                unit, got = address.role.unit, f"got {address.value:g} {total_unit(address.role.unit)}"
+                hint = f"give the contact's area, such as area = '0.01 m^2', or a quantity in {unit}"
+                yield Problem(name, f"{got}, a total, and this is per unit area; {hint}")
+        if totals and area is not None:
+            other = replaced(self, {name: float(address.value or 0.0) / area for name, address in totals.items()})
+            for item in fields(self):  # type: ignore[arg-type]
+                object.__setattr__(self, item.name, getattr(other, item.name))
 
     def inconsistencies(self) -> Iterator[Problem]:
         """Problems with which fields are given together; called once each field is valid by itself."""
@@ -333,7 +353,10 @@ def is_required(item: Field[Any]) -> bool:
 
 def checked(item: Field[Any], value: Any) -> Any:
     """The value of a field, converted and checked; ParameterError names no field, only the fault."""
-    return None if value is None and item.default is None else role_of(item).checked(value)
+    if value is None and item.default is None:
+        return None
+    role = role_of(item)
+    return role.given(value) if isinstance(role, Parameter) else role.checked(value)
 
 
 def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str, FrozenRecord]]:

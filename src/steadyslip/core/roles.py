@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Integral, Real
 from textwrap import wrap
@@ -118,6 +119,10 @@ KINDS = {
 """What a parameter can be to the stages that look for meaning, not for names."""
 
 
+class Total(float):
+    """A number given for a whole contact, in N, N/m, ..., in place of one per unit area; it waits for the area."""
+
+
 @dataclass(frozen=True)
 class Parameter(Value):
     """What a numeric field of a record means.
@@ -184,6 +189,18 @@ class Parameter(Value):
         if not self.domain.contains(number):
             raise self.refused(value)
         return number
+
+    def given(self, value: Any) -> float:
+        """What a constructor takes: as `checked`, or text for the whole of a contact, which is a `Total`."""
+        if isinstance(value, Total):
+            return value
+        try:
+            return self.checked(value)
+        except ParameterError:
+            if isinstance(value, str) and is_per_area(self.unit):
+                with suppress(ParameterError):
+                    return Total(Parameter(total_unit(self.unit), self.domain, self.doc).checked(value))
+            raise
 
     def allowed(self) -> str:
         unit = "" if self.unit == "1" else f" in {self.unit}, or text such as {example(self.unit)}"

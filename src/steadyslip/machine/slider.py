@@ -28,6 +28,7 @@ class Slider(Rig, section="slider"):
     ``drive.velocity``); a bare last part is enough where it is unique.
     """
 
+    has_area: ClassVar[bool] = True
     assumed: ClassVar[Mapping[str, str]] = {"slider.stiffness": "k"}
     instead: ClassVar[Mapping[str, str]] = {"slider.axial_stiffness": "slider.stiffness"}
     aside: ClassVar[tuple[str, ...]] = ("slider.area",)

@@ -17,6 +17,7 @@ class Surface(FrozenRecord):
     The laws are in stresses over `area`; without one they are in forces. Slip is counted in the direction of motion.
     """
 
+    has_area: ClassVar[bool] = True
     in_totals: ClassVar[bool] = True
 
     body: str = setting(Text("the body that slides"))

@@ -15,7 +15,7 @@ from explored import Explored, compared, library
 from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
-from steadyslip.explorer.assembly import parts
+from steadyslip.explorer.assembly import _dense, _narrow, parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part, program
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
 from steadyslip.kernels.layout import Setting
@@ -63,7 +63,7 @@ def polynomial_programs(n):
     names = sp.symbols(f"c:{2 * n + 2}")
     model = SimpleNamespace(arguments=names)
     whole = program(model, "coefficients", names[: n + 1], then=_judged)
-    several = _stable_set(list(names), model)
+    several = _stable_set(n)
     text = "".join(javascript.text(one) for one in (whole, *several))
     facts = {"parameters": list(map(str, names)), "degree": n, "squares": len(several[0].stores) - 2, "closed": False,
              "observed": []}  # fmt: skip
@@ -86,7 +86,7 @@ def test_polynomials_are_judged_as_in_python(n):
         truth = truth[np.isfinite(truth)]
         truth = truth[np.lexsort((-truth.imag, -truth.real))]
         assert np.all(np.abs(mine - truth) <= BAR * np.abs(truth))
-        found, expected = script("own.set(all).stableSet(p, q)", all=[*p, *q], p=p, q=q), stable_set(p, q)
+        found, expected = script("own.stableSet(p, q)", p=p, q=q), stable_set(p, q)
         intervals = np.array([[one["low"], one["high"]] for one in found["intervals"]]).reshape(-1, 2)
         kept = expected.intervals[np.isfinite(expected.intervals[:, 0])]
         assert np.allclose(intervals, kept, rtol=1e-10, atol=0)
@@ -152,6 +152,19 @@ def test_conditions_between_numbers_are_checked():
 def test_what_cannot_be_printed_is_refused_in_words():
     with pytest.raises(ss.NotAvailable, match=r"atan\(\.\.\.\)"):
         linear_part(rig(contact=Turning(preload=SIGMA)))
+
+
+def test_shortened_code_says_the_same():
+    """Comments, types and spaces go; what is within a line of code, and text in quotes, stays."""
+    text = (
+        "const a = 1; // one\n"
+        '  /** @type {any} */ const b = "// @ /** x */";\n'
+        "/**\n * Many\n * lines.\n */\n"
+        "let c = (/** @type {any} */ (b)).d;\n"
+    )
+    assert _narrow(text) == 'const a = 1;\nconst b = "// @ /** x */";\nlet c = ((b)).d;\n'
+    generated = "function f(R, x, y) {\n    var t1 = R[0] - (-2.5e-07);\n    y[0] = (t1 >= 0) ? t1 : (1 / x);\n}\n"
+    assert _dense(generated) == "function f(R,x,y){\nvar t1=R[0]-(-2.5e-07);\ny[0]=(t1>=0)?t1:(1/x);\n}\n"
 
 
 # -- links and files

@@ -103,11 +103,11 @@ def parts(rig: Slider, title: str, branch: int) -> tuple[str, dict[str, Any]]:
     modules = [_web(f"{name}.js") for name in MODULES]
     library = [_web(f"{name}.js") for name in LIBRARY]
     script = _narrow(javascript.as_script(javascript.runtime(), *modules))
-    worker = _narrow(javascript.as_script(javascript.runtime(), *library, driven))
+    worker = _narrow(javascript.as_script(javascript.runtime(), *library)) + _dense(driven)
     known = _data(rig, title, branch, facts) | {"motion": moving, "still": still, "sketch": sketch(rig)}
     code = (
-        f"{script}\nconst programs = {_narrow(text)};\n"
-        f"const library = () => {{\n{worker}\nconst machine = {_narrow(machine)};\n"
+        f"{script}\nconst programs = {_dense(text)};\n"
+        f"const library = () => {{\n{worker}\nconst machine = {_dense(machine)};\n"
         "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
     )
     return code, known
@@ -120,7 +120,13 @@ def _web(name: str) -> str:
 def _narrow(text: str) -> str:
     """Code without indentation and lines of comment, a fifth of its length; no string goes over several lines."""
     bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
-    return re.sub(r"^ +", "", bare, flags=re.M)
+    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # types within a line
+    return re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
+
+
+def _dense(text: str) -> str:
+    """Generated code, which has no strings, without the spaces beside signs."""
+    return re.sub(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *", r"\1", re.sub(r"^ +", "", text, flags=re.M))
 
 
 def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -96,7 +96,7 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
     else:
-        programs += _stable_set([*without, *slope], model)
+        programs += _stable_set(len(coefficients) - 1)
     facts = {
         "parameters": list(model.parameters),
         "affine": equation.affine,
@@ -136,26 +136,30 @@ def _judged(c: list[Node]) -> list[Value]:
     return [*c, *(select(truth, 1.0, 0.0) for truth in truths)]
 
 
-def _stable_set(both: list[sp.Expr], model: Model) -> list[Program]:
-    """Where p + k q may change: real edges and the polynomial in β²; k of a root of it; the verdict at any k."""
-    n, number = len(both) // 2, sp.Symbol("number")
+def _stable_set(degree: int) -> list[Program]:
+    """Where p + k q may change: real edges and the polynomial in β²; k of a root of it; the verdict at any k.
 
-    def edges(c: list[Node]) -> list[Value]:
-        p, q = c[:n], c[n:]
+    These read the coefficients of p and q from a record of their own.
+    """
+
+    def edges(p: list[Node], q: list[Node], _: Node) -> list[Value]:
         return [*crossing.real_edges(p, q, select), *crossing.axis_polynomial(p, q, select)]
 
-    def on_axis(c: list[Node]) -> list[Value]:
-        return [crossing.stiffness_on_axis(c[:n], c[n : 2 * n], c[-1])]
+    def on_axis(p: list[Node], q: list[Node], square: Node) -> list[Value]:
+        return [crossing.stiffness_on_axis(p, q, square)]
 
-    def verdict(c: list[Node]) -> list[Value]:
-        at = [one + c[-1] * other for one, other in zip(c[:n], c[n:], strict=False)]
-        return [select(crossing.is_hurwitz(at, select), 1.0, 0.0)]
+    def stable_at(p: list[Node], q: list[Node], k: Node) -> list[Value]:
+        both = [one + k * other for one, other in zip(p, q, strict=True)]
+        return [select(crossing.is_hurwitz(both, select), 1.0, 0.0)]
 
-    return [
-        program(model, "edges", both, then=edges),
-        program(model, "onAxis", [*both, number], number, then=on_axis),
-        program(model, "stableAt", [*both, number], number, then=verdict),
-    ]
+    found = []
+    for name, values in (("edges", edges), ("onAxis", on_axis), ("stableAt", stable_at)):
+        made = Program(name)
+        p, q = ([made.load(start + i) for i in range(degree + 1)] for start in (0, degree + 1))
+        for place, value in enumerate(values(p, q, made.number)):
+            made.store(place, value, "y")
+        found.append(made)
+    return found
 
 
 def _interval(ingredients: list[Node]) -> Sequence[Value]:

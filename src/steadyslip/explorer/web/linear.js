@@ -25,9 +25,9 @@ export class Linear {
     this.c = new Float64Array(facts.degree + 3); // whether all roots are on the left, and it is ill-posed, behind coefficients
   }
 
-  /** What a program gives. @param {string} name @param {number} many @param {number} [number] */
-  ask(name, many, number = 0) {
-    this.programs[name](this.R, number, this.y);
+  /** What a program gives. @param {string} name @param {number} many @param {number} [number] @param {Float64Array} [from] */
+  ask(name, many, number = 0, from = this.R) {
+    this.programs[name](from, number, this.y);
     return Array.from(this.y.subarray(0, many));
   }
 
@@ -119,8 +119,8 @@ export class Linear {
 
   /** The same by trial: between all k at which a root may cross the axis, the verdict is one. */
   stableSet(p, q) {
-    const [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2), cuts = [still, infinite];
-    for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, re)[0]);
+    const both = Float64Array.of(...p, ...q), [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2, 0, both), cuts = [still, infinite];
+    for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, re, both)[0]);
     const found = cuts.filter((k) => k > 0 && Number.isFinite(k)).sort((a, b) => a - b);
     const apart = [0, ...found.filter((k, i) => i === 0 || k > found[i - 1] * (1 + SAME)), Infinity];
     const ratios = p.map((v, i) => Math.abs(v / q[i])).filter((r) => r > 0 && Number.isFinite(r)), natural = ratios.length ? Math.max(...ratios) : 1;
@@ -128,7 +128,7 @@ export class Linear {
     let before = false;
     for (let i = 0; i + 1 < apart.length; i++) {
       const low = apart[i], high = apart[i + 1], inner = low > 0 ? Math.sqrt(low) * Math.sqrt(high) : high / 2, last = low > 0 ? 2 * low : natural;
-      const stable = this.ask("stableAt", 1, high === Infinity ? last : inner)[0] === 1;
+      const stable = this.ask("stableAt", 1, high === Infinity ? last : inner, both)[0] === 1;
       if (i > 0 && stable !== before) ends.push(low);
       if (stable && before) intervals[intervals.length - 1].high = high;
       else if (stable) intervals.push({ low, high });

@@ -16,10 +16,11 @@ import numpy as np
 
 import steadyslip as ss
 from delays import some, spectral, winding
-from machines import at_random, three_bodies
+from machines import at_random, same_block, three_bodies
 from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.model import operating_point
+from test_machine_motion import slopes_of_motion
 
 SINGULAR = 1e-8  # smallest over largest singular value of the matrix at an eigenvalue
 
@@ -53,6 +54,57 @@ def campaign(count, first):
             if not good:
                 print(f"seed {seed}: {s}")
     print(f"{count} random machines: {right} eigenvalues right, {wrong} wrong")
+
+
+def motions(count, first):
+    """Machines of one body against sliders, sample by sample."""
+    worst, wrong = 0.0, 0
+    times_of = np.linspace(0.0, 20.0, 101)
+    for seed in range(first, first + count):
+        block, machine = same_block(seed)
+        pieces = [
+            ss.VelocityStep(at=0.5, to=1.3),
+            ss.DisturbanceStep(at=1.0, by=0.02),
+            ss.NormalStressStep(at=2.0, by=0.05),
+        ]
+        try:
+            own = ss.simulate(block, pieces, times=times_of, until=20.0)
+        except ss.SteadyslipError as error:
+            try:
+                ss.simulate(machine, pieces, times=times_of, until=20.0)
+                wrong += 1
+                print(f"seed {seed}: only the slider is refused, {error}")
+            except ss.SteadyslipError:
+                pass
+            continue
+        other = ss.simulate(machine, pieces, times=times_of, until=20.0)
+        names = {"v": "block.v", "slip": "base.slip", "shear_stress": "base.friction_force"}
+        apart = max(np.max(np.abs(other[b] - own[a]) / np.max(np.abs(own[a])), initial=0.0) for a, b in names.items())
+        worst = max(worst, apart)
+        same = own.status == other.status and [e.kind for e in own.events] == [e.kind for e in other.events]
+        if not same or not apart < 1e-7:
+            wrong += 1
+            print(f"seed {seed}: {own.status}, {other.status}, {apart:.2g}")
+    print(f"{count} sliders and machines of one body: {wrong} move differently, by {worst:.2g} at most")
+
+
+def small_motions(count, first):
+    """Slopes of the rates of motion against eigenvalues of the linear verdict."""
+    wrong = refused = 0
+    for seed in range(first, first + count):
+        machine = at_random(seed)[0]
+        try:
+            found = np.linalg.eigvals(slopes_of_motion(machine)[0])
+        except ss.NotAvailable as error:
+            refused += 1
+            print(f"seed {seed}: {error}")
+            continue
+        wanted = ss.eigenvalues(machine)
+        size = np.max(np.abs(wanted))
+        if len(found) != len(wanted) or any(np.min(np.abs(found - s)) > 1e-7 * size for s in wanted):
+            wrong += 1
+            print(f"seed {seed}: {found}, {wanted}")
+    print(f"{count} random machines: slopes of motion of {wrong} have other eigenvalues, {refused} refused")
 
 
 def delays(count, first):
@@ -90,3 +142,5 @@ if __name__ == "__main__":
     times()
     campaign(chosen.count, chosen.first)
     delays(chosen.count, chosen.first)
+    small_motions(chosen.count, chosen.first)
+    motions(chosen.count, chosen.first)

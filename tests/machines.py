@@ -165,3 +165,27 @@ def at_random(seed, delay=0.0):
         return whole
 
     return machine, matrix
+
+
+def same_block(seed):
+    """A slider, and the machine of one body that it is."""
+    random = np.random.default_rng(seed)
+
+    def size(low=-1.0, high=1.0):
+        return float(10 ** random.uniform(low, high))
+
+    mu, load = 0.3 + 0.3 * random.random(), size(0, 1)
+    own = rate_state(size(-1.5, -0.5), -size(-2, -1), size(), mu, load, regularised=seed % 4 == 1)
+    tilt = float(random.uniform(-0.4, 0.4)) if seed % 3 else 0.0
+    contact = ss.InclinedSpring(steady_normal_stress=load, angle=tilt) if tilt else ss.Constant(preload=load)
+    mass, damping, k = (0.0 if seed % 5 == 2 else size()), size(-2, 0), size(0, 2)
+    block = ss.Slider(
+        friction=own, contact=contact, stiffness=k, damping=damping, mass=mass, drive=ss.Steady(1.0)
+    )  # fmt: skip
+    machine = ss.Machine(
+        bodies={"block": ss.SlidingBody(mass=mass)},
+        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
+        contacts={"base": ss.Surface(body="block", friction=own, contact=contact)},
+        drive=ss.Pull(velocity=1.0),
+    )
+    return block, machine

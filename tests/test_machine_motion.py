@@ -1,14 +1,23 @@
 """Motion of machines: against equations typed by hand, energy, eigenvalues, one-body machines, names, idle bodies."""
 
 import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import solve_ivp
 
 import steadyslip as ss
-from machines import brake, coulomb, rate_state, surface, two_blocks, two_mass
+from machines import at_random, brake, coulomb, rate_state, same_block, surface, two_blocks, two_mass
+from steadyslip.model.point import operating_point
+from steadyslip.model.reduction import SLOPES, TIME, P, Q, reduce_model
+from steadyslip.model.scales import eliminable
 
+ROOT = Path(__file__).parents[1]
 FINE = {"rtol": 1e-10}
 
 
@@ -248,30 +257,6 @@ def test_an_idle_body_changes_nothing_and_a_stiff_link_little():
     assert apart[0] / apart[1] == pytest.approx(10, rel=0.1)
 
 
-def same_block(seed):
-    """A slider, and the machine of one body that it is."""
-    random = np.random.default_rng(seed)
-
-    def size(low=-1.0, high=1.0):
-        return float(10 ** random.uniform(low, high))
-
-    mu, load = 0.3 + 0.3 * random.random(), size(0, 1)
-    own = rate_state(size(-1.5, -0.5), -size(-2, -1), size(), mu, load, regularised=seed % 4 == 1)
-    tilt = float(random.uniform(-0.4, 0.4)) if seed % 3 else 0.0
-    contact = ss.InclinedSpring(steady_normal_stress=load, angle=tilt) if tilt else ss.Constant(preload=load)
-    mass, damping, k = (0.0 if seed % 5 == 2 else size()), size(-2, 0), size(0, 2)
-    block = ss.Slider(
-        friction=own, contact=contact, stiffness=k, damping=damping, mass=mass, drive=ss.Steady(1.0)
-    )  # fmt: skip
-    machine = ss.Machine(
-        bodies={"block": ss.SlidingBody(mass=mass)},
-        links={"spring": ss.Spring(between=("drive", "block"), stiffness=k, damping=damping)},
-        contacts={"base": ss.Surface(body="block", friction=own, contact=contact)},
-        drive=ss.Pull(velocity=1.0),
-    )
-    return block, machine
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_a_machine_of_one_body_moves_as_a_slider(seed):
     block, machine = same_block(seed)
@@ -406,3 +391,121 @@ def test_starting_values_of_machines():
         ss.simulate(two_tables(), until=1.0, initial={"front.v": -1.0})
     with pytest.raises(ss.ParameterError, match="a slider is one block"):
         ss.simulate(same_block(0)[0], ss.DisturbanceStep(at=1, by=1.0, on="front"), until=5.0)
+
+
+# -- the equations of motion behind it
+
+
+def slopes_of_motion(machine):
+    """Jacobian of the rates of motion in steady sliding, and the rates there."""
+    point = operating_point(machine)
+    model, reduction = point.model, reduce_model(point.model, eliminable(point))
+    at = dict(model.steady) | dict.fromkeys((P, Q, TIME, *SLOPES[:3]), sp.Integer(0))
+    for one in reduction.slidings:
+        if one.variable is not None:
+            at[one.variable.w] = one.variable.w_of_v.xreplace(model.steady)
+    wanted = [*(e for row in reduction.jacobian() for e in row), *reduction.rates]
+    numbers = point.evaluate(model.function(sp.sympify(e).xreplace(at) for e in wanted))
+    n = len(reduction.state)
+    values = np.array([float(value) for value in numbers])
+    return values[: n * n].reshape(n, n), values[n * n :], reduction
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_small_motion_has_the_eigenvalues_of_the_linear_verdict(seed):
+    """Machines of one to four bodies, some without mass: two routes from the Model to the same numbers."""
+    machine = at_random(seed)[0]
+    jacobian, rates, _ = slopes_of_motion(machine)
+    found, wanted = np.linalg.eigvals(jacobian), ss.eigenvalues(machine)
+    assert len(found) == len(wanted)
+    assert np.max(np.abs(rates)) < 1e-12
+    for s in wanted:
+        assert np.min(np.abs(found - s)) < 1e-7 * np.max(np.abs(wanted))
+
+
+def test_bodies_without_mass_take_every_form():
+    forms = {slopes_of_motion(at_random(seed)[0])[2].form for seed in range(40)}
+    assert forms >= {"explicit", "eliminated"}
+
+
+def test_light_bodies_move_as_those_of_little_mass():
+    """Two blocks without mass, joined by a dashpot: their balances are solved together after a jump."""
+    own = [rate_state(0.3, 0.1, 1.0), rate_state(0.2, -0.05, 2.0)]
+    apart = []
+
+    def blocks(mass):
+        return ss.Machine(
+            bodies={name: ss.SlidingBody(mass=mass) for name in ("one", "two")},
+            links={
+                "pull": ss.Spring(between=("drive", "one"), stiffness=0.5),
+                "hold": ss.Spring(between=("drive", "two"), stiffness=0.4),
+                "joint": ss.Spring(between=("one", "two"), stiffness=0.3, damping=0.4),
+            },
+            contacts={"first": surface("one", own[0]), "second": surface("two", own[1])},
+            drive=ss.Pull(velocity=1.0),
+        )
+
+    pulse = [ss.DisturbancePulse(at=1.0, by=0.2, duration=3.0, on="two")]
+    assert slopes_of_motion(blocks(0.0))[2].form == "eliminated"
+    light = ss.simulate(blocks(0.0), pulse, times=TIMES, until=20.0, **FINE)
+    assert light.status == "done"
+    after = np.searchsorted(TIMES, 1.0)
+    assert light["second.slip_rate"][after] > 1.2  # at once
+    for mass in (1e-3, 1e-4):
+        heavy = ss.simulate(blocks(mass), pulse, times=TIMES, until=20.0, **FINE)
+        settled = (TIMES > 1.5) & (np.abs(TIMES - 4.0) > 0.5)
+        apart.append(np.max(np.abs(heavy["two.v"] - light["two.v"])[settled]))
+    assert apart[1] < 1e-3
+    assert apart[0] / apart[1] == pytest.approx(10, rel=0.3)
+
+
+def test_pore_fluid_follows_in_motion():
+    own = rate_state(0.3, -0.05, 1.0)
+    wet = ss.PoreFluid(preload=1.0, suction=0.05, drainage=1.3, slip_distance=0.7, v_ref=1.0)
+    machine = ss.Machine(
+        bodies={"block": ss.SlidingBody(mass=1.0)},
+        links={"spring": ss.Spring(between=("drive", "block"), stiffness=0.5)},
+        contacts={"gouge": ss.Surface(body="block", friction=own, contact=wet)},
+        drive=ss.Pull(velocity=1.0),
+    )
+    run = ss.simulate(machine, ss.VelocityStep(at=0, to=1.5), times=TIMES, until=20.0, **FINE)
+
+    def right(t, y):
+        x, v, theta, dilation, pressure = y
+        opening = -v / 0.7 * (dilation - 0.05 * np.log(v))
+        pull = own.mu_ref - 0.5 * (x - 0.5 * t)
+        return [v - 1, pull - (1 - pressure) * friction(own, 1.0, v, theta), aging(own, v, theta), opening,
+                -1.3 * pressure - opening]  # fmt: skip
+
+    found = radau(right, [0, 1, 0, 0, 0], TIMES)
+    agree(run, "block.v", found[1])
+    agree(run, "gouge.dilation", found[3])
+    agree(run, "gouge.pore_pressure", found[4])
+    still = dataclasses.replace(machine, bodies={"block": ss.SlidingBody(mass=0.0)})
+    assert slopes_of_motion(still)[2].form == "eliminated"
+    jacobian = slopes_of_motion(still)[0]
+    assert np.sort_complex(np.linalg.eigvals(jacobian)) == pytest.approx(np.sort_complex(ss.eigenvalues(still)))
+
+
+def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "steadyslip", "simulate", "examples/machines/feed-axis.toml", "--until", "10 s",
+         "--protocol", "velocity-step at=1s to='0.06 rpm'",
+         "--protocol", "disturbance-pulse at=5s by='100 N' duration=1s on=table", "--json",
+         "-o", str(tmp_path / "run.csv")],
+        capture_output=True, text=True, cwd=ROOT, check=True,
+    )  # fmt: skip
+    found = json.loads(done.stdout)
+    assert found["status"] == "done"
+    assert found["units"]["motor.v"] == "rad/s"
+    assert found["units"]["guide.normal_force"] == "N"
+    assert found["final"]["load_velocity"] == pytest.approx(0.06 * 2 * np.pi / 60)
+    assert found["final"]["guide.normal_force"] == pytest.approx(3000.0)
+    assert "motor.v (rad/s)" in (tmp_path / "run.csv").read_text().splitlines()[0]
+    wrong = subprocess.run(
+        [sys.executable, "-m", "steadyslip", "simulate", "examples/machines/feed-axis.toml", "--until", "10 s",
+         "--protocol", "velocity-step at=1s to='1 mm/s'"],
+        capture_output=True, text=True, cwd=ROOT, check=False,
+    )  # fmt: skip
+    assert wrong.returncode == 2
+    assert "rad/s" in wrong.stderr

@@ -8,8 +8,6 @@ from scipy.linalg import eigvals
 
 import steadyslip as ss
 from machines import rate_state
-from steadyslip.model import build_model
-from steadyslip.model.reduction import reduce_model
 
 A, B, F0 = 0.01, 0.015, 0.6
 
@@ -107,8 +105,6 @@ def test_wet_layers_in_a_machine_of_several_bodies():
 
 
 def test_what_is_not_offered_says_so():
-    with pytest.raises(ss.NotAvailable, match="pore fluid"):
-        reduce_model(build_model(layer()))
     with pytest.raises(ss.ParameterError, match="describe it as a machine"):
         ss.Slider(
             friction=rate_state(1, 0, 1), contact=layer().contacts["layer"].contact, stiffness=1.0,

@@ -201,15 +201,11 @@ class _Reducing:
     def __init__(self, model: Model, push: str, press: str) -> None:
         if model.delays:
             raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
-        if model.states:
-            raise NotAvailable(
-                "motion of contacts with states of their own, such as pore fluid, is not offered; their verdict is"
-            )
         self.model, self.moving = model, kinematics(model)
         self.given = _inputs(model, push, press)
-        self.memory = tuple(item.symbol for item in model.memory)
+        self.memory = tuple(item.symbol for item in (*model.memory, *model.states))
         self.integrals = tuple(item.symbol for item in model.integrals)
-        owner = {item.symbol: contact for contact in model.contacts for item in contact.memory}
+        owner = {s.symbol: contact for contact in model.contacts for s in (*contact.memory, *contact.own_states)}
         speeds = {contact.velocity for contact in model.contacts}
         self.definitions = {
             s: self._variables(e, self._of(s)) for s, e in model.definitions.items() if s not in speeds

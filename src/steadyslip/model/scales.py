@@ -287,6 +287,9 @@ def _together(
         x = np.where(x > 0, x, np.where((held > 0) & (held < np.inf), held, np.min(slips)))
         scales[f"{one.name}.x"] = x
         scales[f"{one.name}.v"] = np.where(own[k] != 0, np.abs(own[k]), x / time)
+    for i, (contact, stress) in enumerate(zip(model.contacts, point.sigmas, strict=True)):
+        direct = np.abs(weights(point, i).direct)  # a pressure matters where friction feels it
+        scales |= {item.name: np.where(direct > 0, direct, np.abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.w": found["w"]}
     for item, rate in zip(model.variables, model.rates, strict=True):

@@ -61,6 +61,12 @@ def _slip_rates(model: Model) -> Callable[..., list[Any]]:
 
 
 @question
+def _steady_states(model: Model) -> Callable[..., list[Any]]:
+    """The states of contact laws."""
+    return model.function(model.steady[item.symbol] for item in model.states)
+
+
+@question
 def _steady_speeds(model: Model) -> Callable[..., list[Any]]:
     return model.function(one.speed for one in model.coordinates)
 
@@ -75,6 +81,7 @@ def _balance(reduction: Reduction, index: int) -> tuple[Callable[..., list[Any]]
     ((w, balance),) = reduction.restarts
     at_rest = {V_LP: model.parameters["drive.velocity"], Q: sp.Integer(0), P: sp.Integer(0), TIME: sp.Integer(0)}
     at_rest |= {item.symbol: sp.Integer(0) for item in model.integrals}
+    at_rest |= {item.symbol: sp.sympify(model.steady[item.symbol]) for item in model.states}
     expression = balance.xreplace({w: reduction.w_of_v}).xreplace(at_rest)
     slope = derivative(expression, memory[index])
     function = model.function([expression, slope], model.contact.slip, model.contact.velocity, *memory)
@@ -137,6 +144,8 @@ def _initial_values(
     values = dict(zip((item.name for _, item in own), places, strict=True)) | dict(zip(names, memory, strict=True))
     values |= {f"{name}v": speed for (name, _), speed in zip(own, speeds, strict=True)}
     values |= {item.name: start.get(item.name, 0.0) for item in model.integrals}
+    for item, value in zip(model.states, point.evaluate(_steady_states(model)), strict=True):
+        values[item.name] = _number(start.get(item.name, value))
     order = _continuous_names(reduction)
     for i in range(len(slips)):
         if f"w {i}" in order:
@@ -153,7 +162,7 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
     moving = [item.name for item in model.variables if item.kind in ("slip", "velocity")]
     if model.is_single:  # without inertia the memory makes up for a velocity that is given
         moving = [moving[0], f"{moving[0].removesuffix('x')}v"]
-    known = [*moving, *(item.name for item in (*model.memory, *model.integrals))]
+    known = [*moving, *(item.name for item in (*model.memory, *model.states, *model.integrals))]
     problems, found = [], {}
     for name, value in given.items():
         if name not in known:

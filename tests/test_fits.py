@@ -303,6 +303,9 @@ def test_sepiolite_strengthens():
     assert fit["b"].high < 0
     assert fit.ssq == pytest.approx(1.5903e-2, rel=1e-3)  # 1.805e-2 with the measured displacement
     assert 0.7 < fit.noise[0].lag1 < 0.9
+    said = " ".join(str(fit).split())  # friction rises faster and later than the law can
+    assert "step.1.at ended at the smallest value" in said
+    assert "friction would have the change earlier than the record's other columns allow" in said
 
 
 # -- which law

@@ -380,3 +380,102 @@ def test_a_stuck_clock_and_absurd_numbers_are_told(tmp_path, role, change, told)
     np.savetxt(path, np.column_stack(list(table.values())), header=head, comments="")
     with pytest.raises(ss.ParameterError, match=told):
         ss.read_record(path)
+
+
+# -- odd but honest texts
+
+
+def rows(separator, *cells):
+    return "\n".join(separator.join(row) for row in zip(*cells, strict=True)) + "\n"
+
+
+def plain(values, digits=6):
+    return [f"{x:.{digits}f}" for x in values]
+
+
+HEAD = "Time (s),Displacement (um),Friction,Normal stress (MPa)\n"
+
+
+def read_as(tmp_path, text, **options):
+    path = tmp_path / "odd.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return ss.read_record(path, **options)
+
+
+def check(record):
+    time, friction, normal, moved = columns()
+    np.testing.assert_allclose(record.time, time, atol=1e-4)
+    np.testing.assert_allclose(record.friction, friction, atol=1e-5)
+    np.testing.assert_allclose(record.normal, 1e6 * normal, rtol=1e-5)
+    np.testing.assert_allclose(record.displacement, 1e-6 * moved, rtol=1e-5)
+
+
+def test_dates_and_clocks_in_columns_of_their_own_across_midnight(tmp_path):
+    """As German loggers export: two columns, decimal commas, day before month; the date goes on at midnight."""
+    time, friction, normal, moved = columns()
+    clock = [
+        f"{int(86390 + t) // 3600 % 24:02d}:{int(86390 + t) // 60 % 60:02d}:{(86390 + t) % 60:07.4f}" for t in time
+    ]
+    dates = ["31.12.2023" if t < 10 else "01.01.2024" for t in time]
+    cells = [clock, plain(1e-3 * moved), plain(friction), plain(normal)]
+    text = rows(";", dates, *([c.replace(".", ",") for c in column] for column in cells))
+    record = read_as(tmp_path, "Datum;Uhrzeit;Weg in mm;Reibwert;Normalspannung in MPa\n" + text)
+    check(record)
+    assert any("are those of the dates in 'Datum'" in note for note in record.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("31.12.1970 00:00:01,5", 364 * 86400 + 1.5),
+        ("12/31/1970 11:00:00 PM", 364 * 86400 + 23 * 3600.0),
+        ("31/12/1970 12:00:00 am", 364 * 86400.0),
+        ("12:30:00 pm", 45000.0),
+        ("1:00:00", 3600.0),
+        ("32.12.1970 00:00:00", None),
+        ("1.5", None),
+        ("02.03", None),
+    ],
+)
+def test_dates_as_people_write_them(text, seconds):
+    assert moment(text) == seconds
+
+
+def test_unicode_text_fortran_exponents_and_quoted_names(tmp_path):
+    time, friction, normal, moved = columns()
+    table = rows("\t", plain(time), plain(moved), plain(friction), plain(normal))
+    check(read_as(tmp_path, HEAD.replace(",", "\t").encode("utf-16") + table.encode("utf-16-le")))
+    fortran = [[f"{x:.7E}".replace("E", "D") for x in column] for column in (time, moved, friction, normal)]
+    check(read_as(tmp_path, HEAD + rows(",", *fortran)))
+    quoted = '"Time (s)","Way, total","Friction","Normal stress (MPa)"\n'.replace("Way, total", "Way")
+    text = quoted + rows(",", plain(time), plain(moved), plain(friction), plain(normal))
+    check(read_as(tmp_path, text, displacement=("Way", "um")))
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["Tiempo (s),Desplazamiento (um),Coeficiente de fricción,Esfuerzo normal (MPa)",
+     "Tempo (s),Spostamento (um),Attrito,Sforzo normale (MPa)"],
+)  # fmt: skip
+def test_names_in_spanish_and_italian(tmp_path, names):
+    time, friction, normal, moved = columns()
+    check(read_as(tmp_path, names + "\n" + rows(",", plain(time), plain(moved), plain(friction), plain(normal))))
+
+
+def test_a_clock_that_begins_anew_is_refused(tmp_path):
+    """Half of the rows were left out, and the next that counted was a jump of everything."""
+    time, friction, normal, moved = columns()
+    text = HEAD + rows(",", plain(np.where(time > 15, time - 15, time)), plain(moved), plain(friction), plain(normal))
+    with pytest.raises(ss.ParameterError, match=r"line 32: the clock begins anew, 0\.25.* s after 14\.7.* for 29 rows"):
+        read_as(tmp_path, text)
+
+
+def test_a_clock_coarser_than_even_sampling_leaves_rates_alone():
+    """Stamps in whole seconds, every 0.376 s: rates were 13 % off, because groups of three rows had one slope."""
+    time = np.linspace(0.0, 150.0, 400)
+    moved = 1e-6 * np.where(time < 60.13, time, 60.13 + 5 * (time - 60.13))
+    record = ss.record_from_arrays(np.round(time), friction=0.6 + 0.001 * np.sin(time), displacement=moved)
+    np.testing.assert_allclose(record.time - record.time[0], time, atol=0.4)
+    assert record.initial_rate == pytest.approx(1e-6, rel=2e-3)
+    assert [step.after for step in record.steps] == pytest.approx([5e-6], rel=2e-3)
+    assert any("clock is coarser than the sampling (151 times for 400 rows)" in note for note in record.notes)

@@ -236,8 +236,18 @@ class FitNumbers(ReadOnly):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
                     value = float(one.value(bound))
                     end = f"{value:.7g} s" if one.unit == "s" else shown(value, one.unit, area=self.plan.rig.area)
-                    found.append(f"{one.name} ended at the {word} value that was searched, {end}")
+                    text = f"{one.name} ended at the {word} value that was searched, {end}"
+                    found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
         return tuple(found)
+
+    def _beyond_window(self, one: Unknown, when: str) -> str:
+        """What it means that friction would have a change at a time that the columns exclude."""
+        if not (self.plan.follows and one.parameter.startswith("step.") and one.parameter.endswith(".at")):
+            return ""
+        return (
+            f": friction would have the change {when} than the record's other columns allow; the model does not follow "
+            "friction around it (another law, two states, a ramp), or friction was not sampled at the same times"
+        )
 
     def _within_interval(self, one: Unknown) -> bool:
         """Whether an unknown is the time of a step that lies between two samples."""

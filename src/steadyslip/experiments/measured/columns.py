@@ -32,11 +32,13 @@ _WORDS = {
 }
 _SPELLINGS = {word: name for name, words in _WORDS.items() for word in words}
 _SUFFIXES = ("s", "ms", "min", "h", "m", "cm", "mm", "um", "nm", "Pa", "kPa", "MPa", "GPa", "N", "kN", "mN", "uN")
-_TIMES = {"time", "times", "elapsed", "elapsedtime", "uhrzeit", "datetime", "date", "datum"}
-_FRICTION = re.compile(r"friction|^reib(ungs?)?(wert|zahl|koeff|beiwert|$)")
-_DISPLACED = re.compile(r"disp|position|slip|ram|verschieb|vorschub|weg$|déplacement")
+_TIMES = {"time", "times", "elapsed", "elapsedtime", "uhrzeit", "datetime", "date", "datum", "tiempo", "tempo"}
+_FRICTION = re.compile(r"friction|fricción|rozamiento|attrito|^reib(ungs?)?(wert|zahl|koeff|beiwert|$)")
+_DISPLACED = re.compile(r"disp|position|slip|ram|verschieb|vorschub|weg$|déplacement|desplaza|spostament")
 _ACROSS = re.compile(r"normalweg|vertikal|normalversch")
-_SHEAR = re.compile(r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement")
+_SHEAR = re.compile(
+    r"shear|tau|τ|scher|schub|reibkraft|reibungskraft|tangential|querkraft|cisaillement|cortante|cizall|tagli|tangenzial"
+)
 _BRACKETS = re.compile(r"^(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*$")
 
 
@@ -100,7 +102,7 @@ def known_unit(text: str) -> str | None:
 
 def guessed_role(name: str, has_unit: str | None) -> str | None:
     """The role that a bare name, and its unit, suggest."""
-    plain = re.sub(r"[^a-zµμστäöüßéè]+", " ", name.lower().replace("_", " ")).strip()
+    plain = re.sub(r"[^a-zµμστäöüßéèóáíñàç]+", " ", name.lower().replace("_", " ")).strip()
     words = set(plain.split())
     dimension = None if has_unit is None else unit(has_unit)[1]
     if dimension == unit("m/s")[1]:

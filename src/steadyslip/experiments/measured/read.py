@@ -19,6 +19,8 @@ from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen, 
 
 Array = np.ndarray
 GAP = 10.0  # times the usual spacing
+RESTART = 0.02  # of the rows: so many on end whose time goes back are a clock that begins anew
+COARSE, EVEN = 0.6, 1.25  # share of rows with a time of their own; ticks by which even rows may miss their stamps
 AROUND = 25  # rows before and behind, from which that is told
 HUGEST = 1e60  # of a number in SI units
 PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
@@ -220,7 +222,7 @@ def _cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) 
     si, lines = _without_gaps_in_rows(si, lines, notes)
     _check_sizes(si, source, lines)
     if len(lines) >= FEWEST_ROWS:
-        si, lines = _in_order(si, lines, notes)
+        si, lines = _in_order(si, lines, notes, source)
     if len(lines) < FEWEST_ROWS:
         message = f"{len(lines)} usable rows are left; a record needs {FEWEST_ROWS} or more"
         raise ParameterError([Problem("file", message)], title=source)
@@ -271,18 +273,42 @@ def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) 
     return {role: values[~bad] for role, values in si.items()}, lines[~bad]
 
 
-def _in_order(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
+def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str) -> tuple[dict[str, Array], Array]:
     """Rows whose time goes back are left out, rows of one time told apart: see `_stamped`."""
     time = si["time"]
     high = np.maximum.accumulate(time)
     back = time < high
     if np.any(back):
+        _check_clock(time, high, back, lines, source)
         where = ", ".join(map(str, lines[back][:5]))
         notes.append(
             f"{int(back.sum())} rows whose time goes back left out (lines {where}{', ...' if back.sum() > 5 else ''})"
         )
         si, lines, time = {role: values[~back] for role, values in si.items()}, lines[~back], time[~back]
     return _stamped(si, lines, notes)
+
+
+def _check_clock(time: Array, high: Array, back: Array, lines: Array, source: str) -> None:
+    """Refuse a clock that begins anew: what follows would be left out, or be taken for a jump of everything."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], back, [False]]).astype(int)))
+    begin, end = ends.reshape(-1, 2)[int(np.argmax(ends[1::2] - ends[::2]))]
+    if end - begin > max(RESTART * len(time), FEWEST_ROWS):
+        message = (
+            f"line {lines[begin]}: the clock begins anew, {time[begin]:.6g} s after {high[begin]:.6g} s, for "
+            f"{end - begin} rows; give each part as a file of its own, or mend the time"
+        )
+        raise ParameterError([Problem("time", message)], title=source)
+
+
+def _even(time: Array) -> Array | None:
+    """Times of rows that were taken evenly and stamped by a clock coarser than that; None if they were not."""
+    rows = np.arange(len(time), dtype=float)
+    tick = float(np.min(np.diff(np.unique(time))))
+    slope, origin = np.polyfit(rows, time, 1)
+    rest = time - (origin + slope * rows)
+    if not (slope > 0 and float(np.ptp(rest)) < EVEN * tick):
+        return None
+    return np.asarray(time[0] + slope * rows)
 
 
 def _stamped(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
@@ -295,6 +321,13 @@ def _stamped(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict
     unique, first, counts = np.unique(time, return_index=True, return_counts=True)
     if len(unique) == len(time):
         return si, lines
+    uneven = len(unique) < COARSE * len(time) and np.ptp(counts[1:-1]) > 0  # groups of equal size are spread exactly
+    if uneven and (even := _even(time)) is not None:
+        notes.append(
+            f"the clock is coarser than the sampling ({len(unique)} times for {len(time)} rows); rows taken as even, "
+            f"every {even[1] - even[0]:.4g} s"
+        )
+        return si | {"time": even}, lines
     gaps = np.diff(unique, append=2 * unique[-1] - unique[-2])
     around = np.clip(first[:, None] + np.array([-AROUND, AROUND]), 0, len(time) - 1)
     usual = (time[around[:, 1]] - time[around[:, 0]]) / np.maximum(np.diff(around, axis=1)[:, 0], 1)

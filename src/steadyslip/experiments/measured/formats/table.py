@@ -45,6 +45,12 @@ class Table:
     def __post_init__(self) -> None:
         self.units = self.units or [None] * len(self.names)
 
+    def drop(self, places: Sequence[int]) -> None:
+        """Leave columns out."""
+        keep = [k for k in range(len(self.names)) if k not in places]
+        self.names, self.units = [self.names[k] for k in keep], [self.units[k] for k in keep]
+        self.values = self.values[keep]
+
 
 def check_size(path: Path, size: int, remedy: str = "") -> None:
     """Refuse more numbers than a record may have, before they are read."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
-from steadyslip.experiments.measured.formats.moments import moment
+from steadyslip.experiments.measured.formats.moments import day, moment
 from steadyslip.experiments.measured.formats.table import MISSING, Table, check_size, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
 from steadyslip.files.inputs import read_bytes
@@ -20,7 +20,9 @@ Array = np.ndarray
 SHOWN = 8  # bad lines that a message lists
 MOST_TEXT = 2**30  # bytes of a file
 MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines that are looked at one by one; characters of one
+UTF16 = (b"\xff\xfe", b"\xfe\xff")  # how texts begin that are written so, such as Excel's "Unicode text"
 LARGE, LOOKED_AT = 2**20, 2**17  # bytes beyond which NumPy is tried first; from which it learns the columns
+_FORTRAN = re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+$")
 _BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 
 
@@ -39,6 +41,8 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
         names, units, values = read_xlook(raw, str(path))
         known = [None if unit is None else known_unit(unit) for unit in units]
         return Table(names, values, np.arange(1, values.shape[1] + 1), known, ["read as XLOOK file"])
+    if raw[:2] in UTF16:
+        raw = raw.decode("utf-16", errors="replace").encode()
     if b"\0" in raw[:4096]:
         raise NotAvailable(
             f"{str(path)!r} is not text; endings of other formats: .h5, .hdf5, .nc, .mat, .parquet, .xlsx, .tdms"
@@ -57,8 +61,8 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
     notes += layout.notes
     values, lines, faults = _numbers(layout.body, layout.delimiter, layout.comma, layout.names)
     table = Table(layout.names, values, lines, layout.units, notes)
-    for k in layout.moments if len(lines) else ():
-        count_moments(table, k)
+    if len(lines):
+        _count_all_moments(table, layout)
     if faults and not skip_bad_lines:
         more = [Problem("file", f"... and {len(faults) - SHOWN} more such lines")] if len(faults) > SHOWN else []
         advice = Problem("file", "mend these lines, or leave them out with skip_bad_lines (--skip-bad-lines)")
@@ -67,6 +71,19 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
         shown = ", ".join(str(f.line) for f in faults[:SHOWN])
         notes.append(f"{len(faults)} damaged lines left out: {shown}{', ...' if len(faults) > SHOWN else ''}")
     return table
+
+
+def _count_all_moments(table: Table, layout: _Layout) -> None:
+    """Make seconds of columns of times; dates in a column of their own belong to the clock beside them."""
+    clocks = [k for k in layout.moments if k not in layout.days]
+    if layout.days and len(clocks) == 1:
+        date, clock = table.names[layout.days[0]], table.names[clocks[0]]
+        table.values[clocks[0]] += table.values[layout.days[0]]
+        table.notes.append(f"the times in {clock!r} are those of the dates in {date!r}")
+    for k in clocks or layout.moments:
+        count_moments(table, k)
+    if clocks:
+        table.drop(layout.days)
 
 
 def _decoded(raw: bytes) -> tuple[str, list[str]]:
@@ -85,6 +102,7 @@ class _Layout:
     delimiter: str | None
     comma: bool
     moments: tuple[int, ...]
+    days: tuple[int, ...]
     body: list[tuple[int, str]]
     notes: list[str]
 
@@ -102,9 +120,14 @@ def _layout(path: Path, text: str) -> _Layout:
     count = _usual_count(body, delimiter)
     names, units = _names(header, comments, body[0][0], delimiter, count)
     cells = _cells(body[0][1], delimiter)[: len(names)]
-    moments = tuple(k for k, cell in enumerate(cells) if moment(cell.strip('"')) is not None)
+    moments = tuple(k for k, cell in enumerate(cells) if _is_moment(cell.strip('"')))
+    days = tuple(k for k in moments if day(cells[k].strip('"')) is not None)
     notes = ["numbers are written with a decimal comma"] if comma else []
-    return _Layout(names, units, delimiter, comma, moments, body, notes)
+    return _Layout(names, units, delimiter, comma, moments, days, body, notes)
+
+
+def _is_moment(cell: str) -> bool:
+    return moment(cell) is not None or day(cell) is not None
 
 
 def _plain(path: Path, raw: bytes) -> Table | None:
@@ -172,7 +195,9 @@ def _number(cell: str, comma: bool) -> float | None:
     try:
         return float(plain.replace(",", ".") if comma else plain)
     except ValueError:
-        return moment(plain)
+        if _FORTRAN.match(plain):
+            return float(re.sub("[dD]", "e", plain))
+        return moment(plain) if (date := day(plain)) is None else date
 
 
 def _header(
@@ -205,7 +230,7 @@ def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
     """Cells of a header, which may be separated otherwise than the numbers."""
     marks = [re.escape(delimiter)] if delimiter else []
     for pattern in [*marks, r"\t", r"\s{2,}", ",", ";", r"\s+(?![\[\(])", r"\s+"]:
-        cells = [cell.strip() for cell in re.split(pattern, line.strip())]
+        cells = [cell.strip().strip('"').strip() for cell in re.split(pattern, line.strip())]
         while len(cells) > count and cells[-1] == "":
             cells.pop()
         if len(cells) == count:

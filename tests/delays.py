@@ -39,6 +39,6 @@ def winding(matrix, fast):
     """Zeros to the right of the axis of a determinant without poles there, by how it turns from 0 to beyond `fast`."""
     omega = np.concatenate([np.geomspace(1e-5, 1.0, 1000), np.geomspace(1.0, fast, 4000)[1:]])
     turns = np.unwrap([np.angle(np.linalg.det(matrix(1j * w))) for w in omega])
-    far = [np.log(abs(np.linalg.det(matrix(1j * w)))) for w in (fast, 2 * fast)]
-    degree = round((far[1] - far[0]) / np.log(2))
+    far = np.geomspace(fast, 1e3 * fast, 400)  # where derivatives are delayed, size and turn go up and down for good
+    degree = round(np.polyfit(np.log(far), [np.log(abs(np.linalg.det(matrix(1j * w)))) for w in far], 1)[0])
     return round((degree * np.pi / 2 - (turns[-1] - turns[0])) / np.pi)

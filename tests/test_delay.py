@@ -15,6 +15,7 @@ from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.windows import delay_set, linear_windows
 from steadyslip.model import build_model, operating_point
+from steadyslip.model.range import quasi as operating_quasi
 from steadyslip.model.reduction import reduce_model
 
 
@@ -226,6 +227,24 @@ def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
         json.loads(found.to_json())
     (edge,) = ss.boundary(replace(base, drive=replace(base.drive, kd=0.9)), "drive.kd", between=(0.5, 3.0))
     assert (edge.kind, edge.value) == ("ill-posed", pytest.approx(1.0, rel=1e-12))
+
+
+@pytest.mark.parametrize("delay", [1e2, 1e4, 1e7])
+def test_roots_that_crowd_at_the_axis_under_long_delays_are_found(delay):
+    """The rightmost, of millions to the right: none lies further, and each is a root."""
+    machine = late_axis(f"{delay} s")
+    found = ss.eigenvalues(machine)
+    c, h = operating_quasi(operating_point(machine))
+    for k, s in enumerate(found):
+        assert abs(quasi.value(c, h, s)) < 1e-8 * quasi._size(c, h, s)
+        assert int(quasi.count_right(c, h, s.real * (1 + 1e-6) + 1e-12)) <= k + 1
+    assert np.all(np.diff(found.real) <= 1e-9)
+    assert ss.analyze(machine).unstable_roots > delay / 10
+
+
+def test_a_delay_of_absurd_length_is_refused_in_words():
+    with pytest.raises(ss.NotAvailable, match="leaves the range of floating point"):
+        ss.analyze(late_axis("1e100 s"))
 
 
 def test_all_that_a_controller_does_is_late():

@@ -140,6 +140,8 @@ def _null_vector(matrix: np.ndarray) -> np.ndarray:
         rows = np.max(np.abs(matrix * columns), axis=1, keepdims=True)
         columns = columns / np.maximum(np.max(np.abs(matrix * columns / rows), axis=0), 1e-300)
     scaled = matrix * columns / np.max(np.abs(matrix * columns), axis=1, keepdims=True)
+    if not np.all(np.isfinite(scaled)):
+        return np.full(len(matrix), np.nan)
     return np.asarray(np.linalg.svd(scaled)[2][-1].conj() * columns)
 
 

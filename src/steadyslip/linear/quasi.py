@@ -29,7 +29,7 @@ from steadyslip.linear.polynomials import (
     roots,
 )
 
-INFINITE = 10**6
+INFINITE = 2**62
 _HALVINGS = 60  # of a bracket of a real part
 _MOST = 400_000  # places along the axis at which a function is evaluated
 _TURNS = 5000  # of the fastest crossing, after which delays are not looked at any more
@@ -205,7 +205,7 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
         return np.append(exact, np.full(count, np.nan + 0j))[:count]
     numbers = np.arange(1, count + 1)
     high = np.full(count, 1.01 * _bound(c))
-    low = -np.ones(count)
+    low = -np.ones(count) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave the range of floating point
     for _ in range(60):
         short = count_right(c, h, low) < numbers
         if not np.any(short):

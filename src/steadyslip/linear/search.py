@@ -36,6 +36,7 @@ _ROUNDING = 64  # units of the last place within which two conditions are one, a
 _WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
 _FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a level stretch, which hides no zero
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
+_SCARCE = 6  # times fewer samples where roots have to be counted one rig after the other: with several delays
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,8 @@ class Search:
         self.rig, self.name, self.present, self.branch = rig, name, tuple(present), branch
         address = rig.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
+        scarce = len(operating_point(rig, None, self.present, branch).model.delays) > 1
+        self.share = _SCARCE if scarce else 1
 
     def values(self, x: float | Array) -> OperatingPoint:
         return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
@@ -103,10 +106,10 @@ class Search:
             inset = 1e-9 * (domain.high - domain.low)
             low = domain.low if domain.low_allowed else domain.low + inset
             high = domain.high if domain.high_allowed else domain.high - inset
-            samples = np.linspace(low, high, _LINEAR)
+            samples = np.linspace(low, high, _LINEAR // self.share)
         else:
             size = abs(self.value) or self.natural_size()
-            count = 2 * _DECADES * _PER_DECADE + 1
+            count = 2 * _DECADES * _PER_DECADE // self.share + 1
             with np.errstate(all="ignore"):
                 samples = size * np.geomspace(10.0**-_DECADES, 10.0**_DECADES, count)
             samples = samples[np.isfinite(samples) & (samples > 0)]  # the ends of floating point are no parameters
@@ -117,12 +120,12 @@ class Search:
         return np.unique(np.append(samples, self.value))
 
     def _grid_between(self, low: float, high: float) -> Array:
-        samples = [np.linspace(low, high, _LINEAR)]
+        samples = [np.linspace(low, high, _LINEAR // self.share)]
         for a, b, sign in ((low, high, 1.0), (-high, -low, -1.0)):  # even in logarithm too
             if b > 0:
                 a = max(a, b * 1e-12)
                 decades = np.log10(b / a)
-                samples.append(sign * np.geomspace(a, b, int(_PER_DECADE * decades) + 2)[1:-1])
+                samples.append(sign * np.geomspace(a, b, int(_PER_DECADE * decades / self.share) + 2)[1:-1])
         return np.unique(np.concatenate(samples))
 
     def natural_size(self) -> float:
@@ -194,14 +197,15 @@ class Search:
 
     def _narrowed(self, low: Array, high: Array, low_status: NDArray[np.int64]) -> tuple[Array, Array]:
         """Brackets down to rounding, all at once; keeps the lowest change inside each."""
-        for _ in range(12):
+        split = _SPLIT if self.share == 1 else 2
+        for _ in range(int(60 / np.log2(split))):
             if not len(low):
                 break
-            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, split + 1)
             x[:, -1] = high
             status = self.status(x.ravel()).reshape(x.shape)
             first = np.argmax(status != low_status[:, None], axis=-1)
-            first = np.where(first == 0, _SPLIT, first)
+            first = np.where(first == 0, split, first)
             row = np.arange(len(low))
             low, high = x[row, first - 1], x[row, first]
         return low, high

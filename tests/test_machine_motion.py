@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import steadyslip as ss
 from machines import at_random, brake, coulomb, rate_state, same_block, surface, two_blocks, two_mass
@@ -509,3 +510,65 @@ def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
     )  # fmt: skip
     assert wrong.returncode == 2
     assert "rad/s" in wrong.stderr
+
+
+def test_friction_that_acts_on_its_own_normal_force_is_solved_for():
+    """A self-energising contact with memory of normal stress: τ stands in ln σ(τ), on a block that another drags."""
+    own = rate_state(0.02, -0.01, 1.0, mu=0.4, normal_memory=ss.LinkerDieterich(alpha=0.2, sigma_ref=1.0))
+    machine = ss.Machine(
+        bodies={"one": ss.SlidingBody(mass=1.0), "two": ss.SlidingBody(mass=2.0)},
+        links={
+            "pull": ss.Spring(between=("drive", "two"), stiffness=1.0, damping=0.1),
+            "bar": ss.Spring(between=("two", "one"), stiffness=3.0, damping=0.1),
+        },
+        contacts={"wedge": ss.Surface(body="one", friction=own, contact=ss.SelfEnergising(preload=1.0, gain=0.3))},
+        drive=ss.Pull(velocity=1.0),
+    )
+    run = ss.simulate(machine, initial={"two.v": 1.2}, times=TIMES, until=20.0, **FINE)
+    assert run.status == "done"
+    memory = "wedge.Psi" if "wedge.Psi" in run else "wedge.Phi"
+
+    def rub(v, kept):
+        """τ with Ψ = bΘ + α ln σ as it is."""
+        return brentq(lambda t: t - (1 + 0.3 * t) * (0.4 + own.a * np.log(v) + kept - 0.2 * np.log(1 + 0.3 * t)), 0, 2)
+
+    resting = 0.4 / (1 - 0.3 * 0.4)
+    start = 0.2 * np.log(1 + 0.3 * resting)
+
+    def right(t, y):
+        x, z, v, w, kept = y
+        bar = 3.0 * (z - x) + 0.1 * (w - v)
+        theta = (kept - 0.2 * np.log(1 + 0.3 * rub(v, kept))) / own.b
+        return [
+            v - 1,
+            w - 1,
+            bar + resting - rub(v, kept),
+            (-z - 0.1 * (w - 1) - bar) / 2,
+            own.b * aging(own, v, theta),
+        ]
+
+    assert rub(1.0, start) == pytest.approx(resting, rel=1e-9)
+    found = radau(right, [0, 0, 1, 1.2, start], TIMES)
+    agree(run, "one.v", found[2])
+    agree(run, "two.v", found[3])
+    scale = own.b if memory == "wedge.Phi" else 1.0
+    agree(run, memory, found[4] / scale)
+    agree(run, "wedge.friction_force", [rub(v, kept) for v, kept in zip(found[2], found[4], strict=True)])
+
+
+def test_the_picture_of_a_run_names_contacts_in_their_units():
+    run = ss.simulate(two_tables(), ss.NormalStressRamp(at=1.0, by=-3.0, duration=10.0, on="oiled"), until=20.0)
+    panels = run.plot()
+    names = [text.get_text() for text in panels[0].get_legend().get_texts()]
+    assert names[:2] == ["dry", "oiled"]
+    assert [panel.get_ylabel() for panel in panels] == ["slip rate (m/s)", "friction (1)", "normal force (N)"]
+    assert "contact lost (oiled)" in panels[0].get_title()
+    drawn = {line.get_label(): line.get_ydata() for line in panels[2].lines}
+    assert drawn["oiled"] == pytest.approx(run["oiled.normal_force"])
+    with pytest.raises(ss.NotAvailable, match="machine"):
+        run.plot("phase")
+
+
+def test_a_machine_has_one_steady_sliding():
+    with pytest.raises(ss.ParameterError, match="branch: got 1"):
+        ss.simulate(two_tables(), until=1.0, branch=1)

@@ -89,7 +89,7 @@ class Reduction(Keeper):
     rates : tuple of sympy.Expr
         d(state)/dt.
     unknown : sympy.Symbol or None
-        What Newton's method finds, in form *implicit*: w or the acceleration.
+        What Newton's method finds, in form *implicit*: w, the acceleration, or friction of a contact.
     residual : sympy.Expr or None
         Its equation, in form *implicit*.
     restarts : tuple of (sympy.Symbol, sympy.Expr)
@@ -249,11 +249,12 @@ class _Reducing:
             balance = self._force_balance(place) if place is not None and light else self.balances[i]
             equations.append((self.inlined(balance), contact.friction))
         found, left = solved_in_turn(equations)
-        if left:
+        if len(left) > 1 or (left and any(map(self._is_light, range(len(self.model.contacts))))):
             self._refuse(
                 f"friction of {self._names(left)} changes the normal force on it, which the law answers in a way that "
                 "has no closed form"
             )
+        self.implicit = left
         self.definitions = found | self.definitions  # put in last
 
     def _names(self, left: Iterable[tuple[sp.Expr, sp.Symbol]]) -> str:
@@ -296,6 +297,7 @@ class _Reducing:
         self.pushed, left = solved_in_turn(
             [(self.inlined(self._force_balance(one)), one.acceleration) for one in heavy]
         )
+        left = self.implicit + left
         light = [i for i in range(len(model.contacts)) if self._is_light(i)]
         residuals = [(self.inlined(self.balances[i]), self._w(i)) for i in light]
         self.victims = self._victims(light, eliminate)

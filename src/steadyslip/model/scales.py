@@ -302,6 +302,9 @@ def _together(
         }
         wanted = [own_w[w] for w, _ in reduction.restarts]
         return scales, np.minimum.reduce(np.broadcast_arrays(*wanted))
+    frictions = [contact.friction for contact in model.contacts]
+    if reduction.unknown in frictions:
+        return scales, np.abs(weights(point, frictions.index(reduction.unknown)).direct)
     return scales, np.minimum.reduce(np.broadcast_arrays(*(unknown for _, unknown in each)))
 
 

@@ -202,7 +202,15 @@ def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, ve
     for w, _ in reduction.restarts:
         slip = velocity if model.is_single else slip_rates(point)[own[w]]
         found.append(point.evaluate(_velocity_variable(reduction, own[w]), slip, *memory)[0])
+    if reduction.unknown in model.steady and not found:
+        found = [point.evaluate(_steady_unknown(reduction))[0]]
     return found or [0.0]
+
+
+@question
+def _steady_unknown(reduction: Reduction) -> Callable[..., list[Any]]:
+    """The unknown in steady sliding."""
+    return reduction.model.function([reduction.model.steady[reduction.unknown]])
 
 
 @question

@@ -211,6 +211,8 @@ def prepare(
     """
     own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
     plan = Protocol.of(protocol).varied({name: value for name, value in vary.items() if name not in own})
+    if branch and isinstance(rig, Machine):
+        raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
     point = operating_point(rig, own, branch=branch)
     _refuse_singular(rig, point, bool(own))
     if not own:
@@ -223,8 +225,8 @@ def prepare(
     segments = pack(plan, point.drive, final)
     if np.any(segments.jump) and any(one.damping and LOAD_POINT in one.senses for one in rig.mechanism().elements):
         raise ParameterError(
-            [Problem("protocol", "a displacement step through a dashpot (slider.damping, a derivative gain) is an "
-                     "infinite force; use a short velocity step instead")]
+            [Problem("protocol", "a displacement step through a dashpot (slider.damping, of a link, a kd) is "
+                     "an infinite force; use a short velocity step instead")]
         )  # fmt: skip
     eliminate = eliminable(point)
     push, press = targets(rig, plan)

@@ -134,3 +134,22 @@ def test_every_record_begins_on_its_own_and_a_file_keeps_that(tmp_path):
     again = ss.load_fit(tmp_path / "fit.nc")
     assert again.names == fit.names
     np.testing.assert_allclose(again.model, fit.model)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return ss.fit(ss.lab_rig(), cut(1, count=400), initial="free", starts=3)
+
+
+def test_figures_name_what_is_fitted_of_the_beginning(fit):
+    """`friction` alone would be the record's."""
+    panels = np.ravel(fit.plot("corner"))
+    labels = {text for panel in panels if panel is not None for text in (panel.get_xlabel(), panel.get_ylabel())}
+    assert {"initial.friction (1)", "initial.Theta (1)"} <= labels
+
+
+@pytest.mark.parametrize("count", [27, 1000])
+def test_histograms_of_few_draws_have_few_bars(count, fit):
+    panels = np.ravel(ss.normal_draws(fit, count).plot())
+    bars = len(next(panel for panel in panels if panel is not None).patches)
+    assert bars == round(2 * count ** (1 / 3))

@@ -191,7 +191,7 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
     for panel, (kick, sizes) in zip(panels, result.thresholds.items(), strict=True):
         fails = np.isfinite(sizes) & (sizes > 0)
         if np.any(fails):
-            panel.hist(sizes[fails], bins=40, color=SKY, label="draws")
+            panel.hist(sizes[fails], bins=round(np.clip(2 * np.sum(fails) ** (1 / 3), 5, 40)), color=SKY, label="draws")
             panel.axvline(
                 float(np.median(sizes[fails])), color=BLACK, linewidth=1, linestyle="--", label="median of these"
             )

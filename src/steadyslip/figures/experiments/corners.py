@@ -107,7 +107,7 @@ def _outlined(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scal
 def _drawn(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None:
     """Draws as dots, and lines of equal density around 68 and 95 % of them."""
     if alone:
-        panel.hist(x, bins=40, color=SKY)
+        panel.hist(x, bins=round(np.clip(2 * len(x) ** (1 / 3), 5, 40)), color=SKY)  # Rice's rule
         panel.set_yticks([])
         return
     few = slice(0, MOST_DRAWN)

@@ -72,6 +72,6 @@ def brief(name: str) -> str:
     first, _, last = name.rpartition(".")
     if ".states" in first:
         return f"{last} {first.rpartition('.')[2]}"
-    if first.partition(".")[0] in ("jump", "step", "trend"):
+    if first.partition(".")[0] in ("jump", "step", "start", "initial", "trend"):
         return name
     return last

@@ -458,6 +458,11 @@ def test_modes_are_those_of_an_undamped_pair():
     )
 
 
+def test_a_pad_that_moves_both_ways_is_one_body():
+    words = ss.modes(brake(rate_state(0.02, -0.01, 0.5)))[0].words()
+    assert words.startswith("the pad (along and normal) judders;")
+
+
 def test_the_verdict_says_what_moves():
     machine = two_mass(kp=2.0).with_values({"links.screw.stiffness": 3.0})
     found = ss.analyze(machine)

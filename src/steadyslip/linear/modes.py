@@ -54,7 +54,8 @@ class Mode(Displayed):
         rest = [name for name, size in sizes.items() if HARDLY <= size < MOVES]
         still = [name for name, size in sizes.items() if size < HARDLY]
         does = "judder" if self.eigenvalue.imag else "drift"
-        parts = [f"{_listed(leads)} {does if len(leads) > 1 else does + 's'}"]
+        movers = _merged(leads)
+        parts = [f"{_listed(movers)} {does if len(movers) > 1 else does + 's'}"]
         if len(leads) == 2 and self._opposed(*leads):
             parts[0] += " against each other"
         if rest:
@@ -81,6 +82,16 @@ class Mode(Displayed):
         if self.eigenvalue.imag:
             rows.append(f"  period {shown(2 * np.pi / abs(self.eigenvalue.imag), 's')}")
         return "\n".join(rows)
+
+
+def _merged(names: list[str]) -> list[str]:
+    """A body that moves along the slide and away from it, once."""
+    both = {name for name in names if name + NORMAL in names}
+    return [
+        f"{n} (along and normal)" if n in both else n
+        for n in names
+        if n.removesuffix(NORMAL) == n or n[: -len(NORMAL)] not in both
+    ]
 
 
 def _listed(names: list[str]) -> str:

@@ -152,7 +152,7 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
         ax.spines[side].set_visible(False)
     does = "grows" if mode.eigenvalue.real > 0 else "decays"
     kind = f"period {shown(2 * math.pi / abs(mode.eigenvalue.imag), 's')}" if mode.eigenvalue.imag else "no oscillation"
-    ax.set_xlabel(printed(f"leading mode: {does}, {kind}"), fontsize=8)
+    ax.set_xlabel(printed(f"leading mode\n{does}, {kind}"), fontsize=8)
     ax.tick_params(axis="x", labelsize=8)
     return ax
 

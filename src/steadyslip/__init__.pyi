@@ -186,6 +186,8 @@ from .model.sliding import (
     steady_states as steady_states,
 )
 from .motion import (
+    ContactEvent as ContactEvent,
+    ContactSlip as ContactSlip,
     Ensemble as Ensemble,
     Event as Event,
     History as History,

@@ -3,9 +3,19 @@
 rig + protocol -> jobs (arrays) -> kernels in lanes -> history or ensemble
 """
 
-from steadyslip.motion.events import Event, SlipEvent
+from steadyslip.motion.events import ContactEvent, ContactSlip, Event, SlipEvent
 from steadyslip.motion.many import Ensemble, simulate_many
 from steadyslip.motion.result import History, load_history
 from steadyslip.motion.single import simulate
 
-__all__ = ["Ensemble", "Event", "History", "SlipEvent", "load_history", "simulate", "simulate_many"]
+__all__ = [
+    "ContactEvent",
+    "ContactSlip",
+    "Ensemble",
+    "Event",
+    "History",
+    "SlipEvent",
+    "load_history",
+    "simulate",
+    "simulate_many",
+]

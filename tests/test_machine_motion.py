@@ -320,6 +320,12 @@ def test_the_contact_that_sticks_is_named_and_one_may_reverse():
     assert ("dry", "arrest") not in kinds
     assert run.velocities["oiled"][0] < -0.1
     assert run.velocities["dry"][0] > 0
+    for event in run.events:
+        series = run[f"{event.contact}.friction_force"], run[f"{event.contact}.slip"]
+        assert event.normal_force == pytest.approx({"dry": 2.0, "oiled": 1.0}[event.contact])
+        force, slip = (np.interp(event.time, run["t"], values) for values in series)
+        assert event.friction_force == pytest.approx(force, abs=0.02)
+        assert event.slip == pytest.approx(slip, abs=1e-3)
     slips = run.slip_events
     assert {one.contact for one in slips} == {"dry", "oiled"}
     for one in slips:
@@ -572,3 +578,24 @@ def test_the_picture_of_a_run_names_contacts_in_their_units():
 def test_a_machine_has_one_steady_sliding():
     with pytest.raises(ss.ParameterError, match="branch: got 1"):
         ss.simulate(two_tables(), until=1.0, branch=1)
+
+
+def test_a_jump_of_the_load_point_leaves_all_where_they_are():
+    """Also what turns behind a screw: it falls behind by its own share."""
+    machine = ss.Machine(
+        bodies={"table": ss.SlidingBody(mass=1.0), "nut": ss.RotatingBody(inertia=0.2)},
+        links={
+            "pull": ss.Spring(between=("drive", "table"), stiffness=2.0),
+            "screw": ss.Screw(between=("nut", "table"), lead=0.5, stiffness=5.0, damping=0.3),
+        },
+        contacts={"guide": surface("table", rate_state(0.5, 0.1, 1.0))},
+        drive=ss.Pull(velocity=1.0),
+    )
+    run = ss.simulate(machine, ss.DisplacementStep(at=1.0, by=0.3), until=3.0)
+    (before,) = np.flatnonzero(np.diff(run["t"]) == 0)
+    for name in ("table.displacement", "nut.displacement", "nut.v", "guide.slip", "guide.slip_rate"):
+        assert run[name][before + 1] == pytest.approx(run[name][before], abs=1e-12), name
+    assert run["nut.x"][before + 1] - run["nut.x"][before] == pytest.approx(-0.3 / 0.5)
+    assert run["nut.displacement"][before] == pytest.approx(2.0)
+    assert run["table.acceleration"][before + 1] == pytest.approx(2.0 * 0.3)
+    assert run.units["nut.v"] == "rad/s"

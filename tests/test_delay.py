@@ -92,7 +92,7 @@ def test_without_its_delay_a_machine_is_as_it_was():
 
 @pytest.mark.parametrize("terms", [2, 3])
 def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms):
-    for seed in range(40 if terms == 2 else 8):
+    for seed in range(16 if terms == 2 else 4):
         c, h = some(seed, terms)
         found = spectral(c, h)
         if np.min(np.abs(found.real[:12])) < 1e-6:
@@ -105,7 +105,7 @@ def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms
 
 def test_edges_of_delays_are_those_of_the_discretised_equation():
     seen = 0
-    for seed in range(40):
+    for seed in range(20):
         c, _ = some(seed)
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 2.0  # so that it is often stable
         c[1] *= 4.0
@@ -229,7 +229,7 @@ def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
     assert (edge.kind, edge.value) == ("ill-posed", pytest.approx(1.0, rel=1e-12))
 
 
-@pytest.mark.parametrize("delay", [1e2, 1e4, 1e7])
+@pytest.mark.parametrize("delay", [1e2, 1e7])
 def test_roots_that_crowd_at_the_axis_under_long_delays_are_found(delay):
     """The rightmost, of millions to the right: none lies further, and each is a root."""
     machine = late_axis(f"{delay} s")

@@ -3,6 +3,9 @@
 Fresh random examples on a developer's machine, the same ones every time in continuous integration. What
 ``-m "not slow"`` leaves out is listed in slow.txt: each test, and how many of its parameters come before.
 ``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.
+
+Tests marked ``campaign`` do a fixed part of what scripts do by the thousand: random rigs and files against a second
+route, killed processes, repeated fits. A run of the whole leaves them out, ``-m campaign`` runs them; CI does both.
 """
 
 import gc
@@ -29,6 +32,8 @@ def pytest_collection_modifyitems(items):
     listed = (line.rsplit(" ", 1) for line in SLOW.read_text(encoding="utf-8").splitlines())
     left = {test: int(quick) for test, quick in listed}
     for item in items:
+        if item.get_closest_marker("campaign"):
+            item.add_marker(pytest.mark.slow)
         test = item.nodeid.partition("[")[0]
         if test in left:
             if not left[test]:
@@ -51,6 +56,8 @@ def pytest_sessionfinish():
 
 
 def pytest_configure(config):
+    if config.args_source is config.ArgsSource.TESTPATHS and not config.option.markexpr:
+        config.option.markexpr = "not campaign"
     if config.getoption("--measure"):
         config.pluginmanager.register(_Measured(), "measured")
 

@@ -466,6 +466,7 @@ def test_cache_that_cannot_be_written(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_concurrent_writers(folder):
     """Several processes compile the same kernel at once; all are right, and one sound file remains."""
     script = "from tiny_kernel import ask; print(ask(11), ask(12))"

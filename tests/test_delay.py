@@ -91,6 +91,7 @@ def test_without_its_delay_a_machine_is_as_it_was():
 
 
 @pytest.mark.parametrize("terms", [2, 3])
+@pytest.mark.campaign
 def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms):
     for seed in range(16 if terms == 2 else 4):
         c, h = some(seed, terms)
@@ -230,6 +231,7 @@ def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
 
 
 @pytest.mark.parametrize("delay", [1e2, 1e7])
+@pytest.mark.campaign
 def test_roots_that_crowd_at_the_axis_under_long_delays_are_found(delay):
     """The rightmost, of millions to the right: none lies further, and each is a root."""
     machine = late_axis(f"{delay} s")

@@ -262,6 +262,7 @@ def moved_on_a_page(own, kind, until, stop=""):
 
 @pytest.mark.parametrize("kind", [kind for kind, (_, piece) in DISTURBED.items() if piece])
 @pytest.mark.parametrize("name", MOVING)
+@pytest.mark.campaign
 def test_a_page_moves_as_python_does(name, kind):
     """From the rig's numbers to slip events, all of it in JavaScript but the equations."""
     own, until = MOVING[name], 20.0

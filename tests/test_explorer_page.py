@@ -527,6 +527,7 @@ slider.dispatchEvent(new Event("change"));
 return [document.querySelector("h1").textContent, slider.style.getPropertyValue("--track").includes("--stable")];"""
 
 
+@pytest.mark.campaign
 def test_firefox_shows_the_same(file, moved, tmp_path_factory):
     """Another engine agrees with Python's answers, moves the rig in its worker, and judges it as sliders move."""
     firefox = Firefox(tmp_path_factory.mktemp("firefox"))

@@ -20,6 +20,7 @@ from steadyslip.experiments.numerics.noise import describe
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_intervals_cover_as_often_as_they_say():
     """160 replicates: 68 and 95 % intervals contain the truth that often, within binomial bounds."""
     rig, count = lab.rig(), 160
@@ -113,6 +114,7 @@ def test_bootstrap_profile_and_covariance_agree_where_noise_is_white():
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian():
     fit = ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300))
     draws = ss.posterior(fit, 500, walkers=24)
@@ -131,6 +133,7 @@ def test_posterior_agrees_with_the_covariance_where_the_likelihood_is_gaussian()
     assert ss.normal_draws(fit, 10).to_arviz()["posterior"].sizes["draw"] == 10
 
 
+@pytest.mark.campaign
 def test_blocks_keep_correlation():
     fit = lab.basalt()
     assert fit.correlated
@@ -189,6 +192,7 @@ def test_a_normal_stress_history_leaves_one_direction_open():
     assert not ss.precision(lab.rig(alpha=0.4), both, fixed=["slider.stiffness"], noise=2e-7).unidentified
 
 
+@pytest.mark.campaign
 def test_stiffness_and_slip_distance_of_a_short_record():
     """Before the state has evolved, only slopes are seen."""
     protocol = ss.Protocol(pieces=(ss.VelocityStep(at=30.13, to=1.2e-6),), until=33.0)

@@ -7,10 +7,12 @@ from steadyslip.files.specifications import rig_from_text
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.campaign
 def test_mutated_rig_files_are_read_or_refused_with_one_message(seed):
     assert list(fuzz_rigs.files(60, f"fixed-{seed}", analyse=60)) == []
 
 
+@pytest.mark.campaign
 def test_combinations_have_an_answer_or_one_message():
     assert list(fuzz_rigs.combinations(16, "fixed")) == []
 

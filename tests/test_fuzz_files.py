@@ -12,6 +12,7 @@ PROGRAM = Path(__file__).with_name("fuzz_files.py")
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="every trial is a process with limits")
+@pytest.mark.campaign
 def test_damaged_and_hostile_files_are_an_answer_or_one_message():
     done = subprocess.run(
         [sys.executable, PROGRAM, "--trials", "30", "--seed", "3"], capture_output=True, text=True, check=False

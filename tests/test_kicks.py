@@ -396,6 +396,7 @@ FEW = ("slip massless tilted", "lugre mass level", "nagata massless level")
 
 
 @pytest.mark.parametrize("kind", FEW)
+@pytest.mark.campaign
 def test_random_kicks_equal_scipy(kind):
     """Of a few kinds here, that kernels are compiled for anyway; the others by hand."""
     assert kind in KINDS

@@ -501,6 +501,7 @@ def test_what_cancels_in_the_structure_cancels_exactly():
 
 
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.campaign
 def test_eigenvalues_of_machines_at_random_make_theory_11s_matrix_singular(seed):
     machine, matrix = at_random(seed)
     found = ss.eigenvalues(machine)

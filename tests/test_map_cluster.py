@@ -83,6 +83,7 @@ def wait_for(log, points):
         time.sleep(0.01)
 
 
+@pytest.mark.campaign
 def test_killed_workers_scheduler_and_driver(tmp_path, cluster, undisturbed):
     store, log = tmp_path / "map.zarr", tmp_path / "log"
     attack.plan(log)  # says where to log, to all processes that follow

@@ -137,6 +137,7 @@ def test_names_that_a_map_does_not_have_are_said(capsys, monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_ctrl_c_says_how_to_go_on(tmp_path):
     """Twice: with workers, and after that the rest."""
     store = tmp_path / "big.zarr"

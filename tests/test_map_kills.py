@@ -50,6 +50,7 @@ def check(store, log, undisturbed, chunks_in_hand):
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_workers_that_are_killed_lose_their_chunk_only(tmp_path, undisturbed):
     log = tmp_path / "log"
     tokens = tmp_path / "log.tokens"
@@ -65,6 +66,7 @@ def test_workers_that_are_killed_lose_their_chunk_only(tmp_path, undisturbed):
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_a_run_that_is_killed_goes_on(tmp_path, undisturbed):
     """All its processes while it starts, then the leading one at work; benchmarks/kills.py deals more blows."""
     store, log = tmp_path / "map.zarr", tmp_path / "log"
@@ -109,6 +111,7 @@ def test_ctrl_c_ends_with_part_of_the_map(tmp_path, undisturbed):
         st.tuples(st.floats(0, 1), st.sampled_from(["cut", "empty", "flip", "gone", "more"])), min_size=1, max_size=6
     )
 )
+@pytest.mark.campaign
 def test_damaged_chunks_are_found_and_computed_again(undisturbed, tmp_path_factory, damages):
     folder = tmp_path_factory.mktemp("damaged")
     store, log = folder / "map.zarr", folder / "log"

@@ -159,6 +159,7 @@ def test_a_folder_where_a_file_belongs_is_said(tmp_path, name):
     assert str(place if name != "zarr.json" else store) in str(caught.value)
 
 
+@pytest.mark.campaign
 def test_a_full_disk_keeps_what_is_finished(tmp_path):
     """The system refuses files above a size here; a write that fails half way is the same to the program."""
     program = (
@@ -239,6 +240,7 @@ def test_a_function_that_fails_names_the_point(tmp_path):
     assert "1 of 2 chunks are finished and kept" in str(error.value)
 
 
+@pytest.mark.campaign
 def test_workers_that_cannot_live_are_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr("steadyslip.maps.work.local.PATIENCE", 2)
 

@@ -107,6 +107,7 @@ def test_a_time_at_the_end_of_its_window_stops_no_fit():
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_the_valley_that_catches_most_starts():
     """Half a minute of basalt, two states: nearly all starts end in a degenerate valley at 1.8755e-3."""
     spec = ss.read_spec("examples/fits/basalt.toml")

@@ -112,6 +112,7 @@ def fresh(tmp_path):
     return (tmp_path / f"{i}.zarr" for i in count())
 
 
+@pytest.mark.campaign
 def test_any_value_of_any_option(fitted, fresh):
     faults = []
     grid = ss.run_map(PLAN, next(fresh), workers=1, progress=False)

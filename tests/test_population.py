@@ -31,6 +31,7 @@ def experiments(seed, count, errors=(0.03, 0.04), slope=None):
     return told, np.array(truth)
 
 
+@pytest.mark.campaign
 def test_the_full_joint_posterior_sampled_by_emcee_is_the_same():
     """The other route: mean, spreads and all members sampled together, nothing integrated out."""
     import emcee
@@ -83,6 +84,7 @@ def test_known_spreads_leave_generalised_least_squares():
 
 
 @pytest.mark.parametrize("count", [4])
+@pytest.mark.campaign
 def test_intervals_contain_the_truth_as_often_as_they_say(count):
     """Means, spreads and members of populations of few experiments; see benchmarks/population.py for many."""
     trials = 10

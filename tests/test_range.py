@@ -225,6 +225,7 @@ def test_hurwitz_is_the_same_in_any_unit_of_time(rates, decades, flip):
         assert is_hurwitz(scaled) == (not flip)
 
 
+@pytest.mark.campaign
 def test_verdicts_at_absurd_sizes_are_those_of_numbers_without_end():
     """A sample of `benchmarks/sizes.py`: the same polynomial in 700 digits, whose exponents have no end."""
     spec = importlib.util.spec_from_file_location("sizes", EXAMPLES.parent / "benchmarks" / "sizes.py")

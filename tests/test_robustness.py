@@ -84,6 +84,7 @@ def judged(text: str) -> None:
 
 @given(st.data())
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@pytest.mark.campaign
 def test_any_value_anywhere(data):
     lines = TEXT.splitlines()
     keys = [i for i, line in enumerate(lines) if re.match(r"\w+ =", line)]
@@ -109,6 +110,7 @@ def test_any_value_anywhere_in_a_protocol(data):
 
 @given(st.data())
 @settings(max_examples=40, deadline=None)
+@pytest.mark.campaign
 def test_any_damage_to_the_text(data):
     text = TEXT + EXPERIMENT
     for _ in range(data.draw(st.integers(1, 4))):
@@ -120,6 +122,7 @@ def test_any_damage_to_the_text(data):
 
 @given(st.data())
 @settings(max_examples=30, deadline=None)
+@pytest.mark.campaign
 def test_any_size_of_any_parameter(data):
     """Thirty decades to each side: an answer, or the message that floating point ends."""
     rig = ss.read_rig(EXAMPLE)

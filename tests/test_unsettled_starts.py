@@ -49,6 +49,7 @@ def test_where_a_record_begins_is_found(evolution, guess):
     assert "not steady at first" in " ".join(str(fit).split())
 
 
+@pytest.mark.campaign
 def test_a_b_and_d_c_are_unbiased_and_their_intervals_contain_the_truth():
     """Deviations of 12 replicates in quoted errors have mean zero and size one."""
     guess, names = ss.lab_rig(), ("friction.a", "friction.b", "friction.d_c", "slider.stiffness")

@@ -13,6 +13,7 @@ from words_at_random import false_sentences, some_rig
 
 
 @pytest.mark.parametrize("number", range(8))
+@pytest.mark.campaign
 def test_every_sentence_about_random_rigs_is_true(number):
     """By eigenvalues of the rig with one number changed; ``python tests/words_at_random.py 1000`` tries more."""
     for retry in range(20):

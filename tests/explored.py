@@ -74,5 +74,7 @@ def compared(explored, rig, branch=0):
     truth = np.array(analysis.eigenvalues)
     if len(numbers) != len(truth):
         return Difference(apart.verdicts, apart.critical, np.inf, apart.ends)
-    apart.eigenvalues = float(np.max(np.abs(numbers - truth) / np.abs(truth), initial=0.0))
+    with np.errstate(invalid="ignore"):
+        distance = np.where(numbers == truth, 0.0, np.abs(numbers - truth) / np.abs(truth))
+    apart.eigenvalues = float(np.max(distance, initial=0.0))
     return apart

@@ -124,6 +124,16 @@ def test_verdicts_are_those_of_python(law, contact, mass, drive):
         agrees(compared(explored, own.with_values({"stiffness": 9e9 * factor})))
 
 
+def test_without_a_spring_both_say_whether_anything_grows():
+    """One root is zero; weakening by velocity (b > a) makes another grow, strengthening leaves the place neutral."""
+    own = rig(stiffness=0.0, radiation_damping=0.0).with_values({"a": 0.01, "b": 0.02})
+    explored = Explored(own)
+    for b, (status, edge) in ((0.02, (2, False)), (0.005, (2, True))):
+        apart = compared(explored, own.with_values({"b": b}))
+        agrees(apart)
+        assert apart.verdicts[0][:2] == (status, edge)
+
+
 @pytest.mark.parametrize("who", USERS)
 def test_verdicts_on_users_laws_are_those_of_python(who):
     explored = Explored(USERS[who])

@@ -9,6 +9,8 @@ from dimensionless import unit_rig
 from rigs_of_theory import rate_state, rig
 from steadyslip.core.errors import ParameterError
 from steadyslip.linear.polynomials import roots
+from steadyslip.linear.status import on_edge
+from steadyslip.model.point import operating_point
 from words_at_random import false_sentences, some_rig
 
 
@@ -159,6 +161,23 @@ def test_without_stiffness_nothing_grows_or_dies(b, mass):
     assert text.startswith("ON THE EDGE")
     assert "nothing restores the block's place" in text
     assert "stable at every stiffness" not in text
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e3])
+def test_where_one_root_is_zero_and_another_grows_sliding_is_unstable(mass):
+    """Without a spring the place is neutral, but weakening by velocity (b > a) grows: no edge decides that."""
+    a_rig = rig(stiffness=0.0, mass=mass, radiation_damping=0.0).with_values({"a": 0.01, "b": 0.02})
+    found = ss.analyze(a_rig)
+    assert min(abs(s) for s in found.eigenvalues) < 1e-9 * max(s.real for s in found.eigenvalues)
+    assert (found.stable, found.on_edge) == (False, False)
+    text = str(found)
+    assert text.startswith("UNSTABLE")
+    assert "doubles in" in text
+    assert not any("edge of stability" in word for word in found.warnings)
+    several = ss.stability(a_rig, {"friction.b": np.array([0.005, 0.02])})
+    assert list(several) == ["unstable", "unstable"]  # neither dies out; only the second grows
+    on = on_edge(operating_point(a_rig, {"friction.b": np.array([0.005, 0.02])}))
+    assert list(on) == [True, False]
 
 
 @pytest.mark.parametrize("mass", [0.0, 1e12])

@@ -70,3 +70,20 @@ def is_near_edge(point: OperatingPoint, share: float) -> Any:
     if not point.model.delays:
         return np.abs(0.5 * nearness(point)[0]) <= share
     return (np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING)
+
+
+def outgrown(point: OperatingPoint, neutral: Any, share: float) -> NDArray[np.bool_]:
+    """Whether a disturbance grows by more than a share, whatever a root on the axis does; or at once.
+
+    Parameters
+    ----------
+    neutral : bool or ndarray of bool
+        Where one root is zero to within rounding: it does not count.
+    """
+    s = spectrum(point)
+    with np.errstate(all="ignore"):
+        size = np.abs(s)
+        grows = s.real > share * size
+        least = np.min(size, axis=-1, keepdims=True, where=~np.isnan(size), initial=np.inf)
+        grows &= ~(np.asarray(neutral)[..., None] & (size <= least))
+        return np.asarray(np.any(grows, axis=-1) | is_ill_posed(point))

@@ -13,7 +13,7 @@ from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear.crossing import share_left
 from steadyslip.linear.response import has_closed_form, response_numbers
-from steadyslip.linear.spectrum import is_near_edge, is_stable, static_sum
+from steadyslip.linear.spectrum import is_near_edge, is_stable, outgrown, static_sum
 from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -79,15 +79,16 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
     """Whether the verdict on a single rig changes as its numbers do in their last digits.
 
     So it does at an edge, and where terms of the equations cancel that are many orders of magnitude larger than what
-    is left of them.
+    is left of them; not where a disturbance grows beside one that an edge leaves as it is.
     """
     chance = np.random.default_rng(0)
     arguments = [
         value * (1 + np.finfo(float).eps * chance.uniform(-8.0, 8.0, LAST_DIGITS)) for value in point.arguments
     ]
     others = point.with_arguments(arguments, (LAST_DIGITS,))
-    neutral = static_sum(point) == 0  # an eigenvalue of zero, of which nothing is left
-    return bool(neutral | np.any(status(others) != status(point)))
+    if static_sum(point) == 0 and not np.all(outgrown(others, True, ON_THE_EDGE)):  # a root of zero, and none grows
+        return True
+    return bool(np.any(status(others) != status(point)))
 
 
 @question
@@ -100,7 +101,8 @@ def _static_terms(model: Model) -> Callable[..., list[Any]]:
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits.
 
-    Without any stiffness nothing restores the place of the block: that is static stiffness zero, too.
+    Without any stiffness nothing restores the place of the block: that is static stiffness zero, too. Where another
+    disturbance grows, sliding is unstable, and no edge decides.
     """
     with np.errstate(all="ignore"):
         undamped = is_near_edge(point, ON_THE_EDGE)
@@ -112,4 +114,6 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         else:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
-        return np.asarray(undamped | (share_left(terms) <= ON_THE_EDGE))
+        neutral = share_left(terms) <= ON_THE_EDGE
+        edge = np.asarray(undamped | neutral)
+        return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge

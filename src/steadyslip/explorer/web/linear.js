@@ -104,9 +104,16 @@ export class Linear {
       illPosed,
       side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
       frequency: critical === null ? null : edgewise,
-      onEdge: Math.abs(0.5 * dampingOfPairs(eigenvalues)) <= this.facts.edge || statics <= this.facts.edge,
+      onEdge: !illPosed && this.edgeDecides(eigenvalues, statics <= this.facts.edge),
       observed: Object.fromEntries(this.facts.observed.map(([name], i) => [name, observed[i]])),
     };
+  }
+
+  /** Whether a root on the axis decides: no other grows. @param {Complex[]} found @param {boolean} neutral whether one is zero */
+  edgeDecides(found, neutral) {
+    const { edge } = this.facts, least = Math.min(...found.map((s) => Math.hypot(s.re, s.im)));
+    const grows = found.some(({ re, im }) => re > edge * Math.hypot(re, im) && !(neutral && Math.hypot(re, im) <= least));
+    return (neutral || Math.abs(0.5 * dampingOfPairs(found)) <= edge) && !grows;
   }
 
   /** Stable k > 0, and the ends where stability changes; the closed form where there is one, which keeps its digits. */

@@ -204,6 +204,61 @@ def test_an_edge_in_the_list_goes_there(browser, file):
         assert "1 times the critical" in visit.page.inner_text(".verdict p")
 
 
+def edges_of(visit):
+    """The list of nearest edges as it is read: name and value."""
+    return dict(re.findall(r"(\S+) → (\S+)", visit.page.inner_text(".edges")))
+
+
+@pytest.mark.parametrize("far", [("friction.b", "1e10"), ("friction.b", "1600"), ("slider.stiffness", "1e-300 Pa/m")])
+def test_a_value_far_away_leaves_nothing_behind(browser, file, far):
+    """Edges, and where one lands, are the edge's own: no slider's range decides on them; reset brings ranges back."""
+    with Visit(browser, file) as visit:
+        before, track = edges_of(visit), visit.slider("friction.b").evaluate("e => e.style.cssText")
+        visit.type(*far)
+        if far[0] == "friction.b":
+            assert edges_of(visit)["friction.b"] == before["friction.b"], "edges are exact on every range"
+        for back in ("back to the rig", "undo"):
+            visit.page.get_by_role("button", name=back).click()
+            if back == "undo":
+                visit.page.get_by_role("button", name=back).click()
+            assert edges_of(visit) == before
+            assert visit.slider("friction.b").evaluate("e => e.style.cssText") == track
+        visit.type(*far)
+        visit.page.get_by_role("button", name=re.compile(r"^friction\.b →")).click()
+        if far[0] == "friction.b":
+            landed = float(visit.field("friction.b").input_value())
+            (edge,) = [one.value for one in ss.boundary(INCLINED, "friction.b")]
+            assert landed == pytest.approx(edge, rel=2e-4)
+
+
+def test_ranges_follow_a_link_and_the_critical_stiffness(browser, file):
+    """An open page shows a link as one does that is opened with it; the stiffness that is needed is in reach."""
+    link = "#friction.b=0.2&slider.stiffness=50000000000000"
+    with Visit(browser, file, link) as visit:
+        there = looks(visit)
+    with Visit(browser, file) as visit:
+        visit.page.evaluate(FOLLOW, link)
+        end = time.time() + 10
+        while visit.field("friction.b").input_value() != "0.2":
+            assert time.time() < end
+        assert looks(visit) == there
+        critical = ss.critical_stiffness(INCLINED.with_values({"friction.b": 0.2}))
+        assert edges_of(visit)["slider.stiffness"] == f"{critical / 1e9:.4g}"
+    with Visit(browser, file) as visit:
+        visit.type("friction.b", "0.5")
+        critical = ss.critical_stiffness(INCLINED.with_values({"friction.b": 0.5}))
+        assert critical > 30 * 9e9, "beyond the range of the rig of the file"
+        assert edges_of(visit)["slider.stiffness"] == f"{critical / 1e9:.4g}"
+        assert "--stable" in visit.slider("slider.stiffness").get_attribute("style")
+        row = next(line for line in visit.saved("values and edges").splitlines() if "slider.stiffness" in line)
+        assert float(row.split(",")[2]) == pytest.approx(critical, rel=1e-12)
+
+
+def looks(visit):
+    tracks = "[...document.querySelectorAll('input[type=range]')].map((e) => e.value + e.style.cssText)"
+    return visit.sentence(), edges_of(visit), visit.page.evaluate(tracks)
+
+
 def test_files_and_links_carry_every_digit(browser, file, tmp_path):
     with Visit(browser, file) as visit:
         visit.type("friction.a", "0.0123456789012345")

@@ -13,12 +13,15 @@ import { Rig, inside, rangeOf, scaleOf } from "./rig.js";
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
 const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
 const PARTS = 60; // of a track, at whose ends the status is asked for
+const BEYOND = 1e-4; // how far behind an edge one lands that goes there, of its value
+const DRAWN = 1e150; // numbers beyond that, and below its inverse, lie off every scale
 
 export class Page {
   /** @type {any} */ answer;
   // furnished once the verdict is to be seen
-  /** @type {[number, number][]} */ ranges;
-  /** @type {{from: number, to: number, status: number, below: number}[][]} */ tracks;
+  /** @type {[number, number][]} */ home; // ranges of the rig of the file
+  /** @type {[number, number][]} */ ranges; // those of now
+  /** @type {{from: number, to: number, at: number, status: number}[][]} */ tracks; // position and value of each end
   /** @type {Controls} */ controls;
   /** @type {Chart} */ chart;
   /** @type {Facts} */ facts;
@@ -50,12 +53,13 @@ export class Page {
   /** Everything below the verdict. @param {() => any} library */
   furnish(library) {
     const { rig, root } = this, { data } = rig, values = rig.values;
-    rig.values = data.parameters.map((one) => one.value); // ranges are those of the rig of the file
-    this.ranges = data.parameters.map((_, i) => rangeOf(rig, i));
+    rig.values = data.parameters.map((one) => one.value);
+    this.home = data.parameters.map((_, i) => rangeOf(rig, i));
+    this.fit(rig.values);
     this.tracks = data.parameters.map((_, i) => this.track(i));
     const k = Math.max(0, data.parameters.findIndex((one) => one.name === data.stiffness)), [first] = this.edges().filter((edge) => edge.i !== k);
     rig.values = values;
-    values.forEach((value, i) => this.reach(i, value));
+    this.fit(values);
     this.controls = new Controls(this);
     this.chart = new Chart(this, [first ? first.i : k === 0 ? 1 % data.parameters.length : 0, k]); // the edge that is nearest
     this.facts = new Facts(this);
@@ -72,7 +76,7 @@ export class Page {
       this.course.draw();
     }).observe(root);
     window.addEventListener("hashchange", () => {
-      if (!this.told && location.hash !== rig.hash()) this.change(rig.fromHash(location.hash));
+      if (!this.told && location.hash !== rig.hash()) this.put(rig.fromHash(location.hash));
     });
     root.dataset.ready = "yes";
   }
@@ -90,7 +94,7 @@ export class Page {
     this.redoButton = button("↷", "redo", () => this.step(this.future, this.past));
     const { title, version, parameters } = this.rig.data;
     this.tools = make("div", { className: "tools", role: "toolbar", "aria-label": "page" }, this.undoButton, this.redoButton,
-      button("reset", "back to the rig of the file", () => this.change(parameters.map((one) => one.value))));
+      button("reset", "back to the rig of the file", () => this.put(parameters.map((one) => one.value))));
     return make("header", {}, make("p", { className: "brand" }, make("b", { textContent: title }), ` explored with steadyslip ${version}`), this.tools);
   }
 
@@ -104,17 +108,35 @@ export class Page {
     return scaleOf(this.rig.data.parameters[i], ...this.ranges[i]);
   }
 
-  /** Widen the range of a parameter to hold a value. */
+  /** Widen the range of a parameter to hold a value, if that can be drawn. */
   reach(i, value) {
-    const [low, high] = this.ranges[i];
-    if (value !== 0 && (value < low || value > high)) this.ranges[i] = [Math.min(low, value > 0 ? value / 3 : value * 3), Math.max(high, value * 3)];
+    const [low, high] = this.ranges[i], size = Math.min(DRAWN, Math.max(1 / DRAWN, Math.abs(value)));
+    if (value > 0 && (value < low || value > high)) this.ranges[i] = [Math.min(low, size / 3), Math.max(high, size * 3)];
+    else if (value < 0 && value < low) this.ranges[i] = [-size * 3, high];
+  }
+
+  /** Ranges for values that no hand has set: those of the rig of the file, widened where the values lie outside. */
+  fit(values) {
+    if (!this.home) return;
+    this.ranges = this.home.slice();
+    values.forEach((value, i) => this.reach(i, value));
+  }
+
+  /** The slider of the stiffness reaches to the critical one, which other parameters move. */
+  follow() {
+    const { answer, rig: { data, values } } = this, i = data.parameters.findIndex((one) => one.name === data.stiffness);
+    if (i < 0 || answer.critical === null) return;
+    const { critical, share, gain, stiffness } = answer, { name } = data.parameters[i];
+    if (i === data.axial) this.reach(i, critical / share);
+    else if (name === "slider.stiffness") this.reach(i, critical);
+    else if (gain > 0) this.reach(i, (values[i] * (critical + gain - stiffness)) / gain); // the gain takes part as a spring does
   }
 
   // -- changes
 
   /** New values, to be undone. @param {number[]} values @param {boolean} [same] whether it goes on with the last change */
   change(values, same = false) {
-    if (values.every((value, i) => Object.is(value, this.rig.values[i]))) return;
+    if (this.rig.has(values)) return;
     if (!same) {
       this.past = [...this.past.slice(-199), this.rig.values];
       this.course?.keep();
@@ -124,11 +146,19 @@ export class Page {
     this.redraw();
   }
 
+  /** New values that no hand on a slider has set. @param {number[]} values */
+  put(values) {
+    if (this.rig.has(values)) return;
+    this.fit(values);
+    this.change(values);
+  }
+
   step(from, to) {
     const values = from.pop();
     if (!values) return;
     to.push(this.rig.values);
     this.rig.values = values;
+    this.fit(values);
     this.course?.keep();
     this.redraw();
   }
@@ -141,8 +171,7 @@ export class Page {
 
   /** A value that was typed. */
   place(i, value) {
-    this.reach(i, value);
-    this.change(this.with(i, value));
+    this.put(this.with(i, value));
     this.redraw();
   }
 
@@ -181,18 +210,20 @@ export class Page {
 
   // -- what follows from the values
 
-  /** Positions between 0 and 1 where a track changes, with what is between. */
+  /** Positions between 0 and 1 where a track changes, and values, with what is between. */
   track(i) {
     const scale = this.scale(i), parts = [];
-    let before = this.rig.status(i, scale.at(0)), from = 0;
+    let low = scale.at(0), before = this.rig.status(i, low), from = 0;
     for (let n = 1; n <= PARTS; n++) {
-      const next = this.rig.status(i, scale.at(n / PARTS));
-      if (next === before) continue;
-      const [low, high] = this.rig.narrowed(i, scale, (n - 1) / PARTS, n / PARTS);
-      parts.push({ from, to: high, status: before, below: low });
-      [from, before] = [high, next];
+      const high = scale.at(n / PARTS), next = this.rig.status(i, high);
+      if (next !== before) {
+        const at = this.rig.narrowed(i, low, high), to = scale.of(at);
+        parts.push({ from, to, at, status: before });
+        [from, before] = [to, next];
+      }
+      low = high;
     }
-    parts.push({ from, to: 1, status: before, below: 1 });
+    parts.push({ from, to: 1, at: low, status: before });
     return parts;
   }
 
@@ -200,13 +231,13 @@ export class Page {
   edges() {
     const found = [];
     this.rig.data.parameters.forEach((one, i) => {
-      const scale = this.scale(i), value = this.rig.values[i];
-      const parts = this.tracks[i];
+      const first = this.scale(i).at(0), value = this.rig.values[i], parts = this.tracks[i];
       let best = null;
       parts.slice(0, -1).forEach((part, n) => {
-        const at = scale.at(part.to), other = parts[n + 1].status, away = at > value;
+        const { at } = part, other = parts[n + 1].status, away = at > value;
         const beyond = away ? other : part.status, distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
-        const landing = scale.at(Math.min(1, Math.max(0, part.to + (away ? 1e-4 : -1e-4))));
+        const width = away ? parts[n + 1].at - at : at - (n ? parts[n - 1].at : first);
+        const landing = at + (away ? 1 : -1) * Math.min(BEYOND * Math.abs(at) || width, 0.5 * width);
         if (best === null || distance < best.distance || (!value && at < best.at)) best = { i, at, distance: value ? distance : 1e6, beyond, landing };
       });
       if (best) found.push(best);
@@ -229,6 +260,7 @@ export class Page {
 
   redraw() {
     this.judge();
+    if (this.home && !this.sliding) this.follow();
     this.undoButton.disabled = !this.past.length;
     this.redoButton.disabled = !this.future.length;
     if (!this.controls) return;
@@ -266,7 +298,7 @@ export function render(model, element, data, programs, library) {
   });
   const take = () => {
     const given = model.get("values"), { values } = page.rig;
-    page.change(names.map((name, i) => (inside(data.parameters[i], given[name]) ? given[name] : values[i])));
+    page.put(names.map((name, i) => (inside(data.parameters[i], given[name]) ? given[name] : values[i])));
   };
   take();
   model.on("change:values", take);

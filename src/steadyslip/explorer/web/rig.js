@@ -49,15 +49,20 @@ export class Rig {
     return this.set(this.trial).status(this.data.branch);
   }
 
-  /** Where the status changes between two positions of a scale, to rounding of the position. */
-  narrowed(i, scale, low, high) {
-    const before = this.status(i, scale.at(low));
-    for (let step = 0; step < 50 && high - low > 1e-13; step++) {
-      const middle = 0.5 * (low + high);
-      if (this.status(i, scale.at(middle)) === before) low = middle;
+  /** Where the status changes between two values, to rounding of the value: the first that has the other. */
+  narrowed(i, low, high) {
+    const before = this.status(i, low), least = low === 0 ? 1e-12 * high : 0;
+    for (let step = 0; step < 200 && high - low > Math.max(least, 1e-13 * Math.max(Math.abs(low), Math.abs(high))); step++) {
+      const middle = low > 0 && high > 4 * low ? Math.sqrt(low) * Math.sqrt(high) : 0.5 * (low + high);
+      if (this.status(i, middle) === before) low = middle;
       else high = middle;
     }
-    return [low, high];
+    return high;
+  }
+
+  /** Whether these are the values of now. @param {number[]} values */
+  has(values) {
+    return values.every((value, i) => Object.is(value, this.values[i]));
   }
 
   /** Answers of Python that travel with the page, compared: what differs, in words. */
@@ -121,7 +126,7 @@ export function scaleOf(one, low, high) {
   const from = one.value === 0 && one.lowAllowed ? ZERO : 0, ratio = Math.log(high / low);
   return {
     at: (t) => (t < from ? 0 : low * Math.exp(((t - from) / (1 - from)) * ratio)),
-    of: (v) => (v <= 0 ? 0 : from + (1 - from) * (Math.log(v / low) / ratio)),
+    of: (v) => (v <= 0 ? 0 : Math.max(0, from + (1 - from) * (Math.log(v / low) / ratio))),
   };
 }
 

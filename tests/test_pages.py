@@ -17,12 +17,14 @@ from command import run
 from fuzz_rigs import DRIVES, FRICTION
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
+from steadyslip.explorer.sketch import sketch
 from steadyslip.files.standalone import write_page
 from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import math, table, typed
 from steadyslip.reports.results import LISTED, _told_apart
+from steadyslip.reports.rig import inputs
 from unpainted import unpainted  # noqa: F401 -- a fixture
 
 MACHINES = Path(__file__).parents[1] / "examples" / "machines"
@@ -171,6 +173,19 @@ def test_rigs_with_an_area_are_told_in_newtons():
 
 
 # -- documents
+
+
+@pytest.mark.parametrize("made", [inputs, brief])
+def test_inputs_are_in_the_units_of_the_rigs_file(made):
+    """With an area forces, masses and stiffnesses of all of it, in reports and in notebooks."""
+    words = re.sub("<[^>]+>", " ", made(ss.read_rig("examples/slow-axis.toml")))
+    assert all(f" {value} " in words for value in ("600 N", "8 kg", "50 N s/m", "600 kN/m", "2 kN s/m", "0.004 m²"))
+    assert not re.search(r"Pa\b|kg/m|normal stress", words)
+
+
+@pytest.mark.parametrize(("drive", "name"), [(ss.PD(V0, kp=9e9, kd=0.0), "PD"), (ss.PID(V0, kp=9e9, ki=1e8), "PID")])
+def test_sketches_name_the_controller_that_drives(drive, name):
+    assert f">{name}</text>" in sketch(rig(stiffness=None, drive=drive))
 
 
 def test_a_report_says_everything_about_a_rig():

@@ -164,7 +164,8 @@ def _load(rig: Slider) -> str:
     bar = _path((x, y - 14), (x, y + 14)) if rig.damping else ""
     point = f'<circle cx="{x:.5g}" cy="{y:.5g}" r="4" fill="currentColor"/>'
     if rig.drive.proportional():
-        point = f'<rect x="{x - 2:.5g}" y="{y - 12:.5g}" width="34" height="24"/>' + _text(x + 15, y + 4, "PID")
+        name = "PID" if rig.drive.integral() else "PD"
+        point = f'<rect x="{x - 2:.5g}" y="{y - 12:.5g}" width="34" height="24"/>' + _text(x + 15, y + 4, name)
         x += 28
     start = (x - 10, y - 16) if _pushed(rig) or rig.contact.shape().part == "crank" else (x + 8, y)
     arrow = _arrow(start, (start[0] + 26, start[1])) + _text(start[0] + 12, start[1] - 8, "v₀")

@@ -16,10 +16,11 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, shown_range
+from steadyslip.core.quantities import shown, shown_range, stress_name
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.explorer.sketch import sketch
 from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.reports.drawings import drawn
@@ -139,13 +140,13 @@ def _record(record: FrozenRecord) -> Iterator[str]:
     for path, one in (record.parameters() if isinstance(record, Machine) else parameters(record)).items():
         if one.value is not None:
             values = np.asarray(one.value)
-            area = record.area_of(path) if isinstance(record, Machine) else None
+            area = record.area_of(path) if isinstance(record, Rig) else None
             words = (
                 shown(float(values), one.role.unit, 6, area)
                 if values.ndim == 0
-                else _array(values, one.role.unit, None)
+                else _array(values, one.role.unit, area)
             )
-            rows.append((path, words, one.role.doc))
+            rows.append((path, words, stress_name(one.role.doc, area)))
     yield table(rows, ("parameter", "value", "meaning"))
 
 

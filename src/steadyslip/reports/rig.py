@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from steadyslip import figures
 from steadyslip.core.errors import NotAvailable, ParameterError
-from steadyslip.core.quantities import shown
+from steadyslip.core.quantities import shown, stress_name
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications import rig_to_text
@@ -65,14 +65,16 @@ def in_a_sentence(analysis: Verdict) -> str:
 
 
 def inputs(rig: Slider) -> str:
-    """Every number of a rig with its letter, unit and meaning."""
+    """Every number of a rig with its letter, unit and meaning; totals where the rig has an area."""
     symbols = build_model(rig).parameters
     rows = []
     for name, one in rig.parameters().items():
         if one.value is None:
             continue
         known = letter(symbols[name]) if name in symbols else Markup("")
-        rows.append((name, known, shown(one.value, one.role.unit, 6), one.role.doc))
+        rows.append(
+            (name, known, shown(one.value, one.role.unit, 6, rig.area_of(name)), stress_name(one.role.doc, rig.area))
+        )
     return table(rows, ("parameter", "letter", "value", "meaning"))
 
 

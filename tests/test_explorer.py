@@ -222,6 +222,28 @@ def test_links_and_files_keep_every_digit(page_of_own, a, k, psi):
     np.testing.assert_array_equal(ss.critical_stiffness(again), ss.critical_stiffness(own))  # NaN where there is none
 
 
+# -- drawings
+
+TURNS = """const box = { left: 60, top: 8, width: 290, height: 220 }, turns = [];
+for (let i = 0; i < 200000; i++) turns.push(0.7 * i + 0.001 * Math.sin(i));
+const square = straight(-1.1, 1.1), drawn = pathThrough(box, turns.map(Math.cos), turns.map(Math.sin), square, square);
+const once = turns.slice(0, 9);"""
+
+
+def test_a_path_that_goes_round_and_round_is_as_long_as_the_drawing_can_show():
+    """Tens of thousands of turns over the same way would take a browser seconds at each repaint."""
+    code = parts(OWN, "A rig", 0)[0]
+    script = Script(f"{code}\n{TURNS}")
+    path = script("drawn")
+    assert len(path) < 60_000
+    points = np.array([part.split() for part in re.findall(r"[\d.]+ [\d.]+", path)], dtype=float)
+    angles = np.sort(np.arctan2((points[:, 1] - 118) / 100, (points[:, 0] - 205) / 131.8))
+    assert np.diff(angles).max() < 0.05, "all of it is drawn"
+    once = script("pathThrough(box, once.map(Math.cos), once.map(Math.sin), square, square)")
+    assert once.count("M") == 1
+    assert once.count("L") == 8
+
+
 # -- motion
 
 MOVING = {

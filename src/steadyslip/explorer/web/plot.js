@@ -109,13 +109,28 @@ export function strip(box, curves, until, unit, label, last) {
   return { group, up: up.scale };
 }
 
-/** The path of one series over another; points closer than half a unit are left out. */
-function pathThrough(box, xs, ys, across, up) {
-  let path = "", lastX = NaN, lastY = NaN;
+/** The path of one series over another: points closer than half a unit, and ways over units all drawn before, are left out. */
+export function pathThrough(box, xs, ys, across, up) {
+  const wide = Math.ceil(box.width) + 2, drawn = new Uint8Array(wide * (Math.ceil(box.height) + 2));
+  let path = "", lastX = NaN, lastY = NaN, down = false; // whether the pen is where the last point was
+  const isNew = (x, y) => { // whether the way there goes over a unit that has nothing yet
+    const steps = Math.ceil(Math.max(Math.abs(x - lastX), Math.abs(y - lastY), 1));
+    let found = false;
+    for (let k = 0; k <= steps; k++) {
+      const cell = Math.floor(lastX + (k / steps) * (x - lastX) - box.left) + wide * Math.floor(lastY + (k / steps) * (y - lastY) - box.top);
+      if (!drawn[cell]) found = true;
+      drawn[cell] = 1;
+    }
+    return found;
+  };
   for (let i = 0; i < xs.length; i++) {
     const x = box.left + across.of(xs[i]) * box.width, y = box.top + (1 - up.of(ys[i])) * box.height;
     if (Math.abs(x - lastX) + Math.abs(y - lastY) < 0.5 || !Number.isFinite(x + y)) continue;
-    path += `${path ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`;
+    if (!Number.isNaN(lastX) && isNew(x, y)) {
+      if (!down) path += `M${lastX.toFixed(1)} ${lastY.toFixed(1)}`;
+      path += `L${x.toFixed(1)} ${y.toFixed(1)}`;
+      down = true;
+    } else down = false;
     [lastX, lastY] = [x, y];
   }
   return path;

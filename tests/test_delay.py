@@ -104,6 +104,7 @@ def test_counted_and_rightmost_roots_are_those_of_the_discretised_equation(terms
             assert np.min(np.abs(found - one)) < 1e-6 * max(1.0, abs(one)), seed
 
 
+@pytest.mark.campaign
 def test_edges_of_delays_are_those_of_the_discretised_equation():
     seen = 0
     for seed in range(20):
@@ -146,6 +147,7 @@ def test_windows_of_what_enters_linearly_are_those_of_counting():
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.campaign
 def test_late_machines_at_random_have_the_roots_of_theory_11s_matrix(seed):
     machine, matrix = at_random(seed, delay=0.05 * (1 + seed))
     found = ss.eigenvalues(machine)

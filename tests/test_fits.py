@@ -33,6 +33,7 @@ from steadyslip.experiments.numerics.noise import lag_one
         (lab.two_states(), replace(lab.STEP, until=400.0), ss.lab_rig(states=2), ()),
     ],
 )
+@pytest.mark.campaign
 def test_the_truth_comes_back_from_no_guess(rig, protocol, guess, jumps):
     for uniform in (True, False):  # in one test, so that one kernel is compiled once
         record = lab.record(rig, protocol, seed=8, uniform=uniform)

@@ -2,8 +2,6 @@
 
 import dataclasses
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import steadyslip as ss
+from command import run
 from machines import at_random, brake, coulomb, rate_state, same_block, surface, two_blocks, two_mass
 from steadyslip.model.point import operating_point
 from steadyslip.model.reduction import SLOPES, TIME, P, Q, reduce_model
@@ -419,6 +418,7 @@ def slopes_of_motion(machine):
 
 
 @pytest.mark.parametrize("seed", range(16))
+@pytest.mark.campaign
 def test_small_motion_has_the_eigenvalues_of_the_linear_verdict(seed):
     """Machines of one to four bodies, some without mass: two routes from the Model to the same numbers."""
     machine = at_random(seed)[0]
@@ -495,13 +495,12 @@ def test_pore_fluid_follows_in_motion():
 
 
 def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "steadyslip", "simulate", "examples/machines/feed-axis.toml", "--until", "10 s",
-         "--protocol", "velocity-step at=1s to='0.06 rpm'",
-         "--protocol", "disturbance-pulse at=5s by='100 N' duration=1s on=table", "--json",
-         "-o", str(tmp_path / "run.csv")],
-        capture_output=True, text=True, cwd=ROOT, check=True,
+    done = run(
+        "simulate", ROOT / "examples/machines/feed-axis.toml", "--until", "10 s",
+        "--protocol", "velocity-step at=1s to='0.06 rpm'",
+        "--protocol", "disturbance-pulse at=5s by='100 N' duration=1s on=table", "--json", "-o", tmp_path / "run.csv",
     )  # fmt: skip
+    assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["status"] == "done"
     assert found["units"]["motor.v"] == "rad/s"
@@ -509,10 +508,9 @@ def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
     assert found["final"]["load_velocity"] == pytest.approx(0.06 * 2 * np.pi / 60)
     assert found["final"]["guide.normal_force"] == pytest.approx(3000.0)
     assert "motor.v (rad/s)" in (tmp_path / "run.csv").read_text().splitlines()[0]
-    wrong = subprocess.run(
-        [sys.executable, "-m", "steadyslip", "simulate", "examples/machines/feed-axis.toml", "--until", "10 s",
-         "--protocol", "velocity-step at=1s to='1 mm/s'"],
-        capture_output=True, text=True, cwd=ROOT, check=False,
+    wrong = run(
+        "simulate", ROOT / "examples/machines/feed-axis.toml", "--until", "10 s",
+        "--protocol", "velocity-step at=1s to='1 mm/s'",
     )  # fmt: skip
     assert wrong.returncode == 2
     assert "rad/s" in wrong.stderr

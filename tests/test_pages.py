@@ -363,6 +363,7 @@ def test_answers_of_records_have_documents(lab_results, name, request):
 @pytest.mark.usefixtures("unpainted")
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(0, len(FRICTION) * len(CONTACTS), 37))
+@pytest.mark.campaign
 def test_reports_of_all_kinds_of_rigs_fit(number):
     law, contact = FRICTION[number % len(FRICTION)], CONTACTS[number % len(CONTACTS)]
     own = ss.Slider(friction=law, contact=contact, stiffness=9e9, mass=1e6 * (number % 2), drive=DRIVES[number % 3])

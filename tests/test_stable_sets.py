@@ -22,6 +22,7 @@ from steadyslip.model.range import characteristic
 @pytest.mark.parametrize("friction", ONE_MEMORY, ids=lambda law: type(getattr(law, "evolution", law)).__name__)
 @pytest.mark.parametrize("contact", CONTACTS, ids=lambda law: law.name)
 @pytest.mark.parametrize("inertia", [False, True])
+@pytest.mark.campaign
 def test_both_routes_agree_on_random_rigs(friction, contact, inertia):
     """Closed form against Jacobian on 40 random rigs of each kind: some 5000 rigs in all."""
     rng = np.random.default_rng(7)

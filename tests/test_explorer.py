@@ -177,6 +177,14 @@ def test_shortened_code_says_the_same():
     assert _dense(generated) == "function f(R,x,y){\nvar t1=R[0]-(-2.5e-07);\ny[0]=(t1>=0)?t1:(1/x);\n}\n"
 
 
+def test_no_two_parameters_of_a_part_are_called_the_same():
+    own = next(one for one in FRICTION if len(getattr(one, "states", ())) > 1)
+    known = parts(rig(friction=own), "A rig", 0)[1]["parameters"]
+    called = [(one["name"].partition(".")[0], one["label"]) for one in known]
+    assert len(set(called)) == len(called)
+    assert {("friction", "a"), ("friction", "states.1.b"), ("friction", "states.2.b")} <= set(called)
+
+
 # -- links and files
 
 OWN = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)

@@ -6,7 +6,7 @@ import html
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from typing import Any
 
@@ -177,7 +177,7 @@ def _parameter(rig: Slider, name: str, branch: int) -> dict[str, Any]:
     natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
     return {
         "name": name,
-        "label": name.rpartition(".")[2],
+        "label": _label(name, rig.parameters()),
         "doc": one.role.doc,
         "unit": unit,
         "factor": factor,
@@ -190,6 +190,14 @@ def _parameter(rig: Slider, name: str, branch: int) -> dict[str, Any]:
         "whole": domain.whole,
         "allowed": domain.text,
     }
+
+
+def _label(name: str, names: Iterable[str]) -> str:
+    """A name below the heading of its part: the last word, or all behind the part where several end so."""
+    part, _, rest = name.partition(".")
+    last = name.rpartition(".")[2]
+    alike = [one for one in names if one.partition(".")[0] == part and one.rpartition(".")[2] == last]
+    return last if len(alike) == 1 else rest
 
 
 def _template(rig: Slider, names: list[str]) -> str:

@@ -201,7 +201,7 @@ def test_an_edge_in_the_list_goes_there(browser, file):
     with Visit(browser, file) as visit:
         visit.page.get_by_role("button", name=re.compile(r"^slider\.stiffness →")).click()
         assert visit.sentence().startswith("Stable")
-        assert "1 times the critical" in visit.page.inner_text(".verdict p")
+        assert "is 1.0001 times the critical" in visit.page.inner_text(".verdict p"), "not 1 times, as on the edge"
 
 
 def edges_of(visit):
@@ -531,6 +531,25 @@ def test_other_rigs_have_pages_too(browser, tmp_path, name):
     again = ss.rig_from_text(text)
     assert ss.analyze(again).critical_stiffness == analysis.critical_stiffness
     assert ss.analyze(again).eigenvalues == analysis.eigenvalues
+
+
+def test_the_bar_paints_no_stiffness_that_a_gain_rules_out(browser, tmp_path):
+    """A rig that is stable whatever stiffness is beside its gain: nothing of its bar is painted unstable."""
+    own = RIGS["controller"].with_values({"drive.kp": 9e11})
+    assert ss.analyze(own).stable_stiffness[0][0] == 0
+    ss.explore(own).save(tmp_path / "rig.html")
+    with Visit(browser, tmp_path / "rig.html") as visit:
+        assert "Stable whatever the stiffness beside the gain, 900 GPa/m." in visit.page.inner_text(".verdict p")
+        bar = visit.page.locator(".bar")
+        assert "gain now 900 GPa/m" in bar.inner_text()
+        assert bar.get_attribute("aria-label").endswith("the gain is 900 GPa/m: any")
+        boxes = [bar.locator(f".{name}").bounding_box() for name in ("unstable", "unknown", "stable")]
+        assert boxes[1]["width"] + boxes[2]["width"] == pytest.approx(boxes[0]["width"], abs=1.0)
+
+
+def test_numbers_off_every_scale_are_drawn_at_its_end(browser, file):
+    with Visit(browser, file, "#slider.stiffness=1e-320") as visit:
+        assert "NaN" not in visit.page.evaluate("document.querySelector('.steadyslip').innerHTML")
 
 
 AXE = """async () => (await axe.run()).violations.filter((one) => ["serious", "critical"].includes(one.impact))

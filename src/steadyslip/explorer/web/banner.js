@@ -4,6 +4,8 @@ import { ABSENT } from "./linear.js";
 import { ticks } from "./plot.js";
 import { headline, kindOf, quantity, reason } from "./words.js";
 
+const DECADE = Math.log(10); // on both sides of what is marked
+
 /** Marks or labels of a bar: class, place in per cent and text; only what is new is written. */
 function placed(box, rows, name) {
   while (box.children.length > rows.length) box.lastChild.remove();
@@ -22,7 +24,7 @@ export class Banner {
     this.data = data;
     this.sentence = make("h1", {});
     this.reason = make("p", {});
-    this.paths = ["unstable", "stable"].map((name) => svg("path", { class: name }));
+    this.paths = ["unstable", "unknown", "stable"].map((name) => svg("path", { class: name }));
     this.marks = make("div", {});
     this.labels = make("div", {});
     this.bar = make("div", { className: "bar", role: "img" }, svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, ...this.paths), this.marks, this.labels);
@@ -44,25 +46,28 @@ export class Banner {
     const stiffness = (k) => quantity(k, "Pa/m", this.data.area);
     const intervals = answer.intervals.map(({ low, high }) => ({ low: low + gain, high: high + gain }));
     const ends = answer.intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k)).map((k) => k + gain);
-    const marks = [...ends, own].filter((k) => k > 0);
+    const marks = [...ends, own, gain].filter((k) => k > 0);
     if (!marks.length || answer.status === ABSENT) {
       this.bar.hidden = true;
       this.bar.setAttribute("aria-label", "no stiffness is stable");
       return;
     }
     this.bar.hidden = false;
-    const low = Math.log(Math.min(...marks) / 10), high = Math.log(Math.max(...marks) * 10);
+    const low = Math.log(Math.min(...marks)) - DECADE, high = Math.log(Math.max(...marks)) + DECADE;
     const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
-    const drawn = `M0 0H100V10H0Z|${intervals.map((one) => `M${x(one.low)} 0H${x(one.high)}V10H${x(one.low)}Z`).join("")}`.split("|");
+    const least = gain > 0 ? `M0 0H${x(gain)}V10H0Z` : ""; // less than the gain alone is not to be had
+    const drawn = `M0 0H100V10H0Z|${least}|${intervals.map((one) => `M${x(one.low)} 0H${x(one.high)}V10H${x(one.low)}Z`).join("")}`.split("|");
     this.paths.forEach((path, n) => put(path, "d", drawn[n]));
     const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low)), per = this.data.area ?? 1;
     const scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).map((k) => k / per).filter((k) => x(k) > 6 && x(k) < 94);
     const marked = [...scale.map((k) => ["tick", x(k), ""]), ["own", x(own), ""], ...ends.map((k) => ["edge", x(k), ""])];
-    const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `stiffness now ${stiffness(own)}`],
+    const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `${gain > 0 ? "gain" : "stiffness"}${gain > 0 && own > gain ? " and stiffness" : ""} now ${stiffness(own)}`],
+      ...(own > gain && gain > 0 && !ends.length ? [["", within(gain), `the gain alone ${stiffness(gain)}`]] : []),
       ...ends.map((k) => ["", within(k), `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`])];
     placed(this.marks, marked, "i");
     placed(this.labels, labels, "span");
-    const words = intervals.map(({ low: a, high: b }) => (b === Infinity ? `above ${stiffness(a)}` : `${stiffness(a)} to ${stiffness(b)}`));
-    put(this.bar, "aria-label", `stable stiffness: ${words.join(", or ") || "none"}`);
+    const words = intervals.map(({ low: a, high: b }) => (b < Infinity ? `${stiffness(a)} to ${stiffness(b)}` : a > gain ? `above ${stiffness(a)}` : "any"));
+    const what = gain > 0 ? `stiffness and gain together, of which the gain is ${stiffness(gain)}` : "stiffness";
+    put(this.bar, "aria-label", `stable ${what}: ${words.join(", or ") || "none"}`);
   }
 }

@@ -33,14 +33,17 @@ export function reason(answer, data) {
   if (answer.status === UNKNOWN) return "A number leaves its range, or breaks a condition that several obey together.";
   if (answer.illPosed) return "The equations are ill-posed here: the model misses an inertia or a direct effect that matters.";
   const { critical, gain, share } = answer, stiffness = (k) => quantity(k, "Pa/m", data.area);
-  if (critical === null) return answer.intervals.length ? "Stable at every stiffness." : "No stiffness makes this sliding stable.";
+  if (critical === null) return answer.intervals.length ? (gain > 0 ? `Stable whatever the stiffness beside the gain, ${stiffness(gain)}.` : "Stable at every stiffness.") : "No stiffness makes this sliding stable.";
   const total = answer.stiffness + gain, edge = critical + gain, what = gain ? "Stiffness and gain together, " : "The stiffness ";
   const alone = answer.intervals.length === 1 && (answer.side === "above" ? answer.intervals[0].high === Infinity : answer.intervals[0].low === 0);
   const period = answer.frequency ? ` At the critical stiffness a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / answer.frequency, "s").replace(" ", "\u00a0")}.` : "";
   const along = data.axial >= 0 ? ` (${stiffness(edge / share)} along the axis)` : "";
   const tail = alone ? `, ${answer.side} which sliding is stable.${period}` : `, the nearest edge of what is stable.${period}`;
-  return `${what}${stiffness(total)}${gain ? ", are" : " is"} ${digits(total / edge, 3)} times the critical ${stiffness(edge)}${along}${tail}`;
+  return `${what}${stiffness(total)}${gain ? ", are" : " is"} ${ratio(total / edge)} times the critical ${stiffness(edge)}${along}${tail}`;
 }
+
+/** How many times something is something else: with as many digits as tell it from once. */
+const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math.log10(Math.abs(many - 1) || 1)))));
 
 /** What came of a motion. @param {any} course @param {number | null} area */
 export function outcome({ events, status, end, v }, area) {

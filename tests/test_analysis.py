@@ -2,12 +2,16 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import steadyslip as ss
+from rigs_of_theory import CONTACTS
+from steadyslip.verdict.holding import hold
+from steadyslip.verdict.words import facts
 
 PAPER = ss.read_rig(Path(__file__).parents[1] / "examples" / "inclined-spring.toml")
 PLAIN = ss.Slider(
@@ -183,6 +187,26 @@ def test_controllers_are_judged_by_their_gain():
     rig = ss.Slider(friction=PLAIN.friction, contact=PLAIN.contact, drive=ss.PD(1e-6, kp=4e9))
     assert "gain kp, 4 GPa/m, is 0.8 times the critical 5 GPa/m" in ss.analyze(rig).reason
     assert all(edge.value > 0 for edge in ss.boundary(rig, "kp"))
+
+
+@pytest.mark.parametrize("contact", range(0, len(CONTACTS), 4))
+@pytest.mark.parametrize(("drive", "mass"), [(ss.PD(1e-6, kp=4e9, kd=1e9), 0.0), (ss.PID(1e-6, kp=4e9, ki=1e8), 1e6)])
+def test_a_gain_that_is_all_the_stiffness_is_what_is_said_to_be_stable(drive, mass, contact):
+    """The same edges as those of a spring beside the gain, the gain added; none is lost below the gain."""
+    rig = ss.Slider(friction=PLAIN.friction, contact=CONTACTS[contact], drive=drive, mass=mass)
+    found = ss.analyze(rig)
+    held = hold(found)
+    assert (held.name, held.own, held.beside) == ("gain kp", 4e9, 0.0)
+    small = [end for pair in hold(ss.analyze(rig.with_values({"kp": 1.0}))).stable for end in pair]
+    assert [end for pair in held.stable for end in pair] == pytest.approx(small, rel=1e-9)
+    beyond = [max(end - 4e9, 0.0) for end in small if end > 4e9]
+    assert [end for pair in found.stable_stiffness for end in pair if end] == pytest.approx(beyond, rel=1e-8)
+    assert "stiffness" not in found.reason.partition(":")[0]
+    (words,) = [words for name, words in facts(found) if name == "stable for"]
+    assert "gain kp" in words
+    assert "stiffness" not in words
+    beside = ss.analyze(replace(rig, stiffness=1e9))
+    assert "stiffness beside the gain kp" in dict(facts(beside))["stable for"]
 
 
 def test_only_rigs_are_judged():

@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.figures.style import BLACK, VERMILION, axes_or_new, display_unit, labelled
-from steadyslip.linear import critical_stiffness, eigenvalues, stable_stiffness
+from steadyslip.linear import eigenvalues, stable_stiffness, stable_values
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
@@ -23,19 +23,20 @@ _FAST = 1e3  # an eigenvalue faster than the slowest by more would leave the oth
 
 
 def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Axes:
-    """Eigenvalues of small perturbations as the stiffness along the sliding direction varies.
+    """Eigenvalues of small perturbations as the stiffness along the sliding direction, or the gain kp, varies.
 
     Parameters
     ----------
     rig : Slider
     ax : matplotlib.axes.Axes, optional
     stiffness : array_like, optional
-        Stiffnesses k > 0 (Pa/m); by default four decades around the critical one, or the rig's own.
+        Stiffnesses k > 0 (Pa/m); by default four decades around the critical one, or the rig's own. Gains kp where
+        the gain of a controller is all the stiffness that the rig has.
 
     Returns
     -------
     matplotlib.axes.Axes
-        Real and imaginary parts in 1/s and rad/s; colour is k. Diamonds: edges of the stable set; circles:
+        Real and imaginary parts in 1/s and rad/s; colour is k or kp. Diamonds: edges of the stable set; circles:
         the rig's own eigenvalues, those outside the view in words. The view is set by the eigenvalues that
         decide stability; fast ones may lie outside.
 
@@ -47,13 +48,17 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
         If there is neither a critical nor an own stiffness to start from; pass `stiffness`.
     """
     steady_state(rig)
-    own = float(operating_point(rig).named()["slider.stiffness"])
-    rig = replace(rig, stiffness=own, axial_stiffness=None)
-    k = _stiffnesses(rig, own, stiffness)
-    roots = eigenvalues(rig, {"slider.stiffness": k})
+    spring = float(operating_point(rig).named()["slider.stiffness"])
+    gain = float(rig.drive.proportional())
+    along = "drive.kp" if gain and not spring else "slider.stiffness"
+    rig = replace(rig, stiffness=spring, axial_stiffness=None)
+    ends = (stable_values(rig, along) if along == "drive.kp" else stable_stiffness(rig)).ravel()
+    own = spring or gain
+    k = _stiffnesses(rig, along, own, ends, stiffness)
+    roots = eigenvalues(rig, {along: k})
     mine = eigenvalues(rig)
     mine = mine[np.isfinite(mine)]
-    edges, crossings = _crossings(rig, k)
+    edges, crossings = _crossings(rig, along, ends, k)
 
     ax = axes_or_new(ax)
     ax.axvline(0.0, color=BLACK, linewidth=1, zorder=1, label="_imaginary axis")
@@ -66,7 +71,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     )
     figure = ax.get_figure()
     if figure is not None:
-        figure.colorbar(points, ax=ax, label=labelled("slider.stiffness", unit_name))
+        figure.colorbar(points, ax=ax, label=labelled(along, unit_name))
     for edge, at in zip(edges, crossings, strict=True):
         style: dict[str, Any] = {
             "marker": "D",
@@ -75,7 +80,7 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
             "markersize": 8,
             "linestyle": "none",
         }
-        name = f"critical stiffness {edge / factor:.4g} {unit_name}"
+        name = f"critical {'gain kp' if along == 'drive.kp' else 'stiffness'} {edge / factor:.4g} {unit_name}"
         ax.plot(at.real, at.imag, label=name, zorder=3, **style)
     _set_view(ax, roots, mine, crossings)
     ax.plot(
@@ -89,26 +94,24 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     return ax
 
 
-def _stiffnesses(rig: Slider, own: float, given: Any) -> Any:
+def _stiffnesses(rig: Slider, along: str, own: float, ends: Any, given: Any) -> Any:
     if given is not None:
-        k = np.unique(checked_array("slider.stiffness", rig.parameters()["slider.stiffness"].role, given))
+        k = np.unique(checked_array(along, rig.parameters()[along].role, given))
         if k[0] <= 0:
             raise ParameterError([Problem("stiffness", f"got {k[0]!r}; allowed: numbers > 0 in Pa/m")])
         return k
-    # the gain of a controller acts as a stiffness, so it is a scale too
-    choices = (float(critical_stiffness(rig)), own, float(rig.drive.proportional()))
-    centre = next((size for size in choices if size > 0), None)
-    if centre is None:
+    edges = ends[(ends > 0) & np.isfinite(ends)]
+    centre = edges[np.argmin(np.abs(edges - own))] if edges.size else own
+    if not centre:
         raise NotAvailable("the rig has no critical stiffness and its own is zero; pass stiffness, an array in Pa/m")
     return np.geomspace(centre / _HALF_SPAN, centre * _HALF_SPAN, 801)
 
 
-def _crossings(rig: Slider, k: Any) -> tuple[list[float], list[Any]]:
+def _crossings(rig: Slider, along: str, ends: Any, k: Any) -> tuple[list[float], list[Any]]:
     """Ends of the stable intervals in the range, and the eigenvalues on the imaginary axis there."""
-    ends = stable_stiffness(rig).ravel()
     edges, crossings = [], []
     for edge in np.unique(ends[(ends >= k[0]) & (ends <= k[-1])]):
-        found = eigenvalues(rig, {"slider.stiffness": edge})
+        found = eigenvalues(rig, {along: edge})
         found = found[np.isfinite(found)]
         nearest = found[np.argmin(np.abs(found.real))]
         if abs(nearest.real) > 1e-6 * np.abs(found).max():  # ill-posed: the root crosses at infinity

@@ -99,7 +99,7 @@ def _charts(analysis: Analysis) -> Iterator[str]:
     if analysis.stable is not None:
         locus = drawn(lambda: figures.root_locus(rig), "root locus", 6.0)
         yield figure(
-            locus, "Eigenvalues of small disturbances as the stiffness varies; to the right of the axis they grow."
+            locus, f"Eigenvalues of small disturbances as {stiffness} varies; to the right of the axis they grow."
         )
 
 

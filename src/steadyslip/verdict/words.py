@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
-from steadyslip.model.point import operating_point
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
+from steadyslip.verdict.holding import hold
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -91,33 +91,33 @@ def headline(analysis: Verdict) -> str:
 
 def reason(analysis: Findings) -> str:
     """Why, in one sentence."""
-    own = analysis.rig.parameters()["slider.stiffness"].value
-    critical, side = analysis.critical_stiffness, analysis.critical_side
     if analysis.growth_rate == math.inf:
         return why_ill_posed(analysis)
-    own = float(operating_point(analysis.rig).named()["slider.stiffness"]) if own is None else own
-    gain = float(analysis.rig.drive.proportional())
-    if critical is None:
-        if analysis.on_edge and own + gain == 0:
+    held = hold(analysis)
+    own = held.own + held.beside
+    if held.critical is None:
+        if analysis.on_edge and own == 0:
             return "without stiffness nothing restores the block's place, so a disturbance neither grows nor dies"
-        if analysis.stable_stiffness:
-            if analysis.rig.drive.proportional():
-                return "with this controller sliding is stable whatever the stiffness beside it"
-            return "sliding is stable at every stiffness" + why_all(analysis)
-        return "no stiffness makes sliding stable" + why_none(analysis)
-    which = "stiffness and gain kp together, " if gain and own else "gain kp, " if gain else "stiffness "
-    ratio = (own + gain) / (critical + gain)
+        if not held.stable:
+            return f"no {held.name} makes sliding stable" + why_none(analysis)
+        if held.beside:
+            return "with this controller sliding is stable whatever the stiffness beside it"
+        return f"sliding is stable at every {held.name}" + why_all(analysis)
+    critical = held.critical + held.beside
+    together = held.beside and held.own
+    which = "stiffness and gain kp together, " if together else "gain kp, " if held.name == "gain kp" else "stiffness "
+    ratio = own / critical
     text = (
-        f"the {which}{_stiffness(analysis, own + gain)}{',' if gain else ''} is "
+        f"the {which}{_stiffness(analysis, own)}{'' if which == 'stiffness ' else ','} is "
         f"{'' if analysis.on_edge else f'{ratio:.3g} times '}the critical "
-        f"{'' if gain else 'stiffness '}{_stiffness(analysis, critical + gain)}"
+        f"{'stiffness ' if which == 'stiffness ' else ''}{_stiffness(analysis, critical)}"
     )
     if analysis.on_edge and abs(ratio - 1) > 1e-6:  # on another edge than that of the stiffness
         return "neither verdict should be relied on: the least change of a number decides"
     if analysis.on_edge:
         text += " to within rounding, and neither verdict should be relied on"
-    if analysis.stable_stiffness == ((critical, math.inf) if side == "above" else (0.0, critical),):
-        return f"{text}, {side} which sliding is stable"
+    if held.stable == ((held.critical, math.inf) if held.side == "above" else (0.0, held.critical),):
+        return f"{text}, {held.side} which sliding is stable"
     return f"{text}, the nearest edge of the stable set given below"
 
 
@@ -163,6 +163,8 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
 def _onset(onset: Onset) -> str:
     """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
+    if onset.along == "drive.kp":
+        text = text.replace("edge in stiffness", "edge in the gain kp")
     own = onset.rig.parameters()[onset.along].value
     if onset.kind != "subcritical" or own is None:
         return text
@@ -217,17 +219,18 @@ def disturbance(analysis: Verdict) -> str:
 
 
 def _stable_set(analysis: Findings) -> str:
+    held = hold(analysis)
     parts = []
-    for low, high in analysis.stable_stiffness:
+    for low, high in held.stable:
         if low == 0 and high == math.inf:
-            parts.append("every stiffness above zero" if analysis.on_edge else "every stiffness")
+            parts.append(f"every {held.words}{' above zero' if analysis.on_edge else ''}")
         elif high == math.inf:
-            parts.append(f"stiffness above {_stiffness(analysis, low)}")
+            parts.append(f"{held.words} above {_stiffness(analysis, low)}")
         elif low == 0:
-            parts.append(f"stiffness below {_stiffness(analysis, high)}")
+            parts.append(f"{held.words} below {_stiffness(analysis, high)}")
         else:
-            parts.append(f"stiffness from {_stiffness(analysis, low)} to {_stiffness(analysis, high)}")
-    return ", or ".join(parts) or "no stiffness"
+            parts.append(f"{held.words} from {_stiffness(analysis, low)} to {_stiffness(analysis, high)}")
+    return ", or ".join(parts) or f"no {held.words}"
 
 
 def edge_rows(analysis: Verdict) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:

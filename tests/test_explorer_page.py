@@ -416,6 +416,55 @@ def test_every_disturbance_moves_the_rig(browser, tmp_path):
         visit.told("a number above 0")
 
 
+def test_bare_numbers_count_in_the_unit_that_is_shown(browser, moved):
+    """Size and length of a disturbance, as every parameter: what the field shows is what a number counts in."""
+    with Visit(browser, moved["explorer"]) as visit:
+        visit.told("slip event")
+        field = visit.page.get_by_label("length of the run")
+        for text, becomes in (("200", "200 s"), ("0.1 h", "0.1 h"), ("0.2", "0.2 h")):
+            field.fill(text)
+            field.press("Tab")
+            assert field.input_value() == becomes
+        size = visit.page.get_by_label("size of the disturbance")
+        for kind in ("push", "normal", "hold"):
+            visit.page.get_by_label("disturbance", exact=True).select_option(kind)
+            visit.page.locator("[aria-label='size of the disturbance'][placeholder*=' ']").wait_for()
+            unit = size.get_attribute("placeholder").split()[1]
+            size.fill("2")
+            size.press("Tab")
+            assert size.input_value() == f"2 {unit}"
+            visit.page.locator(".motion .hint", has_text=f", 2 {unit}.").wait_for()
+
+
+def test_curves_are_those_of_the_disturbance_that_is_asked_for(browser, moved):
+    """When it comes and what it is is said beside them; where it cannot be, there are no curves of another."""
+    with Visit(browser, moved["explorer"]) as visit:
+        visit.told("slip event")
+        hint, curves = visit.page.locator(".motion .hint"), visit.page.locator(".strips")
+        assert re.fullmatch(r"At .* s \(dashed line\): step of the drive velocity, × 2\.", hint.inner_text())
+        frame, step = visit.page.locator(".strips .frame").first.bounding_box(), visit.page.locator(".strips .step")
+        assert step.bounding_box()["x"] == pytest.approx(frame["x"] + frame["width"] / 20, abs=2)
+        visit.page.emulate_media(media="print")
+        assert hint.is_visible()
+        visit.page.emulate_media(media="screen")
+        for label, wrong, words in (
+            ("size of the disturbance", "abc", "not a number"),
+            ("length of the run", "-1 s", "above 0 s"),
+        ):
+            visit.page.get_by_label(label).fill(wrong)
+            visit.page.get_by_label(label).press("Tab")
+            visit.told(words)
+            assert not curves.is_visible()
+            assert not visit.page.locator(".reading").is_visible()
+            visit.page.get_by_label(label).fill("")
+            visit.page.get_by_label(label).press("Tab")
+            visit.told("slip event")
+            assert curves.is_visible()
+        visit.page.get_by_label("disturbance", exact=True).select_option("blow")
+        visit.told("a blow needs a mass")
+        assert visit.page.get_by_label("size of the disturbance").get_attribute("placeholder") == ""
+
+
 def test_motion_goes_on_where_no_worker_may_run(browser, file, tmp_path):
     """A policy without workers, as some notebooks have: the page computes in slices itself."""
     text = file.read_text(encoding="utf-8").replace("worker-src blob:;", "worker-src 'none';")

@@ -3,7 +3,7 @@ import { button, make, svg } from "./dom.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
-import { parse, shown } from "./quantities.js";
+import { digits, parse, shown, unitIn } from "./quantities.js";
 import { Sketch } from "./sketch.js";
 import { outcome, quantity } from "./words.js";
 
@@ -25,6 +25,7 @@ export class Course {
   /** @type {any[]} */ boxes;
   /** @type {any[]} */ dots;
   playing = 0;
+  units = { size: "", length: "" }; // of what was typed last
 
   /** @param {import("./page.js").Page} page @param {() => any} library */
   constructor(page, library) {
@@ -33,6 +34,7 @@ export class Course {
     this.mover = motion && new Mover(library, motion);
     this.box = make("section", { className: "motion", "aria-label": "motion" }, make("h2", { textContent: "What does it do?" }));
     this.told = make("p", { className: "told", role: "status" });
+    this.done = make("p", { className: "hint" }); // to the rig, and when
     this.sketch = new Sketch(sketch);
     if (!this.mover) {
       this.box.append(make("p", { className: "told", textContent: `No motion on this page: ${still}.` }), this.sketch.canvas);
@@ -47,11 +49,11 @@ export class Course {
     this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself" });
     this.halt = make("button", { type: "button", textContent: "stop", disabled: true, onclick: () => this.mover.stop() });
     this.disturbance.addEventListener("change", () => {
-      this.size.value = "";
+      this.size.value = this.size.placeholder = this.units.size = "";
       this.course = null;
       this.soon();
     });
-    for (const field of [this.size, this.length]) field.addEventListener("change", () => this.soon());
+    for (const name of ["size", "length"]) this[name].addEventListener("change", () => this.typed(name));
     this.strips = svg("svg", { class: "chart strips", role: "img" });
     this.strips.addEventListener("pointermove", (event) => this.point(event));
     this.strips.addEventListener("pointerdown", (event) => this.point(event));
@@ -66,8 +68,17 @@ export class Course {
       make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "slip events" }, make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", { textContent: text, scope: "col" })))), this.events)));
     this.box.append(
       make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt),
-      this.told, this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
+      this.told, this.done, this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
       make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", {}, make("figcaption", { textContent: "The mechanism, seen from the load point" }), this.sketch.canvas)), this.list);
+  }
+
+  /** A bare number counts in the unit that the field shows, or showed before, and is written with it. */
+  typed(name) {
+    const field = this[name], unit = unitIn(field.value);
+    if (!field.value) this.units[name] = "";
+    else if (unit) this.units[name] = unit;
+    else if (unitIn(`${field.value} s`)) field.value = `${field.value} ${this.units[name] || unitIn(field.placeholder)}`.trim();
+    this.soon();
   }
 
   // -- running
@@ -89,11 +100,7 @@ export class Course {
     this.quiet();
     clearTimeout(this.late);
     if (refused) {
-      this.mover.forget();
-      this.halt.disabled = true;
-      this.course = null;
-      this.told.textContent = `No motion: ${refused}.`;
-      this.draw();
+      this.none(`No motion: ${refused}.`);
       return;
     }
     try {
@@ -104,14 +111,25 @@ export class Course {
       const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(asked.until, "s", 3)} so far; curves are those of before.`);
       const found = await this.mover.run(this.model, this.page.answer.sigma, asked, told);
       clearTimeout(this.late);
-      this.course = { ...found, until: found.status === "done" ? asked.until : found.end, disturbance: asked.disturbance };
-      this.told.textContent = outcome(found, this.page.rig.data.area);
+      this.course = { ...found, until: found.status === "done" ? asked.until : found.end, disturbance: asked.disturbance, at: asked.from };
+      this.told.textContent = outcome(this.course, this.page.rig.data.area);
+      this.done.textContent = asked.words;
       this.draw();
     } catch (error) {
       clearTimeout(this.late);
-      this.told.textContent = error instanceof Error ? error.message : String(error);
+      this.none(error instanceof Error ? error.message : String(error));
     }
     this.halt.disabled = true;
+  }
+
+  /** No motion belongs to what is asked for: why, without the curves of another. @param {string} why */
+  none(why) {
+    this.mover.forget();
+    this.halt.disabled = true;
+    this.keep();
+    this.course = null;
+    this.told.textContent = why;
+    this.draw();
   }
 
   refusal() {
@@ -138,7 +156,9 @@ export class Course {
     if (positive && !(size > 0)) throw new Error("a hold lasts for more than 0 s");
     this.size.placeholder = ratio ? `× ${own}` : shown(own, si, 3);
     this.length.placeholder = shown(12 * period, "s", 3);
-    return { disturbance, size: size / per, at: until / 20, until };
+    const at = disturbance === "blow" ? 0 : until / 20, much = ratio ? `× ${digits(size)}` : shown(size, si);
+    const words = `${at ? `At ${shown(at, "s")} (dashed line)` : "At the start"}: ${DISTURBANCES[disturbance].words}, ${much}.`;
+    return { disturbance, size: size / per, at: until / 20, from: at, until, words };
   }
 
   // -- drawing
@@ -153,7 +173,7 @@ export class Course {
   draw() {
     if (!this.mover) return;
     const { course } = this, shows = course ? "" : "none";
-    for (const part of [this.strips, this.phase.parentElement, this.time.parentElement, this.list]) part.style.display = shows;
+    for (const part of [this.done, this.strips, this.phase.parentElement, this.time.parentElement, this.list]) part.style.display = shows;
     if (!course) return;
     const past = this.before && this.before !== course && this.before.disturbance === course.disturbance ? [this.series(this.before)] : [], now = this.series(course), all = [...past, now];
     const { left, width } = this.page.size, { area } = this.page.rig.data, spread = Math.max(...now.sigma.reduce(([a, b], c) => [Math.min(a, c), Math.max(b, c)], [Infinity, -Infinity]).map((end, i) => (i ? end / now.sigma[0] - 1 : 1 - end / now.sigma[0])));
@@ -163,10 +183,11 @@ export class Course {
     const parts = shownSeries.map(([name, unit, label], n) => strip(this.boxes[n], all.map((one) => ({ times: one.times, values: one[name] })), course.until, unit, label, n === shownSeries.length - 1));
     const bottom = this.boxes[this.boxes.length - 1].top + HIGH;
     this.cursor = svg("line", { class: "cursor", y1: this.boxes[0].top, y2: bottom });
+    const when = left + straight(0, course.until).of(course.at) * width, step = svg("line", { class: "step", x1: when, x2: when, y1: this.boxes[0].top, y2: bottom });
     this.dots = shownSeries.map(() => svg("circle", { class: "at", r: 4 }));
     this.strips.setAttribute("viewBox", `0 0 ${left + width + 14} ${bottom + 40}`);
     this.strips.setAttribute("aria-label", `velocity and friction over time: ${this.told.textContent}`);
-    this.strips.replaceChildren(...parts.map((part) => part.group), this.cursor, ...this.dots);
+    this.strips.replaceChildren(...parts.map((part) => part.group), ...(when < left + width ? [step] : []), this.cursor, ...this.dots);
     const drawn = plane(PLANE, all.map((one) => ({ x: one.v, y: one.friction })), ["m/s", "velocity"], ["1", "friction"]);
     this.mark = svg("circle", { class: "at", r: 5 });
     this.phase.setAttribute("aria-label", "friction over velocity");

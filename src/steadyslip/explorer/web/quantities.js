@@ -55,6 +55,9 @@ export function parse(text, si, unit) {
   return Number(digits) * factor;
 }
 
+/** The unit in a text of a number and a unit; empty where there is none. @param {string} text */
+export const unitIn = (text) => NUMBER.exec(text.slice(0, 200))?.[2] ?? "";
+
 /** A number with few digits. @param {number} value */
 export function digits(value, many = 4) {
   const size = Math.abs(value);

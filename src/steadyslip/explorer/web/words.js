@@ -45,10 +45,13 @@ export function reason(answer, data) {
 /** How many times something is something else: with as many digits as tell it from once. */
 const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math.log10(Math.abs(many - 1) || 1)))));
 
+/** How a motion ends before its time, where the driver has a word of its own for it. @type {Record<string, string>} */
+const ENDED = { "no velocity": "no velocity balances the forces" };
+
 /** What came of a motion. @param {any} course @param {number | null} area */
-export function outcome({ events, status, end, v }, area) {
-  if (status === "blow-up") return `It runs away at ${shown(end, "s")}: neither mass nor damping limits the velocity.`;
-  const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${status}.`;
+export function outcome({ events, status, end, v, at }, area) {
+  if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: neither mass nor damping limits the velocity.`;
+  const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;
   if (!events.length) {
     const least = v.reduce((a, b) => Math.min(a, b), Infinity), most = v.reduce((a, b) => Math.max(a, b), -Infinity);
     return `No slip event; velocity ${shown(least, "m/s", 3)} to ${shown(most, "m/s", 3)}.${ended}`;

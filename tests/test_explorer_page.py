@@ -265,7 +265,9 @@ def test_files_and_links_carry_every_digit(browser, file, tmp_path):
         visit.slider("contact.angle").focus()
         visit.page.keyboard.press("PageUp")
         (tmp_path / "rig.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
-        visit.page.wait_for_function("location.hash.includes('contact.angle')")  # browsers take long over it
+        end = time.time() + 10  # browsers take long over it
+        while not visit.page.evaluate("location.hash.includes('contact.angle')"):
+            assert time.time() < end
         link = visit.page.evaluate("location.hash")
         critical = visit.page.inner_text(".verdict p")
         table = visit.saved("values and edges")
@@ -307,6 +309,30 @@ def test_hostile_links_change_nothing(browser, file):
             expected, end = (("Stable: steady sliding at 1 µm/s", "0.03") if "0.03" in link else own), time.time() + 10
             while (found := (visit.sentence(), visit.field("friction.a").input_value())) != expected:
                 assert time.time() < end, (link, found)
+
+
+def test_what_a_link_cannot_bring_is_said(browser, file):
+    """A link of another rig, and numbers that are not allowed: what is left out is named, until another link comes."""
+    with Visit(browser, file, "#friction.a=0.02&friction.states.1.b=0.01&friction.d_c=-1") as visit:
+        assert visit.field("friction.a").input_value() == "0.02"
+        notice = visit.page.locator(".notice")
+        assert "left out: friction.states.1.b, friction.d_c = -1 (allowed: a finite number > 0)." in notice.inner_text()
+        visit.page.evaluate(FOLLOW, "#friction.a=0.03")
+        notice.wait_for(state="hidden")
+    with Visit(browser, file, "#the-caveats") as visit:
+        assert visit.page.locator(".notice").inner_text() == "", "an anchor is no link to values"
+
+
+def test_that_a_link_is_copied_is_said_for_a_while(browser, file):
+    """Over the page, which stays where it is, and not as a warning."""
+    with Visit(browser, file, permissions=["clipboard-write", "clipboard-read"]) as visit:
+        before = visit.page.locator("main").bounding_box()["y"]
+        visit.page.get_by_role("button", name="copy a link").click()
+        said = visit.page.get_by_text("The link is copied.")
+        said.wait_for()
+        assert visit.page.locator("main").bounding_box()["y"] == before
+        assert visit.page.locator(".notice").inner_text() == ""
+        said.wait_for(state="detached", timeout=8000)
 
 
 def test_hostile_titles_are_text(browser, tmp_path):

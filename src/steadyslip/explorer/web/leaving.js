@@ -24,7 +24,7 @@ export function leaving(page) {
 
 function link(page) {
   const text = location.href.split("#")[0] + page.rig.hash(), { notice } = page.banner;
-  const done = () => (notice.textContent = "The link is copied.");
+  const done = () => page.say("The link is copied.");
   const failed = () => (notice.textContent = text);
   if (navigator.clipboard) navigator.clipboard.writeText(text).then(done, failed);
   else failed();

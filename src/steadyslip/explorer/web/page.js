@@ -14,6 +14,7 @@ const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66,
 const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
 const PARTS = 60; // of a track, at whose ends the status is asked for
 const BEYOND = 1e-4; // how far behind an edge one lands that goes there, of its value
+const SAID = 4000, NAMED = 4; // ms for which a word stands; parts of a link that are named
 const DRAWN = 1e150; // numbers beyond that, and below its inverse, lie off every scale
 
 export class Page {
@@ -41,8 +42,8 @@ export class Page {
     this.future = /** @type {number[][]} */ ([]);
     this.sliding = false;
     this.differs = this.rig.differences();
-    if (!told) this.rig.values = this.rig.fromHash(location.hash);
     this.banner = new Banner(data, this.differs);
+    if (!told) this.rig.values = this.fromAddress();
     root.classList.add("steadyslip");
     this.measure();
     root.replaceChildren(this.head(), this.banner.box);
@@ -76,9 +77,24 @@ export class Page {
       this.course.draw();
     }).observe(root);
     window.addEventListener("hashchange", () => {
-      if (!this.told && location.hash !== rig.hash()) this.put(rig.fromHash(location.hash));
+      if (!this.told && location.hash !== rig.hash()) this.put(this.fromAddress());
     });
     root.dataset.ready = "yes";
+  }
+
+  /** A word that needs no answer, over the page for some seconds. @param {string} words */
+  say(words) {
+    this.said.textContent = words;
+    clearTimeout(this.unsaid);
+    this.unsaid = setTimeout(() => (this.said.textContent = ""), SAID);
+  }
+
+  /** Values of the address; what of it this rig cannot take is said. */
+  fromAddress() {
+    const { values, left } = this.rig.fromHash(location.hash), { notice } = this.banner, many = left.length - NAMED;
+    if (this.differs.length) return values; // what is said of that is to stay
+    notice.textContent = left.length ? `The link has what this rig cannot take; it is left out: ${left.slice(0, NAMED).join(", ")}${many > 0 ? `, and ${many} more` : ""}.` : "";
+    return values;
   }
 
   /** How wide the page is, which need not be the window's width; true if its charts are to be drawn anew. */
@@ -95,7 +111,8 @@ export class Page {
     const { title, version, parameters } = this.rig.data;
     this.tools = make("div", { className: "tools", role: "toolbar", "aria-label": "page" }, this.undoButton, this.redoButton,
       button("reset", "back to the rig of the file", () => this.put(parameters.map((one) => one.value))));
-    return make("header", {}, make("p", { className: "brand" }, make("b", { textContent: title }), ` explored with steadyslip ${version}`), this.tools);
+    this.said = make("p", { className: "said", role: "status" });
+    return make("header", {}, this.said, make("p", { className: "brand" }, make("b", { textContent: title }), ` explored with steadyslip ${version}`), this.tools);
   }
 
   foot() {

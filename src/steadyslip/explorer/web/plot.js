@@ -109,15 +109,15 @@ export function strip(box, curves, until, unit, label, last) {
   return { group, up: up.scale };
 }
 
-/** The path of one series over another: points closer than half a unit, and ways over units all drawn before, are left out. */
+/** The path of one series over another: points closer than half a unit, and ways over places all drawn before, are left out. */
 export function pathThrough(box, xs, ys, across, up) {
-  const wide = Math.ceil(box.width) + 2, drawn = new Uint8Array(wide * (Math.ceil(box.height) + 2));
+  const wide = 2 * Math.ceil(box.width) + 3, drawn = new Uint8Array(wide * (2 * Math.ceil(box.height) + 3)); // places of half a unit
   let path = "", lastX = NaN, lastY = NaN, down = false; // whether the pen is where the last point was
-  const isNew = (x, y) => { // whether the way there goes over a unit that has nothing yet
-    const steps = Math.ceil(Math.max(Math.abs(x - lastX), Math.abs(y - lastY), 1));
+  const isNew = (x, y) => { // whether the way there goes over a place that has nothing yet
+    const steps = Math.ceil(2 * Math.max(Math.abs(x - lastX), Math.abs(y - lastY)));
     let found = false;
     for (let k = 0; k <= steps; k++) {
-      const cell = Math.floor(lastX + (k / steps) * (x - lastX) - box.left) + wide * Math.floor(lastY + (k / steps) * (y - lastY) - box.top);
+      const part = k / steps, cell = Math.floor(2 * (lastX + part * (x - lastX) - box.left)) + wide * Math.floor(2 * (lastY + part * (y - lastY) - box.top));
       if (!drawn[cell]) found = true;
       drawn[cell] = 1;
     }

@@ -93,17 +93,17 @@ export class Rig {
     return changed.length ? `#${changed.join("&")}` : "";
   }
 
-  /** Values from a link: only names that the rig has, numbers, and inside their domains; the rest is left alone. */
+  /** Values from a link: only names that the rig has, numbers, and inside their domains; the rest is left, in words. */
   fromHash(text) {
-    const values = this.data.parameters.map((one) => one.value);
+    const values = this.data.parameters.map((one) => one.value), left = /** @type {string[]} */ ([]);
     for (const part of text.slice(0, 10000).replace(/^#/, "").split("&")) {
       const [name, number, ...more] = part.split("=");
-      if (more.length) continue;
       const i = this.data.parameters.findIndex((one) => encodeURIComponent(one.name) === name);
       const value = number && /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(number) ? Number(number) : NaN;
-      if (i >= 0 && inside(this.data.parameters[i], value)) values[i] = value;
+      if (!more.length && i >= 0 && inside(this.data.parameters[i], value)) values[i] = value;
+      else if (number !== undefined) left.push(i < 0 ? name.slice(0, 40) : `${name} = ${number.slice(0, 20)} (allowed: ${this.data.parameters[i].allowed})`);
     }
-    return values;
+    return { values, left };
   }
 }
 

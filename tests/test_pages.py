@@ -66,7 +66,9 @@ def words(text):
 @pytest.mark.parametrize(
     ("text", "printed"),
     [("5 um", "5 µm"), ("3 um/s", "3 µm/s"), ("9 kg/m^2", "9 kg/m²"), ("sum of 2", "sum of 2"), ("-45 deg", "−45 deg"),
-     ("1e-05", "1e-05"), ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
+     ("1e-05", "1 × 10⁻⁵"), ("-1.001e+05 1/s", "−1.001 × 10⁵ 1/s"), ("v=1e-05", "v=1e-05"),
+     ("run-1e-05.csv", "run-1e-05.csv"), ("6.928 us", "6.928 µs"), ("5 uN", "5 µN"), ("menus", "menus"),
+     ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
 )  # fmt: skip
 def test_words_are_set_as_in_print(text, printed):
     assert typed(text) == printed
@@ -204,6 +206,17 @@ def test_a_report_says_everything_about_a_rig():
 
 
 @pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize("path", ["examples/inclined-spring.toml", "examples/machines/brake-pad.toml"])
+def test_one_parameter_has_one_name_in_a_report(path):
+    """That of the file: inputs and edges call it the same."""
+    found = ss.read_rig(path)
+    said = set(re.findall(r"(?<![\w.])(?:[a-z]+\.)+[a-z_]+", words(ss.report(found, explorer=False).html)))
+    heads = {name.partition(".")[0] for name in found.parameters()}
+    names = {name for name in said if name.partition(".")[0] in heads and not name.endswith(".toml")}
+    assert len(names) > 5
+    assert [name for name in names if not any(f"{one}.".startswith(f"{name}.") for one in found.parameters())] == []
+
+
 def test_a_machine_has_a_report():
     machine = ss.read_rig(MACHINES / "two-surfaces.toml")
     analysis = ss.analyze(machine)

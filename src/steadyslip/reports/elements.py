@@ -10,8 +10,14 @@ from typing import Any
 import sympy as sp
 from sympy.printing.mathml import MathMLPresentationPrinter
 
-_SPOKEN = ((r"(?<![A-Za-z])um(?![A-Za-z])", "µm"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"), (r"^x (?=\d)", "× "),
-           (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"))  # fmt: skip
+_SPOKEN = (
+    (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
+    (r"^x (?=\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
+)  # fmt: skip
+_POWER, _RAISED = (
+    re.compile(r"(?<![\w./=-])(−?\d(?:\.\d+)?)e([+-]\d+)(?![\w./-])"),
+    str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"),
+)
 _ENTITIES = {"&InvisibleTimes;": "\u2062", "&dd;": "d", "&ExponentialE;": "e", "<mo>-</mo>": "<mo>−</mo>"}
 STYLE = """
 .steadyslip-told { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b2430; }
@@ -41,11 +47,11 @@ STYLE = """
 
 
 def spoken(text: Any) -> str:
-    """Words as they are set in print: µm, ², →, a true minus."""
+    """Words as they are set in print: µm, ², →, a true minus, powers of ten."""
     words = str(text)
     for pattern, better in _SPOKEN:
         words = re.sub(pattern, better, words)
-    return words
+    return _POWER.sub(lambda found: f"{found[1]} × 10{str(int(found[2])).translate(_RAISED)}", words)
 
 
 def typed(text: Any) -> str:

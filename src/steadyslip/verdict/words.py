@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
-from steadyslip.core.records import resolve
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 from steadyslip.verdict.holding import hold
 
@@ -236,7 +235,7 @@ def _stable_set(analysis: Findings) -> str:
 def edge_rows(analysis: Verdict) -> tuple[list[tuple[str, str, str, str, str]], list[str]]:
     """Of every parameter with an edge: name, value, edge, change and what happens beyond; names of those without."""
     rows = [_margin_row(analysis, margin) for margin in analysis.margins if margin.edge is not None]
-    return rows, [_short(analysis, margin.parameter) for margin in analysis.margins if margin.edge is None]
+    return rows, [margin.parameter for margin in analysis.margins if margin.edge is None]
 
 
 def margin_table(analysis: Verdict) -> list[str]:
@@ -279,21 +278,9 @@ def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, 
     else:
         words = BEYOND.get(edge.kind, edge.kind)
     return (
-        _short(analysis, margin.parameter),
+        margin.parameter,
         shown(margin.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
         shown(edge.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
         change,
         words,
     )
-
-
-def _short(analysis: Verdict, name: str) -> str:
-    """The dotted name without its middle: friction.alpha for friction.normal_memory.alpha."""
-    if name.startswith("contacts."):
-        return name  # of which contact matters
-    first, _, last = name.partition(".")[0], ".", name.rpartition(".")[2]
-    known = analysis.rig.parameters()
-    try:
-        return f"{first}.{last}" if resolve(last, known) == name else name
-    except LookupError:
-        return name

@@ -250,6 +250,11 @@ def test_ranges_follow_a_link_and_the_critical_stiffness(browser, file):
         assert critical > 30 * 9e9, "beyond the range of the rig of the file"
         assert edges_of(visit)["slider.stiffness"] == f"{critical / 1e9:.4g}"
         assert "--stable" in visit.slider("slider.stiffness").get_attribute("style")
+        visit.type("friction.a", "0.4")
+        (edge,) = [one.value for one in ss.boundary(INCLINED.with_values({"friction.a": 0.4}), "friction.b")]
+        assert edge > 4 * 0.016, "beyond its range too"
+        assert float(edges_of(visit)["friction.b"]) == pytest.approx(edge, rel=1e-3)
+        visit.type("friction.a", "0.0145")
         row = next(line for line in visit.saved("values and edges").splitlines() if "slider.stiffness" in line)
         assert float(row.split(",")[2]) == pytest.approx(critical, rel=1e-12)
 

@@ -13,6 +13,7 @@ import { Rig, inside, rangeOf, scaleOf } from "./rig.js";
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
 const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
 const PARTS = 60; // of a track, at whose ends the status is asked for
+const SOUGHT = 30; // tenths of a decade outside a range in which a change is sought
 const BEYOND = 1e-4; // how far behind an edge one lands that goes there, of its value
 const SAID = 4000, NAMED = 4; // ms for which a word stands; parts of a link that are named
 const DRAWN = 1e150; // numbers beyond that, and below its inverse, lie off every scale
@@ -137,6 +138,19 @@ export class Page {
     if (!this.home) return;
     this.ranges = this.home.slice();
     values.forEach((value, i) => this.reach(i, value));
+  }
+
+  /** A range within which nothing changes is widened to the nearest change outside, if there is one within some decades. */
+  seek(i) {
+    const one = this.rig.data.parameters[i], [low, high] = this.ranges[i], [{ status }] = this.tracks[i];
+    if (one.low !== null && one.high !== null) return; // it is all there is
+    for (let step = 1; step <= SOUGHT; step++) {
+      const far = 10 ** (step / 10), found = [high * far, low > 0 ? low / far : low * far].find((x) => inside(one, x) && this.rig.status(i, x) !== status);
+      if (found === undefined) continue;
+      this.reach(i, found);
+      this.tracks[i] = this.track(i);
+      return;
+    }
   }
 
   /** The slider of the stiffness reaches to the critical one, which other parameters move. */
@@ -282,6 +296,7 @@ export class Page {
     this.redoButton.disabled = !this.future.length;
     if (!this.controls) return;
     this.tracks = this.rig.data.parameters.map((_, i) => this.track(i));
+    if (!this.sliding) this.tracks.forEach((track, i) => track.length > 1 || this.seek(i));
     this.controls.show();
     this.chart.show();
     this.facts.show(this.answer);

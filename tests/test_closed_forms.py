@@ -5,10 +5,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, A, B, rate_state, rig
 from steadyslip.linear import cubic
+from steadyslip.linear.formula import MU_SS, formula_in_parts
 from steadyslip.linear.polynomials import is_hurwitz, roots
 from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients
@@ -289,3 +291,21 @@ def test_names_of_a_law_never_clash_with_those_of_the_model():
     for names in (("c", "m", "T"), ("k", "eta", "p"), ("v_0", "sigma_0", "q"), ("x", "v", "sigma"), ("t", "tau", "a_x"),
                   ("I_x", "v_lp", "sigma_ss"), ("psi", "mu_ss", "psi_friction")):  # fmt: skip
         np.testing.assert_allclose(answers(law(*names)), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("stem", ["slow-axis", "lead-screw", "stick-slip"])
+def test_the_formula_in_parts_is_the_formula(stem):
+    """Long ones are told in ingredients that fit on a line; numbers put in, they are those of `critical_stiffness`."""
+    own = ss.read_rig(f"examples/{stem}.toml")
+    whole, *parts = formula_in_parts(own)
+    assert sp.count_ops(whole) <= 60
+    assert bool(parts) == (stem != "stick-slip")
+    for part in parts[::-1]:
+        whole = whole.subs(part.lhs, part.rhs)
+    point = operating_point(own)
+    names = dict(zip(point.model.parameters.values(), point.arguments, strict=True))
+    steady = ss.steady_state(own)
+    names |= {point.model.contact.sigma_ss: steady.normal_stress, MU_SS: steady.friction}
+    assert float(whole.rhs.subs(names)) == pytest.approx(
+        float(ss.critical_stiffness(own)) + float(own.drive.proportional()), rel=1e-9
+    )

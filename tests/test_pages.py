@@ -190,6 +190,15 @@ def test_sketches_name_the_controller_that_drives(drive, name):
     assert f">{name}</text>" in sketch(rig(stiffness=None, drive=drive))
 
 
+def test_formulas_call_functions_what_people_know():
+    """What is computed so that it cannot overflow is read as asinh(x exp(y))."""
+    document = ss.report(ss.read_rig("examples/slow-axis.toml"), explorer=False).html
+    assert "asinh_exp" not in document
+    assert "arcsinh" in document
+    formula = document.partition("The critical stiffness of every rig")[2].partition("</math>")[0]
+    assert len(re.sub("<[^>]+>", "", formula)) < 200  # characters, those of the sentence with them
+
+
 def test_a_report_says_everything_about_a_rig():
     analysis, found = ss.analyze(OWN_RIG), ss.report(OWN_RIG, title="A rig")
     text = words(found.html)

@@ -18,6 +18,9 @@ from steadyslip.model import Model, build_model
 
 LONGEST = 4.0
 """Seconds for each of two simplifications; what takes longer is left as it stands."""
+LEGIBLE, SHORT = 60, 3
+"""Operations of a formula that is read in one line, and of an ingredient that needs no letter."""
+_LETTERS = {"mu": "mu_ss", "f1": "f_1"} | {f"B{i}": f"B_{i}" for i in range(4)}
 MU_SS = sp.Symbol("mu_ss", real=True)
 
 
@@ -62,6 +65,38 @@ def _formula(model: Model) -> sp.Eq:
         lambda: _shortest(*(_with_mu(part, mu, levels) for part in (numerator, denominator))), numerator / denominator
     )
     return sp.Eq(sp.Symbol("k_cr") + model.gain, short, evaluate=False)
+
+
+def formula_in_parts(rig: Slider) -> list[sp.Eq]:
+    """The same in one line where it is short, else in the ingredients of `small_signal`, each with a line of its own.
+
+    Raises
+    ------
+    NotAvailable
+        As `formula`.
+    """
+    whole = formula(rig)
+    if sp.count_ops(whole) <= LEGIBLE:
+        return [whole]
+    model = build_model(rig)
+    known = response(model).as_dict()
+    del known["k"]
+    letters = {name: sp.Symbol(_LETTERS.get(name, name), real=True) for name in known}
+    letters = {name: letters["mu"] if known[name] == known["mu"] else one for name, one in letters.items()}
+    told = {name: value for name, value in known.items() if sp.count_ops(value) > SHORT}
+    numerator, denominator = cubic.hopf_line(**(known | {name: letters[name] for name in told}))
+    found = [sp.Eq(whole.lhs, sp.factor_terms(numerator) / sp.factor_terms(denominator), evaluate=False)]
+    lines = {letters[name]: value for name, value in told.items() if found[0].has(letters[name])}
+    return found + [sp.Eq(letter, _gathered(value), evaluate=False) for letter, value in lines.items()]
+
+
+def _gathered(value: sp.Expr) -> sp.Expr:
+    """A sum with what its terms share in front; roots and functions stay as they are."""
+    kept = [one for one in value.atoms(sp.Pow, sp.Function) if one.is_Function or not one.exp.is_Integer]
+    names = {one: sp.Dummy() for one in kept}
+    terms = [sp.factor(term) for term in sp.Add.make_args(value.xreplace(names))]
+    back = {name: one for one, name in names.items()}
+    return min((value, sp.Add(*terms).xreplace(back)), key=sp.count_ops)
 
 
 class _TooLong(Exception):

@@ -10,6 +10,8 @@ from typing import Any
 import sympy as sp
 from sympy.printing.mathml import MathMLPresentationPrinter
 
+from steadyslip.core.expressions import asinh_exp
+
 _SPOKEN = (
     (r"(?<![A-Za-z])u(?=(?:m|s|N|Pa|rad)(?![A-Za-z]))", "µ"), (r"\^2\b", "²"), (r"\^3\b", "³"), (r"->", "→"),
     (r"^x (?=\d)", "× "), (r"(?<![\w.])-(?=\d)", "−"), (r"\binf\b", "∞"),
@@ -97,6 +99,8 @@ class Markup(str):
 
 def math(expression: Any, display: bool = True) -> Markup:
     """An expression of SymPy as MathML, which needs no font and no script."""
+    if isinstance(expression, sp.Basic):  # computed so that nothing overflows, and read as what it is
+        expression = expression.replace(asinh_exp, lambda x, y: sp.asinh(x * sp.exp(y)))
     text = MathMLPresentationPrinter().doprint(expression)
     for entity, character in _ENTITIES.items():
         text = text.replace(entity, character)

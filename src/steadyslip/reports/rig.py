@@ -10,6 +10,7 @@ from steadyslip.core.quantities import shown, stress_name
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications import rig_to_text
+from steadyslip.linear.formula import formula_in_parts
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
@@ -106,9 +107,13 @@ def _charts(analysis: Analysis) -> Iterator[str]:
 def formulas(analysis: Analysis) -> Iterator[str]:
     """The critical stiffness where it has a formula, and the equations of the model."""
     try:
-        found = analysis.formula()
+        whole, *parts = formula_in_parts(analysis.rig)
         yield paragraph("The critical stiffness of every rig with the same terms, along the sliding direction:")
-        yield f'<div class="formula" tabindex="0">{math(found)}</div>'
+        yield f'<div class="formula" tabindex="0">{math(whole)}</div>'
+        if parts:
+            yield paragraph("with what friction and contact answer to small changes in steady sliding:")
+        for part in parts:
+            yield f'<div class="formula" tabindex="0">{math(part)}</div>'
     except NotAvailable as refused:
         yield paragraph(f"The critical stiffness has no formula here: {refused}.")
     yield paragraph("The equations of motion:")

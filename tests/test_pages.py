@@ -377,6 +377,10 @@ def test_answers_of_records_have_documents(lab_results, name, request):
     text = words(document)
     for part in LAB[name]:
         assert part in text, part
+    if name == "fit":
+        assert (
+            words(typed(f"friction.a {lab_results[name]['a'].shown()}, friction.b")) in text
+        )  # what it found, at once
     shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
     assert not re.search(r"\d um\b", shown)
     assert len(document.encode()) <= 500_000

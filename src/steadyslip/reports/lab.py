@@ -44,7 +44,9 @@ def _fit(result: Fit, comparison: LawComparison | None = None, draws: Draws | No
         body += [heading(f"Record {Path(record.source).name}", 3), lines(record)]
     question = f"Which friction do these records show, and how sure is that: {sources(result)}?"
     rig = result.rig()
-    return Parts(f"Fit to {sources(result)}", f"{len(rows)} parameters.", question, body, rig, of_rig.as_file(rig))
+    lead = ", ".join(f"{one.name} {one.shown()}" for one in result.estimates if one.determined)
+    lead = f"{lead}." if lead else "No parameter is determined."
+    return Parts(f"Fit to {sources(result)}", lead, question, body, rig, of_rig.as_file(rig))
 
 
 def _drawn(result: Draws) -> list[str]:

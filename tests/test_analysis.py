@@ -10,7 +10,7 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS
-from steadyslip.verdict.holding import hold
+from steadyslip.verdict.holding import holding
 from steadyslip.verdict.words import facts
 
 PAPER = ss.read_rig(Path(__file__).parents[1] / "examples" / "inclined-spring.toml")
@@ -195,9 +195,9 @@ def test_a_gain_that_is_all_the_stiffness_is_what_is_said_to_be_stable(drive, ma
     """The same edges as those of a spring beside the gain, the gain added; none is lost below the gain."""
     rig = ss.Slider(friction=PLAIN.friction, contact=CONTACTS[contact], drive=drive, mass=mass)
     found = ss.analyze(rig)
-    held = hold(found)
+    held = holding(found)
     assert (held.name, held.own, held.beside) == ("gain kp", 4e9, 0.0)
-    small = [end for pair in hold(ss.analyze(rig.with_values({"kp": 1.0}))).stable for end in pair]
+    small = [end for pair in holding(ss.analyze(rig.with_values({"kp": 1.0}))).stable for end in pair]
     assert [end for pair in held.stable for end in pair] == pytest.approx(small, rel=1e-9)
     beyond = [max(end - 4e9, 0.0) for end in small if end > 4e9]
     assert [end for pair in found.stable_stiffness for end in pair if end] == pytest.approx(beyond, rel=1e-8)

@@ -50,9 +50,10 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
     steady_state(rig)
     spring = float(operating_point(rig).named()["slider.stiffness"])
     gain = float(rig.drive.proportional())
-    along = "drive.kp" if gain and not spring else "slider.stiffness"
+    name = rig.gain_name()
+    along = name if name and gain and not spring else "slider.stiffness"
     rig = replace(rig, stiffness=spring, axial_stiffness=None)
-    ends = (stable_values(rig, along) if along == "drive.kp" else stable_stiffness(rig)).ravel()
+    ends = (stable_values(rig, along) if along == name else stable_stiffness(rig)).ravel()
     own = spring or gain
     k = _stiffnesses(rig, along, own, ends, stiffness)
     roots = eigenvalues(rig, {along: k})
@@ -80,8 +81,9 @@ def root_locus(rig: Slider, ax: Axes | None = None, stiffness: Any = None) -> Ax
             "markersize": 8,
             "linestyle": "none",
         }
-        name = f"critical {'gain kp' if along == 'drive.kp' else 'stiffness'} {edge / factor:.4g} {unit_name}"
-        ax.plot(at.real, at.imag, label=name, zorder=3, **style)
+        what = f"gain {along.rpartition('.')[2]}" if along == name else "stiffness"
+        label = f"critical {what} {edge / factor:.4g} {unit_name}"
+        ax.plot(at.real, at.imag, label=label, zorder=3, **style)
     _set_view(ax, roots, mine, crossings)
     ax.plot(
         mine.real, mine.imag, "o", color=VERMILION, markeredgecolor=BLACK, markersize=7, zorder=4, label=_own(ax, mine)

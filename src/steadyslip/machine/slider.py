@@ -90,6 +90,13 @@ class Slider(Rig, section="slider"):
         own = [name for name in self.of_kind("stiffness") if not name.startswith("drive.")]
         return (own or [name for name in self.of_kind("stiffness") if self.value(name)] or ["slider.stiffness"])[0]
 
+    def gain_name(self) -> str | None:
+        """The drive's parameter that is the stiffness it adds, None where there is no such one."""
+        names = [name for name in self.of_kind("stiffness") if name.startswith("drive.")]
+        if len(names) != 1 or self.value(names[0]) != self.drive.proportional():
+            return None
+        return names[0]
+
     def area_of(self, name: str) -> float | None:
         return self.area
 

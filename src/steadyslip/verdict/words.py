@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
-from steadyslip.verdict.holding import hold
+from steadyslip.verdict.holding import gain_words, holding
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -92,7 +92,7 @@ def reason(analysis: Findings) -> str:
     """Why, in one sentence."""
     if analysis.growth_rate == math.inf:
         return why_ill_posed(analysis)
-    held = hold(analysis)
+    held = holding(analysis)
     own = held.own + held.beside
     if held.critical is None:
         if analysis.on_edge and own == 0:
@@ -162,8 +162,8 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
 def _onset(onset: Onset) -> str:
     """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
-    if onset.along == "drive.kp":
-        text = text.replace("edge in stiffness", "edge in the gain kp")
+    if onset.along == onset.rig.gain_name():
+        text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.along)}")
     own = onset.rig.parameters()[onset.along].value
     if onset.kind != "subcritical" or own is None:
         return text
@@ -218,7 +218,7 @@ def disturbance(analysis: Verdict) -> str:
 
 
 def _stable_set(analysis: Findings) -> str:
-    held = hold(analysis)
+    held = holding(analysis)
     parts = []
     for low, high in held.stable:
         if low == 0 and high == math.inf:

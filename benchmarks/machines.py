@@ -17,10 +17,10 @@ import numpy as np
 import steadyslip as ss
 from delays import some, spectral, winding
 from machines import at_random, same_block, three_bodies
+from moving_machines import slopes_of_motion
 from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.model import operating_point
-from test_machine_motion import slopes_of_motion
 
 SINGULAR = 1e-8  # smallest over largest singular value of the matrix at an eigenvalue
 

@@ -32,8 +32,8 @@ def pytest_collection_modifyitems(items):
     listed = (line.rsplit(" ", 1) for line in SLOW.read_text(encoding="utf-8").splitlines())
     left = {test: int(quick) for test, quick in listed}
     for item in items:
-        if item.get_closest_marker("campaign"):
-            item.add_marker(pytest.mark.slow)
+        if item.get_closest_marker("campaign") or "browser" in item.fixturenames:
+            item.add_marker(pytest.mark.slow)  # a browser works in processes of its own, whose seconds are not measured
         test = item.nodeid.partition("[")[0]
         if test in left:
             if not left[test]:

@@ -5,6 +5,10 @@ import numpy as np
 import steadyslip as ss
 
 
+def leading(machine):
+    return ss.eigenvalues(machine)[0]
+
+
 def rate_state(f, slope, r, mu=0.6, load=1.0, **further):
     """Friction with theory's f, S and r at unit velocity under a load."""
     return ss.RateState(a=f / load, b=(f - slope) / load, d_c=1 / r, mu_ref=mu, v_ref=1.0, **further)

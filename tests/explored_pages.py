@@ -1,0 +1,71 @@
+"""Pages of the explorer that are open in a browser, with everything they complained about or asked for."""
+
+import re
+
+import steadyslip as ss
+from rigs_of_theory import SIGMA, rate_state, rig
+
+INCLINED = rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5), stiffness=9e9)
+
+MOVED = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=3e9)
+
+FOLLOW = """link => new Promise((done) => {
+  addEventListener("hashchange", () => setTimeout(done), { once: true });
+  setTimeout(done, 500); // where it is the same
+  location.hash = link;
+})"""
+
+
+class Visit:
+    """A page that is open, with everything it complained about or asked for."""
+
+    def __init__(self, browser, path, link="", **options):
+        self.context = browser.new_context(**options)
+        self.page = self.context.new_page()
+        self.complaints, self.requests = [], []
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri() + link)
+        self.page.wait_for_function("[...document.querySelectorAll('.steadyslip')].every(e => e.dataset.ready)")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.context.close()
+        assert not self.complaints, self.complaints
+
+    def sentence(self):
+        return self.page.inner_text("h1")
+
+    def field(self, name):
+        return self.page.get_by_label(re.compile(rf"^{re.escape(name)}: .*value with unit$"))
+
+    def slider(self, name):
+        return self.page.locator(f'input[type=range][aria-label^="{name}: "]')
+
+    def type(self, name, text):
+        self.field(name).fill(text)
+        self.field(name).press("Tab")
+
+    def told(self, pattern):
+        """What the page says of a motion, once it is this."""
+        found = self.page.locator(".told", has_text=re.compile(pattern))
+        found.wait_for(state="attached")
+        return found.inner_text()
+
+    def saved(self, button, encoding="utf-8"):
+        with self.page.expect_download() as waiting:
+            self.page.get_by_role("button", name=button).click()
+        return waiting.value.path().read_text(encoding=encoding)
+
+
+def edges_of(visit):
+    """The list of nearest edges as it is read: name and value."""
+    return dict(re.findall(r"(\S+) → (\S+)", visit.page.inner_text(".edges")))
+
+
+def middle(element):
+    box = element.bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

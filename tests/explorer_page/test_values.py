@@ -1,0 +1,187 @@
+"""Values on the explorer's page: typed, dragged, taken back, at an edge, in a link, in files."""
+
+import json
+import re
+import time
+from urllib.parse import quote
+
+import pytest
+
+import steadyslip as ss
+from explored_pages import FOLLOW, INCLINED, Visit, edges_of, middle
+
+
+def test_values_can_be_typed_with_units_and_taken_back(browser, file):
+    with Visit(browser, file) as visit:
+        visit.type("slider.stiffness", "90 GPa/m")
+        assert visit.sentence().startswith("Stable")
+        visit.type("slider.stiffness", "3 MPa")
+        assert "wrong dimension" in visit.page.inner_text(".fault:not(:empty)")
+        visit.type("slider.stiffness", "-3 GPa/m")
+        assert "allowed: a finite number >= 0" in visit.page.inner_text(".fault:not(:empty)")
+        visit.type("slider.stiffness", "80")  # in the unit that is shown
+        assert visit.field("slider.stiffness").input_value() == "80 GPa/m"
+        for _ in range(2):
+            visit.page.get_by_role("button", name="undo").click()
+        assert visit.sentence().startswith("Unstable")
+        visit.page.get_by_role("button", name="redo").click()
+        assert visit.sentence().startswith("Stable")
+        visit.page.get_by_role("button", name="back to the rig").click()
+        assert visit.sentence().startswith("Unstable")
+
+
+def test_sliders_and_the_chart_work_by_keyboard_and_by_pointer(browser, file):
+    with Visit(browser, file) as visit:
+        stiffness = visit.slider("slider.stiffness")
+        stiffness.focus()
+        for _ in range(12):
+            visit.page.keyboard.press("PageUp")
+        assert visit.sentence().startswith("Stable")
+        assert "GPa/m" in stiffness.get_attribute("aria-valuetext")
+        visit.page.get_by_role("button", name="back to the rig").click()
+        chart = visit.page.locator("svg[role=application]")
+        chart.focus()
+        for _ in range(10):
+            visit.page.keyboard.press("Shift+ArrowUp")
+        assert visit.sentence().startswith("Stable")
+        assert "Stable" in chart.get_attribute("aria-label")
+        box = chart.bounding_box()
+        point = visit.page.locator("svg .point")
+        visit.page.mouse.move(*middle(point))
+        visit.page.mouse.down()
+        visit.page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.8 * box["height"], steps=5)
+        visit.page.mouse.up()
+        assert visit.sentence().startswith("Unstable")
+        visit.page.get_by_role("button", name="undo").click()
+        assert visit.sentence().startswith("Stable"), "a drag is one change"
+
+
+def test_an_edge_in_the_list_goes_there(browser, file):
+    with Visit(browser, file) as visit:
+        visit.page.get_by_role("button", name=re.compile(r"^slider\.stiffness →")).click()
+        assert visit.sentence().startswith("Stable")
+        assert "is 1.0001 times the critical" in visit.page.inner_text(".verdict p"), "not 1 times, as on the edge"
+
+
+@pytest.mark.parametrize("far", [("friction.b", "1e10"), ("friction.b", "1600"), ("slider.stiffness", "1e-300 Pa/m")])
+def test_a_value_far_away_leaves_nothing_behind(browser, file, far):
+    """Edges, and where one lands, are the edge's own: no slider's range decides on them; reset brings ranges back."""
+    with Visit(browser, file) as visit:
+        before, track = edges_of(visit), visit.slider("friction.b").evaluate("e => e.style.cssText")
+        visit.type(*far)
+        if far[0] == "friction.b":
+            assert edges_of(visit)["friction.b"] == before["friction.b"], "edges are exact on every range"
+        for back in ("back to the rig", "undo"):
+            visit.page.get_by_role("button", name=back).click()
+            if back == "undo":
+                visit.page.get_by_role("button", name=back).click()
+            assert edges_of(visit) == before
+            assert visit.slider("friction.b").evaluate("e => e.style.cssText") == track
+        visit.type(*far)
+        visit.page.get_by_role("button", name=re.compile(r"^friction\.b →")).click()
+        if far[0] == "friction.b":
+            landed = float(visit.field("friction.b").input_value())
+            (edge,) = [one.value for one in ss.boundary(INCLINED, "friction.b")]
+            assert landed == pytest.approx(edge, rel=2e-4)
+
+
+def test_ranges_follow_a_link_and_the_critical_stiffness(browser, file):
+    """An open page shows a link as one does that is opened with it; the stiffness that is needed is in reach."""
+    link = "#friction.b=0.2&slider.stiffness=50000000000000"
+    with Visit(browser, file, link) as visit:
+        there = looks(visit)
+    with Visit(browser, file) as visit:
+        visit.page.evaluate(FOLLOW, link)
+        end = time.time() + 10
+        while visit.field("friction.b").input_value() != "0.2":
+            assert time.time() < end
+        assert looks(visit) == there
+        critical = ss.critical_stiffness(INCLINED.with_values({"friction.b": 0.2}))
+        assert edges_of(visit)["slider.stiffness"] == f"{critical / 1e9:.4g}"
+    with Visit(browser, file) as visit:
+        visit.type("friction.b", "0.5")
+        critical = ss.critical_stiffness(INCLINED.with_values({"friction.b": 0.5}))
+        assert critical > 30 * 9e9, "beyond the range of the rig of the file"
+        assert edges_of(visit)["slider.stiffness"] == f"{critical / 1e9:.4g}"
+        assert "--stable" in visit.slider("slider.stiffness").get_attribute("style")
+        visit.type("friction.a", "0.4")
+        (edge,) = [one.value for one in ss.boundary(INCLINED.with_values({"friction.a": 0.4}), "friction.b")]
+        assert edge > 4 * 0.016, "beyond its range too"
+        assert float(edges_of(visit)["friction.b"]) == pytest.approx(edge, rel=1e-3)
+        visit.type("friction.a", "0.0145")
+        row = next(line for line in visit.saved("values and edges").splitlines() if "slider.stiffness" in line)
+        assert float(row.split(",")[2]) == pytest.approx(critical, rel=1e-12)
+
+
+def looks(visit):
+    tracks = "[...document.querySelectorAll('input[type=range]')].map((e) => e.value + e.style.cssText)"
+    return visit.sentence(), edges_of(visit), visit.page.evaluate(tracks)
+
+
+def test_files_and_links_carry_every_digit(browser, file, tmp_path):
+    with Visit(browser, file) as visit:
+        visit.type("friction.a", "0.0123456789012345")
+        visit.slider("contact.angle").focus()
+        visit.page.keyboard.press("PageUp")
+        (tmp_path / "rig.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+        end = time.time() + 10  # browsers take long over it
+        while not visit.page.evaluate("location.hash.includes('contact.angle')"):
+            assert time.time() < end
+        link = visit.page.evaluate("location.hash")
+        critical = visit.page.inner_text(".verdict p")
+        table = visit.saved("values and edges")
+        picture = visit.saved("as a drawing")
+        pixels = visit.saved("as a picture", "latin-1")
+    again = ss.read_rig(tmp_path / "rig.toml")
+    assert again.friction.a == 0.0123456789012345
+    assert f"{ss.analyze(again).critical_stiffness / 1e9:.4g} GPa/m" in critical
+    assert json.dumps("friction.a") + ",0.0123456789012345," in table
+    assert picture.startswith("<svg")
+    assert "var(" not in picture
+    assert pixels.startswith("\x89PNG")
+    with Visit(browser, file, link) as visit:
+        assert visit.page.inner_text(".verdict p") == critical
+        (tmp_path / "rig2.toml").write_text(visit.saved("save as a rig file"), encoding="utf-8")
+    assert ss.read_rig(tmp_path / "rig2.toml") == again
+
+
+HOSTILE = (
+    "#friction.a=-1", "#friction.a=1e999", "#friction.a=NaN", "#friction.a=0x10", "#friction.a", "#=", "#%zz",
+    "#&&&===", "#__proto__=1", "#constructor=2&toString=3", "#slider.stiffness=<script>alert(1)</script>",
+    "#" + "a=1&" * 9000,
+)  # fmt: skip
+
+
+def test_hostile_links_change_nothing(browser, file):
+    """Those that a page is opened with, and those that come while it is open."""
+    own = ("Unstable: steady sliding at 1 µm/s", "0.0145")
+    with Visit(browser, file, quote(HOSTILE[-2], safe="#=&%")) as visit:
+        for link in ("", "#friction.a=0.03", *HOSTILE):
+            visit.page.evaluate(FOLLOW, link)
+            expected, end = (("Stable: steady sliding at 1 µm/s", "0.03") if "0.03" in link else own), time.time() + 10
+            while (found := (visit.sentence(), visit.field("friction.a").input_value())) != expected:
+                assert time.time() < end, (link, found)
+
+
+def test_what_a_link_cannot_bring_is_said(browser, file):
+    """A link of another rig, and numbers that are not allowed: what is left out is named, until another link comes."""
+    with Visit(browser, file, "#friction.a=0.02&friction.states.1.b=0.01&friction.d_c=-1") as visit:
+        assert visit.field("friction.a").input_value() == "0.02"
+        notice = visit.page.locator(".notice")
+        assert "left out: friction.states.1.b, friction.d_c = -1 (allowed: a finite number > 0)." in notice.inner_text()
+        visit.page.evaluate(FOLLOW, "#friction.a=0.03")
+        notice.wait_for(state="hidden")
+    with Visit(browser, file, "#the-caveats") as visit:
+        assert visit.page.locator(".notice").inner_text() == "", "an anchor is no link to values"
+
+
+def test_that_a_link_is_copied_is_said_for_a_while(browser, file):
+    """Over the page, which stays where it is, and not as a warning."""
+    with Visit(browser, file, permissions=["clipboard-write", "clipboard-read"]) as visit:
+        before = visit.page.locator("main").bounding_box()["y"]
+        visit.page.get_by_role("button", name="copy a link").click()
+        said = visit.page.get_by_text("The link is copied.")
+        said.wait_for()
+        assert visit.page.locator("main").bounding_box()["y"] == before
+        assert visit.page.locator(".notice").inner_text() == ""
+        said.wait_for(state="detached", timeout=8000)

@@ -1,0 +1,125 @@
+"""What the explorer's page says of a rig in a real browser is what Python says."""
+
+import re
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from explored_pages import INCLINED, Visit, middle
+from rigs_of_theory import ONE_MEMORY, SIGMA, rig
+
+
+def test_the_page_says_what_python_says_and_asks_for_nothing(browser, file):
+    analysis = ss.analyze(INCLINED)
+    with Visit(browser, file) as visit:
+        assert visit.sentence() == "Unstable: steady sliding at 1 µm/s"
+        text = visit.page.inner_text(".verdict p")
+        assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
+        assert f"{9e9 / analysis.critical_stiffness:.3g} times" in text
+        assert "agrees with 4 answers of Python" in visit.page.inner_text("footer")
+        edges = dict(re.findall(r"(\S+) → (\S+)", visit.page.inner_text(".edges")))
+        for name in ("friction.a", "friction.b"):
+            (edge,) = [one.value for one in ss.boundary(INCLINED, name)]
+            assert float(edges[name]) == pytest.approx(edge, rel=1e-3)
+        assert [one for one in visit.requests if not one.startswith(("blob:", "data:"))] == [file.as_uri()]
+        explained(visit)
+    assert file.stat().st_size <= 200_000
+    assert "default-src 'none'" in file.read_text(encoding="utf-8")
+
+
+def explained(visit):
+    """What a reader who had never seen the page did not understand is said on it."""
+    assert "At the critical stiffness a small disturbance oscillates" in visit.page.inner_text(".verdict p")
+    bar = visit.page.locator(".bar").inner_text()
+    for words in ("stiffness now 9 GPa/m", "stable from", "10 GPa/m", "100 GPa/m"):
+        assert words in bar
+    assert "Theta: state of friction" in visit.page.inner_text(".facts dl")
+    key = visit.page.locator(".map .key").inner_text()
+    assert "no steady sliding" in key, "the track of mu_ref has that"
+    assert "no such rig" not in key, "nothing on the page has that"
+    marks = visit.page.locator(".facts .key")
+    for words in (
+        "now, grows",
+        "now, dies out",
+        "at the edge of stability",
+        "at other stiffnesses, the larger the stiffer",
+    ):
+        assert words in marks.inner_text()
+    assert marks.locator("svg path").count() == 5
+
+
+def test_tracks_are_painted_as_python_judges(browser, file):
+    """Colours of the track of every slider, at positions between the edges, are statuses of Python."""
+    with Visit(browser, file) as visit:
+        paint = visit.slider("friction.a").evaluate("e => e.style.getPropertyValue('--track')")
+        stops = [(name, float(at)) for name, at in re.findall(r"--(\w+)\) ([\d.]+)%", paint)]
+        assert [name for name, _ in stops] == ["unstable", "unstable", "stable", "stable"]
+        (edge,) = [one.value for one in ss.boundary(INCLINED, "friction.a")]
+        low, high = 0.0145 / 30, 0.0145 * 30
+        assert stops[1][1] == pytest.approx(100 * np.log(edge / low) / np.log(high / low), abs=0.01)
+
+
+def test_a_browser_that_computes_otherwise_says_so(browser, file, tmp_path):
+    text = file.read_text(encoding="utf-8")
+    wrong = re.sub(r'("critical": )(\d+\.\d+)', lambda m: f"{m[1]}{float(m[2]) * (1 + 1e-9)!r}", text, count=1)
+    assert wrong != text
+    (tmp_path / "wrong.html").write_text(wrong, encoding="utf-8")
+    with Visit(browser, tmp_path / "wrong.html") as visit:
+        assert "do not rely on this page" in visit.page.inner_text(".notice")
+        assert "the rig itself: the critical stiffness" in visit.page.inner_text(".notice")
+
+
+def test_the_locus_shows_eigenvalues_and_where_stability_changes(browser, file):
+    with Visit(browser, file) as visit:
+        assert visit.page.locator("svg.chart.locus .own.grows").get_attribute("d").count("M") == 2
+        crossing = visit.page.locator("svg.chart.locus .crossing")
+        assert crossing.get_attribute("d").count("M") == 2
+        box = visit.page.locator(".locus .left").bounding_box()
+        assert middle(crossing)[0] == pytest.approx(box["x"] + box["width"], abs=1.0), "there nothing grows or decays"
+        assert crossing.bounding_box()["width"] < 14
+
+
+RIGS = {
+    "area": rig(area=0.01, stiffness=9e9),
+    "axial": rig(contact=ss.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
+    "controller": rig(stiffness=None, drive=ss.PID(1e-6, kp=9e9, ki=1e8), mass=1e3),
+    "locked": rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0)),
+    "bristles": rig(friction=ONE_MEMORY[-1]),
+}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_other_rigs_have_pages_too(browser, tmp_path, name):
+    own = RIGS[name]
+    ss.explore(own).save(tmp_path / "rig.html")
+    analysis = ss.analyze(own)
+    with Visit(browser, tmp_path / "rig.html") as visit:
+        word = {None: "No steady sliding", True: "Stable", False: "Unstable"}[analysis.stable]
+        assert visit.sentence().startswith(word)
+        assert visit.page.inner_text(".notice") == ""
+        visit.told("slip event|runs away|No motion|ends at")
+        assert (visit.page.locator(".strips .curve").count() > 0) == (analysis.stable is not None)
+        text = visit.saved("save as a rig file")
+    again = ss.rig_from_text(text)
+    assert ss.analyze(again).critical_stiffness == analysis.critical_stiffness
+    assert ss.analyze(again).eigenvalues == analysis.eigenvalues
+
+
+def test_the_bar_paints_no_stiffness_that_a_gain_rules_out(browser, tmp_path):
+    """A rig that is stable whatever stiffness is beside its gain: nothing of its bar is painted unstable."""
+    own = RIGS["controller"].with_values({"drive.kp": 9e11})
+    assert ss.analyze(own).stable_stiffness[0][0] == 0
+    ss.explore(own).save(tmp_path / "rig.html")
+    with Visit(browser, tmp_path / "rig.html") as visit:
+        assert "Stable whatever the stiffness beside the gain, 900 GPa/m." in visit.page.inner_text(".verdict p")
+        bar = visit.page.locator(".bar")
+        assert "gain now 900 GPa/m" in bar.inner_text()
+        assert bar.get_attribute("aria-label").endswith("the gain is 900 GPa/m: any")
+        boxes = [bar.locator(f".{name}").bounding_box() for name in ("unstable", "unknown", "stable")]
+        assert boxes[1]["width"] + boxes[2]["width"] == pytest.approx(boxes[0]["width"], abs=1.0)
+
+
+def test_numbers_off_every_scale_are_drawn_at_its_end(browser, file):
+    with Visit(browser, file, "#slider.stiffness=1e-320") as visit:
+        assert "NaN" not in visit.page.evaluate("document.querySelector('.steadyslip').innerHTML")

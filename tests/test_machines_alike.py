@@ -1,0 +1,129 @@
+"""What changes nothing: machines that are one another in other words have the same eigenvalues."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from machines import leading, rate_state, surface, three_bodies, two_mass
+
+
+def test_names_and_their_order_do_not_matter():
+    machine = three_bodies()
+    new = {"motor": "z", "table": "a-body", "head": "M"}
+    links = {f"l{i}": replace(one, between=tuple(new.get(e, e) for e in one.between)) for i, one in
+             enumerate([*machine.links.values()][::-1])}  # fmt: skip
+    contacts = {f"c-{i}": replace(one, body=new[one.body]) for i, one in enumerate([*machine.contacts.values()][::-1])}
+    other = ss.Machine(
+        bodies={new[n]: machine.bodies[n] for n in list(machine.bodies)[::-1]}, links=links, contacts=contacts,
+        drive=replace(machine.drive, body=new[machine.drive.body]),
+    )  # fmt: skip
+    assert ss.eigenvalues(other) == pytest.approx(ss.eigenvalues(machine), rel=1e-11)
+
+
+def test_a_rigid_link_makes_one_body_of_two():
+    """The error falls with the stiffness, order one; damping grows with it."""
+    whole = replace(two_mass(kd=3.0), bodies={"motor": ss.SlidingBody(mass=0.0), "table": ss.SlidingBody(mass=7.0)})
+    tied = {k: two_mass(kd=3.0).with_values({"links.screw.stiffness": k, "links.screw.damping": 1e-2 * k}) for k in
+            (1e4, 1e5, 1e6, 1e7)}  # fmt: skip
+    exact = leading(whole.with_values({"links.screw.stiffness": 1e12}))
+    errors = np.array([abs(leading(one) - exact) for one in tied.values()])
+    order = -np.diff(np.log10(errors))
+    assert order == pytest.approx(np.ones(3), abs=0.02)
+
+
+def test_two_guides_are_one_with_their_loads_together():
+    one = two_mass()
+    guide = one.contacts["guide"]
+    half = {name: replace(guide, contact=ss.Constant(preload=0.5)) for name in ("left", "right")}
+    both = replace(one, contacts=half)
+    a, b = ss.eigenvalues(one), ss.eigenvalues(both)
+    extra = np.argmin([np.min(np.abs(a - s)) < 1e-9 for s in b])  # the states may differ: that decays at v/d_c
+    assert b[extra] == pytest.approx(-1.0, rel=1e-9)
+    assert np.delete(b, extra) == pytest.approx(a, rel=1e-9)
+
+
+def test_an_area_only_says_in_what_the_laws_are_given():
+    one = two_mass()
+    guide = one.contacts["guide"]
+    spread = replace(guide, area=0.25, contact=ss.Constant(preload=4.0))
+    assert ss.eigenvalues(replace(one, contacts={"guide": spread})) == pytest.approx(ss.eigenvalues(one), rel=1e-12)
+    assert ss.steady_state(replace(one, contacts={"guide": spread})).contacts["guide"].normal_force == pytest.approx(
+        1.0
+    )
+
+
+def test_a_motor_behind_a_screw_is_a_mass_on_the_slide():
+    """J = m l², gains times l², speed over l: the same axis."""
+    one, lead = two_mass(kp=4.0, kd=0.7), 0.3
+    turning = ss.Machine(
+        bodies={"motor": ss.RotatingBody(inertia=2.0 * lead**2), "table": ss.SlidingBody(mass=5.0)},
+        links={"screw": ss.Screw(between=("motor", "table"), lead=lead, stiffness=100.0, damping=0.5)},
+        contacts=one.contacts,
+        drive=ss.RotaryPD(velocity=1 / lead, body="motor", kp=4.0 * lead**2, kd=0.7 * lead**2),
+    )
+    assert ss.eigenvalues(turning) == pytest.approx(ss.eigenvalues(one), rel=1e-11)
+    away = replace(turning, drive=replace(turning.drive, measured="table"))
+    assert ss.eigenvalues(away) == pytest.approx(ss.eigenvalues(two_mass(kp=4.0, kd=0.7, measured="table")), rel=1e-11)
+    assert ss.steady_state(turning).links["screw"] == pytest.approx(0.6)
+
+
+def test_a_gear_and_a_radius_change_speed_torque_and_stiffness_as_they_should():
+    """A wheel of radius R behind a gear n: the same rubbing as a mass J/R² pulled through springs k/R² and k/(nR)²."""
+    n, radius = 5.0, 0.2
+    friction = rate_state(0.5, -0.3, 1.0)
+    geared = ss.Machine(
+        bodies={"motor": ss.RotatingBody(inertia=0.1), "wheel": ss.RotatingBody(inertia=1e-3)},
+        links={
+            "shaft": ss.Shaft(between=("drive", "motor"), stiffness=10.0),
+            "gear": ss.Shaft(between=("motor", "wheel"), gear=n, stiffness=1e3, damping=1.0),
+        },
+        contacts={"rim": surface("wheel", friction, radius=radius)},
+        drive=ss.RotaryPull(velocity=1.0),
+    )
+    lever = n * radius
+    straight = ss.Machine(
+        bodies={"motor": ss.SlidingBody(mass=0.1 / lever**2), "wheel": ss.SlidingBody(mass=1e-3 / radius**2)},
+        links={
+            "shaft": ss.Spring(between=("drive", "motor"), stiffness=10.0 / lever**2),
+            "gear": ss.Spring(between=("motor", "wheel"), stiffness=1e3 / radius**2, damping=1.0 / radius**2),
+        },
+        contacts={"rim": surface("wheel", friction)},
+        drive=ss.Pull(velocity=lever),
+    )
+    assert geared.speeds() == {"motor": 1.0, "wheel": 5.0}
+    assert ss.steady_state(geared).contacts["rim"].slip_rate == pytest.approx(1.0)
+    assert ss.steady_state(geared).links == pytest.approx({"shaft": 0.6 * lever, "gear": 0.6 * radius})
+    assert ss.eigenvalues(geared) == pytest.approx(ss.eigenvalues(straight), rel=1e-9)
+
+
+def test_a_cascade_beside_its_motor_is_a_pid_controller():
+    axis = two_mass()
+    kv, kp, tn = 0.8, 3.0, 2.5
+    cascade = ss.Cascade(velocity=1.0, body="motor", kv=kv, kp=kp, tn=tn)
+    pid = ss.PositionPID(velocity=1.0, body="motor", kp=kp * (kv + 1 / tn), kd=kp, ki=kp * kv / tn)
+    one, two = (ss.eigenvalues(replace(axis, drive=drive)) for drive in (cascade, pid))
+    assert one == pytest.approx(two, rel=1e-11)
+    scale = replace(cascade, measured="table")
+    assert ss.eigenvalues(replace(axis, drive=scale))[0] != pytest.approx(one[0], rel=1e-3)
+
+
+def test_a_gear_whose_friction_grows_with_its_torque_is_an_inclined_spring():
+    """σ = σ0 + g T with T the force of the link that loads it: the slider with −tan ψ in place of g."""
+    gain, friction = 0.4, rate_state(0.5, -0.3, 1.0)
+    tooth = ss.InclinedSpring(preload=2.0, angle=-np.arctan(gain))
+    machine = ss.Machine(
+        bodies={"gear": ss.SlidingBody(mass=1.0), "load": ss.SlidingBody()},
+        links={
+            "shaft": ss.Spring(between=("drive", "gear"), stiffness=3.0),
+            "coupling": ss.Spring(between=("gear", "load"), stiffness=5.0),
+        },
+        contacts={"mesh": ss.Surface(body="gear", friction=friction, contact=tooth, loaded_by="shaft")},
+        drive=ss.Pull(velocity=1.0),
+    )
+    slider = ss.Slider(friction=friction, contact=tooth, stiffness=3.0, mass=1.0, drive=ss.Steady(1.0))
+    assert ss.eigenvalues(machine) == pytest.approx(ss.eigenvalues(slider), rel=1e-11)
+    dragged = replace(machine, contacts={**machine.contacts, "drum": surface("load", friction, load=3.0)})
+    sigma = (2.0 + gain * 1.8) / (1 - 0.6 * gain)  # the gear carries the friction of the load as well
+    assert ss.steady_state(dragged).contacts["mesh"].normal_force == pytest.approx(sigma)

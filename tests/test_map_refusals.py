@@ -216,7 +216,7 @@ def test_everything_wrong_with_a_map_is_said_at_once():
     with pytest.raises(ss.ParameterError, match="is the name of something else"):
         ss.Map(rig(), {"angle": ANGLES}, [ss.measure(lambda one: 1.0, name="complete")])
     assert ss.Map(rig(), {"angle": ANGLES}, ss.measure(lambda one: 1.0, name="one")).outputs()[0].name == "one"
-    for compute in (5, None, []):
+    for compute in (5, [None], []):
         with pytest.raises(ss.ParameterError, match="compute"):
             ss.Map(rig(), {"angle": ANGLES}, compute)
     with pytest.raises(ss.ParameterError, match="samples: is empty"):

@@ -125,7 +125,9 @@ class NoSteadySliding(SteadyslipError, ValueError):
         super().__init__(message)
 
 
-MACHINES_CAN = "machines have analyze, simulate, stability, eigenvalues, modes, boundary, margins and stable_values"
+MACHINES_CAN = (
+    "machines have analyze, simulate, maps, sensitivity, eigenvalues, modes, boundary, margins, stable_values"
+)
 
 
 class NotAvailable(SteadyslipError, ValueError):

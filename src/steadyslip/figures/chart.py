@@ -15,6 +15,7 @@ from steadyslip.figures import regions
 from steadyslip.figures.axis import ChartAxis, axis
 from steadyslip.figures.style import BLACK, GREY, ORANGE, SKY, VERMILION, axes_or_new
 from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, status as status_of
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import explain_absence
@@ -100,7 +101,7 @@ def _reasons(rig: Slider, x: ChartAxis, y: ChartAxis, status: Any, points: int) 
     return absence_reasons(rig, [{x.name: float(x.at(share[a[i]])), y.name: float(y.at(share[b[i]]))} for i in chosen])
 
 
-def absence_reasons(rig: Slider, points: Sequence[dict[str, float]]) -> str:
+def absence_reasons(rig: Slider | Machine, points: Sequence[dict[str, float]]) -> str:
     """Why there is no steady sliding at some points, each kind of reason once."""
     found = [explain_absence(rig.with_values(vary), operating_point(rig, vary)).condition for vary in points]
     return ", ".join(sorted(set(found)))

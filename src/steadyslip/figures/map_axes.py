@@ -32,8 +32,19 @@ KINDS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
 
 
 def short(name: str) -> str:
-    """The last part of a dotted name, in words."""
-    return name.rpartition(".")[2].replace("_", " ")
+    """The last part of a dotted name, in words; behind the name of the body, link or contact that it is of."""
+    *before, last = name.split(".")
+    if before[:1] and before[0] in ("bodies", "links", "contacts"):
+        before = before[1:2]
+    elif len(before) != 1 or before[0] in ("slider", "contact", "friction", "drive"):
+        before = []
+    return " ".join((*before, last)).replace("_", " ")
+
+
+def in_words(found: MapResult, name: str) -> str:
+    """A result in words: of which contact it is, or along which parameter."""
+    words, along = short(name), found.along(name)
+    return words if along is None else f"{words} of {short(along)}"
 
 
 def shown_name(found: MapResult, view: View, show: str | None) -> str | None:
@@ -82,7 +93,8 @@ class Scale:
 def place_axes(ax: Axes, found: MapResult, view: View) -> list[Scale]:
     """Label and scale the axes for the parameters of a view."""
     scales = [
-        Scale(n, found.unit(n), p, not view.scattered, found.area) for n, p in zip(view.names, view.places, strict=True)
+        Scale(n, found.unit(n), p, not view.scattered, found.area(n))
+        for n, p in zip(view.names, view.places, strict=True)
     ]
     ax.set_xlabel(scales[0].label)
     ax.set_xscale("log" if scales[0].log else "linear")

@@ -9,7 +9,16 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.figures.map_axes import KINDS, OUT_OF_RANGE, Scale, entry, missing_note, place_axes, shown_name
+from steadyslip.figures.map_axes import (
+    KINDS,
+    OUT_OF_RANGE,
+    Scale,
+    entry,
+    in_words,
+    missing_note,
+    place_axes,
+    shown_name,
+)
 from steadyslip.figures.style import BLACK, BLUE, CURVES, GREY, ORANGE, SKY, VERMILION, labelled
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE
 from steadyslip.maps.view.absence import without_number
@@ -61,13 +70,15 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
     finite = values[np.isfinite(values)]
     if name in view.bands:  # a failure's zero is no size to scale by
         finite = view.bands[name][np.isfinite(view.bands[name]) & (view.bands[name] != 0)]
-    scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area)
+    scale = Scale(name, unit, finite if len(finite) else np.ones(1), spaced=False, area=found.area(name))
     if values.ndim == 3:  # intervals and their ends
         top = finite.max() * 3 if len(finite) else 1.0
         for i in range(values.shape[1]):
             low, high = values[:, i, 0], np.where(np.isinf(values[:, i, 1]), top, values[:, i, 1])
+            if i and not np.isfinite(low).any():
+                break
             ax.fill_between(x, scale(low), scale(high), color=CURVES[i % len(CURVES)], alpha=0.4,
-                            label=f"interval {i + 1} of stable stiffness")  # fmt: skip
+                            label=f"interval {i + 1} of {name.replace('_', ' ')}")  # fmt: skip
     elif name in view.bands:
         top = 1e3 * finite.max(initial=1.0)  # where samples have no upper limit the band leaves the picture
         low, middle, high = (scale(np.minimum(band[order], top)) for band in view.bands[name])
@@ -80,7 +91,7 @@ def _curve_of_numbers(ax: Axes, found: MapResult, view: View, x: Array, order: A
         if gaps := without_number(found, view, name, hatched="status" in view.values):
             entry(ax, Patch(facecolor="none", edgecolor="none", label=f"where there is no line: {gaps}"))
     ax.set_yscale("log" if scale.log else "linear")
-    ax.set_ylabel(labelled(name.replace("_", " "), scale.unit))
+    ax.set_ylabel(labelled(in_words(found, name), scale.unit))
     if name == "safety_factor":
         ax.axhline(1.0, color=BLACK, linewidth=0.8)
     if name == "growth_rate":
@@ -116,10 +127,10 @@ def scatter(ax: Axes, found: MapResult, view: View, show: str | None) -> None:
         values = np.asarray(view.values[name], dtype=float)
         if values.ndim > 1:
             raise ParameterError([Problem("show", f"{name!r} has several numbers a point; choose another result")])
-        up = Scale(name, found.unit(name), values, spaced=False, area=found.area)
+        up = Scale(name, found.unit(name), values, spaced=False, area=found.area(name))
         across.append(up(np.where(np.isfinite(values), values, np.nan)))
         ax.set_yscale("log" if up.log else "linear")
-        ax.set_ylabel(labelled(name.replace("_", " "), up.unit))
+        ax.set_ylabel(labelled(in_words(found, name), up.unit))
     status = view.values.get("status")
     kinds = (
         (UNSTABLE, "unstable", ORANGE, "v"),

@@ -21,6 +21,7 @@ from steadyslip.figures.map_axes import (
     OUT_OF_RANGE,
     Scale,
     entry,
+    in_words,
     missing_note,
     place_axes,
     short,
@@ -41,7 +42,7 @@ def plane(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any) 
     scales = place_axes(ax, found, view)
     x, y = (s(p) for s, p in zip(scales, view.places, strict=True))
     name = shown_name(found, view, show)
-    regions = "status" in view.values and name in (None, "safety_factor", "growth_rate", "critical_stiffness")
+    regions = "status" in view.values and name in (None, "safety_factor", "growth_rate", "critical_stiffness", "edge")
     if regions and view.shares:
         _share_of_stable(ax, x, y, view)
         name = None if show is None else name
@@ -104,10 +105,11 @@ def _contours(ax: Axes, x: Array, y: Array, values: Array, name: str, found: Map
     if min(values.shape) < 2 or not len(good) or good.min() == good.max():
         return
     if name == "safety_factor":
-        levels, factor, label = [s for s in SAFETY if good.min() < s < good.max()], 1.0, "k/k_cr"
+        levels, factor = [s for s in SAFETY if good.min() < s < good.max()], 1.0
+        label = "k/k_cr" if found.along(name) is None else in_words(found, name)
     else:
-        factor, shown_unit = display_unit(found.unit(name), float(np.median(np.abs(good))) or 1.0, found.area)
-        levels, label = _levels(good / factor), f"{short(name)} ({shown_unit})"
+        factor, shown_unit = display_unit(found.unit(name), float(np.median(np.abs(good))) or 1.0, found.area(name))
+        levels, label = _levels(good / factor), labelled(in_words(found, name), shown_unit)
     if not levels:
         return
     lines = ax.contour(x, y, values / factor, levels=levels, colors=BLACK, linewidths=0.6, linestyles="--")
@@ -147,10 +149,10 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         if (values < 0).any():
             entry(ax, Patch(facecolor="white", edgecolor=GREY, label="not computed yet"))
         return
-    factor, unit, norm = scale or colour_scale([values], found.unit(name), found.area)
+    factor, unit, norm = scale or colour_scale([values], found.unit(name), found.area(name))
     mesh = ax.pcolormesh(x, y, np.where(np.isfinite(values), values, np.nan) / factor, cmap="cividis", norm=norm,
                          shading="nearest", rasterized=True)  # fmt: skip
-    ax.figure.colorbar(mesh, ax=ax, label=labelled(name.replace("_", " "), unit))
+    ax.figure.colorbar(mesh, ax=ax, label=labelled(in_words(found, name), unit))
     if note := missing_note(view, name):
         entry(ax, Patch(facecolor="none", label=f"median of samples{note}"))
     if white := without_number(found, view, name):
@@ -221,7 +223,7 @@ def _mark_own(
         return
     ax.plot(*zip(at, nearest, strict=True), color=VERMILION, linewidth=1.2, linestyle=":", zorder=4)
     words = ", ".join(
-        f"{short(name)} {shown(float(value * scale.factor), found.unit(name), 3, found.area)}"
+        f"{short(name)} {shown(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
         for name, value, scale in zip(view.names, nearest, scales, strict=True)
     )
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",

@@ -109,7 +109,9 @@ def _facets(found: MapResult, names: Sequence[str], show: str | None, third: str
     scale = _common_scale(found, views, shown_name(found, views[0], show))
     for ax, view, value in zip(flat, views, chosen, strict=False):
         _draw(ax, found, view, show, scale)
-        ax.set_title(f"{short(third)} = {shown(float(value), found.unit(third), area=found.area)}", fontsize="medium")
+        ax.set_title(
+            f"{short(third)} = {shown(float(value), found.unit(third), area=found.area(third))}", fontsize="medium"
+        )
     for ax in flat[len(chosen) :]:
         ax.set_axis_off()
     for ax in flat:
@@ -125,7 +127,7 @@ def _common_scale(found: MapResult, views: Sequence[View], name: str | None) -> 
     """One colour scale for pictures side by side."""
     if name is None or len(views[0].names) < 2 or found.words(name):
         return ()
-    return colour_scale([view.values[name] for view in views], found.unit(name), found.area)
+    return colour_scale([view.values[name] for view in views], found.unit(name), found.area(name))
 
 
 def _draw(ax: Axes, found: MapResult, view: View, show: str | None, scale: Any = None) -> None:

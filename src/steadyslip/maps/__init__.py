@@ -7,6 +7,7 @@ Store -> MapResult -> files (export), figures, refine
 from __future__ import annotations
 
 from steadyslip.maps.plan.axes import Grid, Samples
+from steadyslip.maps.plan.edges import Edge, LogMargin, SafetyFactor, StableValues
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.measures import Events, KickThreshold, Measure, measure
 from steadyslip.maps.plan.spec import map_from_text, read_map
@@ -16,15 +17,19 @@ from steadyslip.maps.view.result import MapResult, open_map
 from steadyslip.maps.work.run import run_map
 
 __all__ = [
+    "Edge",
     "Events",
     "Grid",
     "KickThreshold",
+    "LogMargin",
     "Map",
     "MapResult",
     "Measure",
     "Refined",
+    "SafetyFactor",
     "Samples",
     "Sensitivity",
+    "StableValues",
     "map_from_text",
     "measure",
     "open_map",

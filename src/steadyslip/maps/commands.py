@@ -15,7 +15,7 @@ from steadyslip.maps.plan.axes import Axis, Generated
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.spec import read_map
 from steadyslip.maps.refine import Refined
-from steadyslip.maps.sensitivity import POINTS, Sensitivity, sensitivity
+from steadyslip.maps.sensitivity import POINTS, Sensitivity, sensitivity, usual_numbers
 from steadyslip.maps.store.arrays import check_path
 from steadyslip.maps.view.result import MapResult, open_map
 from steadyslip.maps.work.run import run_map
@@ -102,7 +102,9 @@ def sensitivity_file(
         ranges |= {name: (low, high, spacing) for name, low, high, spacing in plan.sampling.ranges}
     elif plan.sampling is not None:
         raise NotAvailable("the draws of a fit depend on each other, and Sobol indices are for independent parameters")
-    return sensitivity(plan.rig, ranges, of or _suited(plan), points=points, protocol=plan.protocol)
+    own = {one.name: one for one in plan.compute}
+    wanted = tuple(own.get(name, name) for name in of)  # with the options that the file gives it
+    return sensitivity(plan.rig, ranges, wanted or _suited(plan), points=points, protocol=plan.protocol)
 
 
 def write_sensitivity(found: Sensitivity, path: Path) -> None:
@@ -123,8 +125,8 @@ def _range_of(axis: Axis) -> tuple[float, float, str]:
 
 
 def _suited(plan: Map) -> tuple[Any, ...]:
-    """What the map computes as far as it is one number a point; critical stiffness and margin if nothing is."""
+    """What the map computes as far as it is one number a point; what is usual if nothing is."""
     found = tuple(
         one for one in plan.compute if not any(o.flags or o.extra for o in one.outputs(plan.rig, plan.varied))
     )
-    return found or ("critical_stiffness", "margin")
+    return found or usual_numbers(plan.rig)

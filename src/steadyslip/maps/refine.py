@@ -78,7 +78,9 @@ class Refined(ReadOnly):
             f"where the whole grid would have {full:,.4g}"
         ]
         for name, size in self.spacing.items():
-            lines.append(f"  {name:<24}known to {shown(0.5 * size, self.map.unit(name), 3, self.map.area)} or better")
+            lines.append(
+                f"  {name:<24}known to {shown(0.5 * size, self.map.unit(name), 3, self.map.area(name))} or better"
+            )
         lines.append(f"  {len(self.sides):,} points on the edge")
         return "\n".join(lines)
 

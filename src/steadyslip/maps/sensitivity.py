@@ -13,6 +13,7 @@ from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import interrupts_held, progress_bar
 from steadyslip.core.results import ReadOnly
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Samples
 from steadyslip.maps.plan.map import Map, evaluate
@@ -32,7 +33,7 @@ class Sensitivity(ReadOnly):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     parameters : tuple of str
     ranges : dict of str to (float, float, str)
         Ends in SI units, and ``linear`` or ``log``.
@@ -49,7 +50,7 @@ class Sensitivity(ReadOnly):
         Whether Ctrl-C came before all sets were done.
     """
 
-    rig: Slider = field(repr=False)
+    rig: Slider | Machine = field(repr=False)
     parameters: tuple[str, ...]
     ranges: dict[str, tuple[float, float, str]]
     first: dict[str, Array]
@@ -110,9 +111,9 @@ class Sensitivity(ReadOnly):
 
 @checked()
 def sensitivity(
-    rig: Slider,
+    rig: Slider | Machine,
     over: Mapping[str, Sequence[Any]],
-    of: Any = ("critical_stiffness", "margin"),
+    of: Any = None,
     *,
     points: int = POINTS,
     seed: int = 0,
@@ -123,12 +124,13 @@ def sensitivity(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     over : mapping of str to (low, high) or (low, high, "log")
         At least two parameters by dotted name and their ranges, SI units or text; independent, and uniform in the value
         or in its logarithm.
     of : sequence of str, Measure or function
-        Measures as for `Map` that give one number a point; ``margin`` is ln(k/k_cr).
+        Measures as for `Map` that give one number a point; ``margin`` is ln(k/k_cr). Unless given, of a slider the
+        critical stiffness and that, of a machine its growth rate.
     points : int
         Sets of points, a power of 2; each costs as many evaluations as there are parameters, and two.
     seed : int
@@ -158,7 +160,12 @@ def sensitivity(
     whole = isinstance(points, int) and not isinstance(points, bool)
     if not (whole and LEAST <= points <= MOST and points & (points - 1) == 0):
         raise ParameterError([Problem("points", f"got {points!r}; allowed: a power of 2, from {LEAST} to {MOST}")])
-    plan = Map(rig, compute=of, samples=Samples(over, points, seed=seed), protocol=protocol)
+    plan = Map(
+        rig,
+        compute=usual_numbers(rig) if of is None else of,
+        samples=Samples(over, points, seed=seed),
+        protocol=protocol,
+    )
     if len(plan.varied) < 2:
         raise ParameterError([Problem("over", "give at least two parameters; one alone has all the variance")])
     outputs = plan.outputs()
@@ -194,6 +201,11 @@ def sensitivity(
         plan.rig, plan.varied, ranges, found["first"], found["total"], found["low"], found["high"], found["missing"],
         found["points"], points < asked,
     )  # fmt: skip
+
+
+def usual_numbers(rig: Slider | Machine) -> tuple[str, ...]:
+    """What is asked for unless something is said."""
+    return ("critical_stiffness", "margin") if isinstance(rig, Slider) else ("growth_rate",)
 
 
 def _evaluated(plan: Map, sets: dict[str, Array], progress: bool | None) -> dict[str, Array]:

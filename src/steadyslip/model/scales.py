@@ -271,6 +271,7 @@ def _together(
     count = len(model.contacts)
     stiff, areas = rest[n * count : n * count + n], rest[n * count + n :]
     slips = [found["x"] for found, _ in each]
+    least = np.minimum.reduce(np.broadcast_arrays(*slips))
     time: Any = np.inf
     force: Any = 0.0
     for i, (slip, speed) in enumerate(zip(slips, speeds, strict=True)):
@@ -284,7 +285,7 @@ def _together(
             x = np.minimum(x, np.where(share > 0, slips[i] / np.where(share > 0, share, 1.0), np.inf))
         x = np.where(x < np.inf, x, np.abs(own[k]) * time)
         held = force / np.abs(stiff[k])
-        x = np.where(x > 0, x, np.where((held > 0) & (held < np.inf), held, np.min(slips)))
+        x = np.where(x > 0, x, np.where((held > 0) & (held < np.inf), held, least))
         scales[f"{one.name}.x"] = x
         scales[f"{one.name}.v"] = np.where(own[k] != 0, np.abs(own[k]), x / time)
     for i, (contact, stress) in enumerate(zip(model.contacts, point.sigmas, strict=True)):

@@ -51,6 +51,18 @@ def event_unit(name: str) -> str:
     return "N" if plain == "event_force_drop" else EVENT_UNITS[plain]
 
 
+def event_names(rig: Rig) -> tuple[str, ...]:
+    """The columns of `Ensemble.events`: of a machine for each contact, with its name before it."""
+    if not isinstance(rig, Machine):
+        return tuple(EVENT_UNITS)
+    return tuple(f"{contact}.{_of_contact(name)}" for contact in rig.contacts for name in EVENT_UNITS)
+
+
+def _of_contact(name: str) -> str:
+    """What a column is called where it is one of a contact's: its stresses are forces."""
+    return name.replace("stress_drop", "force_drop")
+
+
 @dataclass(frozen=True, eq=False)
 class Ensemble(ReadOnly):
     """Results of many runs; every array has the broadcast shape of what was varied.
@@ -256,7 +268,7 @@ def _columns(model: Model) -> dict[str, tuple[int, int, bool]]:
     for i, contact in enumerate(model.contacts):
         for k, name in enumerate(TALLY):
             if name and contact.name:
-                own = name.replace("stress_drop", "force_drop")
+                own = _of_contact(name)
                 found[f"{contact.name}.{own}"] = (i * len(TALLY) + k, i, own != name)
             elif name:
                 found[name] = (k, 0, False)

@@ -58,9 +58,16 @@ def parts_of(result: Any, **options: Any) -> Parts:
     )
 
 
-def about_rig(rig: Slider | None) -> list[str]:
+def about_rig(rig: Slider | Machine | None) -> list[str]:
     """Sketch and inputs; nothing where there is no rig."""
+    if isinstance(rig, Machine):
+        return [heading("The machine"), inside(rig)]
     return [] if rig is None else [heading("The rig"), figure(sketch(rig)), of_rig.inputs(rig)]
+
+
+def _with_page(rig: Slider | Machine) -> Slider | None:
+    """The rig, if there is an explorer of it."""
+    return rig if isinstance(rig, Slider) else None
 
 
 @parts_of.register
@@ -112,7 +119,7 @@ def _basin(result: Basin) -> Parts:
 def _sensitivity(result: Sensitivity) -> Parts:
     known = result.rig.parameters()
     ranges = [
-        (name, shown_range(low, high, known[name].role.unit, result.rig.area), spacing, known[name].role.doc)
+        (name, shown_range(low, high, known[name].role.unit, result.rig.area_of(name)), spacing, known[name].role.doc)
         for name, (low, high, spacing) in result.ranges.items()
     ]
     body = [*about_rig(result.rig), heading("What varied"), table(ranges, ("parameter", "range", "spacing", "meaning"))]
@@ -133,7 +140,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
         body.append(paragraph("It was stopped before all points were done.", "warning"))
     (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
     head = f"{result.ranked(first)[0]} decides most about the {first.replace('_', ' ')}"
-    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
+    return Parts(head, "", question, body, _with_page(result.rig), of_rig.as_file(result.rig))
 
 
 @parts_of.register
@@ -260,7 +267,7 @@ def _map(result: MapResult) -> Parts:
     ]  # fmt: skip
     question = "How does the answer depend on the numbers that vary here?"
     head = sentence(first).rstrip(".").replace(" x ", " × ")
-    return Parts(head, "", question, body, rig, of_rig.as_file(rig))
+    return Parts(head, "", question, body, _with_page(rig), of_rig.as_file(rig))
 
 
 def _pictures(result: MapResult) -> Iterator[str]:

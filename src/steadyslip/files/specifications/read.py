@@ -134,6 +134,11 @@ class Specification:
     changed: set[str]
     lines: dict[str, int] = field(repr=False)
 
+    @property
+    def given(self) -> Slider | Machine | None:
+        """The rig or the machine."""
+        return self.machine if self.rig is None else self.rig
+
     def line(self, name: str) -> int | None:
         """The line of a key, or of the table around it."""
         return line_of(name, self.lines)

@@ -179,14 +179,14 @@ class TableReader:
         if isinstance(role, Named):
             return self._named(role, raw, name)
         if isinstance(role, Parameter):
-            role = self._outside(role)
+            role = self.outside(role)
         try:
             return role.read(raw, self.area)
         except ParameterError as error:
             self.problems += [problem.under(name) for problem in error.problems[:1]]
             return None
 
-    def _outside(self, role: Parameter) -> Parameter:
+    def outside(self, role: Parameter) -> Parameter:
         """A parameter in the unit in which it is described here."""
         if self.in_totals and self.area is None and is_per_area(role.unit):
             return replace(role, unit=total_unit(role.unit))  # a contact without area is described in forces

@@ -6,7 +6,7 @@ import itertools
 import math
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,10 @@ from steadyslip.core.records import Address, FrozenRecord, parameters, resolve
 from steadyslip.core.roles import Parameter
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.layout import find_law
+from steadyslip.files.specifications.tables import TableReader
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan import edges  # noqa: F401 -- registers its measures
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE, Axis, Generated, Samples, Sampling, make_axis, make_sampling
 from steadyslip.maps.plan.measures import PROBES, FunctionMeasure, Measure, Output, measure, source_digest
 from steadyslip.model.point import operating_point
@@ -40,14 +43,15 @@ class Map(Displayed):
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
         The base: what does not vary has its values.
     over : mapping of str to Grid or array_like, optional
         Parameters by dotted name, of the rig or of the protocol; each spans a dimension.
     compute : sequence of str, Measure or function
-        Measures by name (``status``, ``critical_stiffness``, ``safety_factor``, ``margin``, ``stable_stiffness``,
-        ``growth_rate``, ``onset``, ``events``, ``threshold``), with options as records such as ``Events(until=200.0)``,
-        or functions of a rig; see `measure`.
+        Measures by name (``status``, ``growth_rate``, ``frequency``, ``edge``, ``stable_values``, ``safety_factor``,
+        ``margin``, ``onset``, ``events``, ``threshold``; of sliders ``critical_stiffness``, ``stable_stiffness``), with
+        options as records such as ``Events(until=200.0)`` or ``Edge(along="drive.kp")``, or functions of a rig; see
+        `measure`. Unless given the status, of sliders with the critical stiffness.
     samples : Samples, mapping of str to array_like, Fit or Draws, optional
         Parameters that vary together along the dimension ``sample``: spread over ranges, listed, or as a fit allows, in
         which case the rig gets the fit's friction as in `predict`.
@@ -62,9 +66,9 @@ class Map(Displayed):
         Listing everything that is wrong.
     """
 
-    rig: Slider
+    rig: Slider | Machine
     over: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    compute: Any = ("status", "critical_stiffness")
+    compute: Any = None
     samples: Any = None
     protocol: Any = field(default_factory=Protocol, repr=False)
     chunk: int | None = None
@@ -73,10 +77,11 @@ class Map(Displayed):
 
     def __post_init__(self) -> None:
         problems: list[Problem] = []
-        if not isinstance(self.rig, Slider):
-            raise ParameterError([Problem("rig", f"got {self.rig!r}; allowed: a Slider, such as read_rig gives")])
+        if not isinstance(self.rig, Slider | Machine):
+            message = f"got {self.rig!r}; allowed: a Slider or Machine, such as read_rig gives"
+            raise ParameterError([Problem("rig", message)])
         self._set("protocol", Protocol.of(self.protocol))
-        self._set("compute", _measures(self.compute, problems))
+        self._set("compute", _measures(usual(self.rig) if self.compute is None else self.compute, problems))
         self._read_samples(problems)
         self._read_axes(problems)
         whole = isinstance(self.chunk, int) and not isinstance(self.chunk, bool)
@@ -86,7 +91,10 @@ class Map(Displayed):
             problems.append(Problem("map.over", "missing; name at least one parameter and its values"))
         for one in self.compute:
             for problem in one.problems(self.rig, self.protocol):
-                problems.append(problem.under(f"map.{one.name}"))
+                message = problem.message if problem.name else f"{one.name!r} {problem.message}"
+                problems.append(Problem(f"map.{one.name}.{problem.name}" if problem.name else "map.compute", message))
+        if problems:
+            raise ParameterError(problems)
         names = [output.name for one in self.compute for output in one.outputs(self.rig, ())]
         extra = {dim for one in self.compute for output in one.outputs(self.rig, ()) for dim, _ in output.extra}
         taken = {*names} & {*self.known(), SAMPLE, COMPLETE, *extra}
@@ -167,7 +175,7 @@ class Map(Displayed):
 
     def known(self) -> dict[str, Address]:
         """All parameters that may vary, by full name."""
-        return self.rig.parameters() | parameters(self.protocol, "protocol.")
+        return self.rig.parameters() | protocol_parameters(self.rig, self.protocol)
 
     def _resolved(self, given: Mapping[str, Any], place: str, problems: list[Problem]) -> dict[str, Any]:
         """By full name; what is wrong with names is added to the problems."""
@@ -281,12 +289,28 @@ class Map(Displayed):
         return f"map of {what} over {' x '.join(parts)}: {self.size:,} points"
 
 
+def usual(rig: Slider | Machine) -> tuple[str, ...]:
+    """What is computed unless something is said."""
+    return ("status", "critical_stiffness") if isinstance(rig, Slider) else ("status", "growth_rate")
+
+
+def protocol_parameters(rig: Slider | Machine, protocol: Protocol) -> dict[str, Address]:
+    """Parameters of a protocol by dotted name, in the units in which they are done to a rig."""
+    reader = TableReader()
+    with reader.of_machine(rig if isinstance(rig, Machine) else None):
+        return {
+            name: replace(one, role=reader.outside(one.role)) for name, one in parameters(protocol, "protocol.").items()
+        }
+
+
 def _for(one: AnyMeasure, vary: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters that matter for a measure: those of the protocol only where something moves."""
     return {name: a for name, a in vary.items() if one.moves or not name.startswith("protocol.")}
 
 
-def evaluate(rig: Slider, protocol: Protocol, compute: Iterable[AnyMeasure], vary: Mapping[str, Any]) -> dict[str, Any]:
+def evaluate(
+    rig: Slider | Machine, protocol: Protocol, compute: Iterable[AnyMeasure], vary: Mapping[str, Any]
+) -> dict[str, Any]:
     """All outputs of all measures at points given as arrays that broadcast; (..., extra) each."""
     shape = np.broadcast_shapes(*(np.shape(a) for a in vary.values()))
     results: dict[str, Any] = {}
@@ -329,7 +353,7 @@ def _measures(given: Any, problems: list[Problem]) -> tuple[AnyMeasure, ...]:
     return tuple(found)
 
 
-def _of_fit(rig: Slider, given: Any) -> tuple[Slider, dict[str, Any]]:
+def _of_fit(rig: Slider | Machine, given: Any) -> tuple[Slider, dict[str, Any]]:
     """The rig with a fit's friction, and draws of the parameters."""
     from steadyslip.experiments import Draws, Fit
     from steadyslip.experiments.answers.predict import transferred
@@ -337,11 +361,14 @@ def _of_fit(rig: Slider, given: Any) -> tuple[Slider, dict[str, Any]]:
     if not isinstance(given, (Fit, Draws)):
         message = f"got {given!r}; allowed: Samples, names and their values, a Fit or Draws of one"
         raise ParameterError([Problem("map.samples", message)])
+    if not isinstance(rig, Slider):
+        message = "a fit is of one block's friction; of a machine, give values for the parameters of a contact by name"
+        raise ParameterError([Problem("map.samples", message)])
     target, _, vary = transferred(rig, given)
     return target, dict(vary)
 
 
-def rig_definition(rig: Slider, protocol: Protocol) -> dict[str, Any]:
+def rig_definition(rig: Slider | Machine, protocol: Protocol) -> dict[str, Any]:
     """Plain data that tells whether two rigs and protocols are the same, laws of other packages by their text."""
     foreign = {
         type(record).__qualname__: source_digest(type(record))

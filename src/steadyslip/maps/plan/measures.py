@@ -16,18 +16,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
+from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError
 from steadyslip.core.records import FrozenRecord, option, parameter
 from steadyslip.core.roles import Domain, below_one, positive, steps, tolerance
-from steadyslip.linear import critical_stiffness, growth_rate, safety_factor, stable_stiffness
-from steadyslip.linear.polynomials import most_intervals
+from steadyslip.linear import growth_rate
 from steadyslip.linear.response import has_closed_form
+from steadyslip.linear.spectrum import spectrum
 from steadyslip.linear.status import WORDS as STATUS, status
-from steadyslip.linear.stiffness import stiffness_polynomials
+from steadyslip.linear.stiffness import in_chunks
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import operating_point
+from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.motion import simulate_many
-from steadyslip.motion.many import EVENT_UNITS
+from steadyslip.motion.many import event_names, event_unit
 from steadyslip.motion.status import WORDS
 from steadyslip.nonlinear.kicks.brackets import BEYOND, threshold_brackets
 from steadyslip.nonlinear.kicks.kicks import KICKS
@@ -36,6 +37,7 @@ from steadyslip.protocol import Protocol
 
 Vary = Mapping[str, Any]
 SECONDS_A_STEP = 4e-8  # of a lane's step on one core; decides no more than the size of chunks
+SECONDS_OF_DELAY = 1e-2  # to count infinitely many roots
 PROBES = 64
 NOT_DONE = -1
 
@@ -81,25 +83,28 @@ class Measure(FrozenRecord, family="measure"):
     moves: ClassVar[bool] = False
     """Whether the protocol matters; otherwise parameters of the protocol that vary are left out."""
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         """The arrays that it gives where the named parameters vary."""
         raise NotImplementedError
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         """The outputs by name, for parameters in SI units that broadcast against each other."""
         raise NotImplementedError
 
-    def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         """What is missing or wrong with it for this rig."""
         yield from ()
 
-    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         """About how long one point takes on one core; `probes` are parameters at some points of the map.
 
         Must not depend on a clock: the size of chunks follows from it, and the same map gets the same chunks.
         """
         present = [name for name in probes if name in rig.parameters()]
-        return 1.2e-7 if has_closed_form(operating_point(rig, None, present).model) else 4e-6
+        model = operating_point(rig, None, present).model
+        if model.delays:
+            return SECONDS_OF_DELAY
+        return 1.2e-7 if has_closed_form(model) else 4e-6 if model.is_single else 2e-5
 
     def definition(self) -> dict[str, Any]:
         """Name and options, to tell whether two measures are the same."""
@@ -110,67 +115,53 @@ class Measure(FrozenRecord, family="measure"):
         return found
 
 
-class CriticalStiffness(Measure, name="critical_stiffness"):
-    """Edge of the stable set nearest to the rig's own stiffness; see `steadyslip.critical_stiffness`."""
-
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("critical_stiffness", "Pa/m", "critical stiffness"),)
-
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"critical_stiffness": critical_stiffness(rig, vary)}
-
-
-class SafetyFactor(Measure, name="safety_factor"):
-    """Stiffness over critical stiffness; see `steadyslip.safety_factor`."""
-
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("safety_factor", "1", "stiffness over critical stiffness"),)
-
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"safety_factor": safety_factor(rig, vary)}
-
-
-class LogMargin(Measure, name="margin"):
-    """Logarithm of the safety factor, ln(k/k_cr): zero at the edge, as far below it as above by the same factor."""
-
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (Output("margin", "1", "logarithm of stiffness over critical stiffness"),)
-
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"margin": np.log(safety_factor(rig, vary))}
-
-
-class StableStiffness(Measure, name="stable_stiffness"):
-    """All stable stiffnesses as intervals; see `steadyslip.stable_stiffness`."""
-
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
-        values = operating_point(rig, None, [n for n in varied if n in rig.parameters()])
-        one = has_closed_form(values.model)
-        most = 1 if one else most_intervals(stiffness_polynomials(values)[0].shape[-1] - 1)
-        extra = (("interval", most), ("end", 2))
-        return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
-
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"stable_stiffness": stable_stiffness(rig, vary)}
+def block_of(rig: Slider | Machine) -> Slider:
+    """The slider that a rig is, of which that was asked before."""
+    if isinstance(rig, Machine):
+        raise InternalError("a slider")
+    return rig
 
 
 class GrowthRate(Measure, name="growth_rate"):
     """Largest real part of the eigenvalues; see `steadyslip.growth_rate`."""
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output("growth_rate", "1/s", "growth rate of small disturbances"),)
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         return {"growth_rate": growth_rate(rig, vary)}
+
+
+class Frequency(Measure, name="frequency"):
+    """Frequency and damping ratio of the leading mode: 0 and ±1 where it does not oscillate."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (
+            Output("frequency", "Hz", "frequency of the leading mode"),
+            Output("damping_ratio", "1", "damping ratio of the leading mode"),
+        )
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        found = np.asarray(in_chunks(operating_point(rig, vary), _leading))
+        return {"frequency": found[..., 0], "damping_ratio": found[..., 1]}
+
+
+def _leading(point: OperatingPoint) -> Any:
+    """Frequency (Hz) and damping ratio of the rightmost eigenvalue, (..., 2)."""
+    found = np.asarray(spectrum(point))
+    with np.errstate(all="ignore"):
+        first = np.argmax(np.where(np.isnan(found.real), -np.inf, found.real), axis=-1)
+        s = np.take_along_axis(found, first[..., None], axis=-1)[..., 0]
+        return np.stack([np.abs(s.imag) / (2 * np.pi), -s.real / np.abs(s)], axis=-1)
 
 
 class StabilityStatus(Measure, name="status"):
     """Stable, unstable (ill-posed included), or no steady sliding."""
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output("status", "1", "stability of steady sliding", STATUS),)
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         values = operating_point(rig, vary)
         found = [np.broadcast_to(status(part), part.shape).reshape(-1) for part in values.pieces(32768)]
         return {"status": np.concatenate(found).reshape(values.shape)}
@@ -179,20 +170,24 @@ class StabilityStatus(Measure, name="status"):
 class OnsetKind(Measure, name="onset"):
     """Kind of onset at the oscillatory edge in stiffness nearest to the rig's own; see `steadyslip.hopf`."""
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (
             Output("onset", "1", "kind of onset", ONSET),
             Output("onset_edge", "Pa/m", "stiffness at the oscillatory edge"),
             Output("onset_coefficient", "1/s", "cubic coefficient of the onset"),
         )
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        found = onset_map(rig, vary)
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        found = onset_map(block_of(rig), vary)
         return {
             "onset": found["kind"], "onset_edge": found["edge"], "onset_coefficient": found["coefficient"]
         }  # fmt: skip
 
-    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
+        if isinstance(rig, Machine):
+            yield Problem("", "is not offered for machines yet")
+
+    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         return 1e-4
 
 
@@ -209,32 +204,38 @@ class Events(Measure, name="events"):
     arrest: float = parameter("1", below_one, "velocity over the drive's below which a block is held", default=1e-3)
     most_steps: float = parameter("1", steps, "steps after which a run is given up", default=1_000_000)
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         ended = (
             Output("outcome", "1", "how the run ended", tuple(WORDS)),
             Output("end_time", "s", "time reached"),
         )
-        meant = (Output(name, unit, name.replace("_", " ")) for name, unit in EVENT_UNITS.items())
+        meant = (Output(name, event_unit(name), _in_words(name)) for name in event_names(rig))
         return (*ended, *meant)
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         found = self._run(rig, protocol, vary)
         return {"outcome": found.status_code, "end_time": found.end, **found.events}
 
-    def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         if self.until is None and protocol.until is None:
             message = "missing; give the end of the runs, such as '200 s', here or in [protocol]"
             yield Problem("until", message)
 
-    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         found = self._run(rig, protocol, probes)
         return float(np.mean(found.steps + found.rejected)) * SECONDS_A_STEP + 1e-6
 
-    def _run(self, rig: Slider, protocol: Protocol, vary: Vary) -> Any:
+    def _run(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Any:
         return simulate_many(
             rig, vary, protocol, until=self.until, observables=(), method=self.method, rtol=self.rtol,
             most_steps=int(self.most_steps), arrest=self.arrest, threads=1, progress=False,
         )  # fmt: skip
+
+
+def _in_words(name: str) -> str:
+    """What a column of events is, and of which contact."""
+    contact, _, plain = name.rpartition(".")
+    return plain.replace("_", " ") + (f" of {contact}" if contact else "")
 
 
 class KickThreshold(Measure, name="threshold"):
@@ -247,7 +248,7 @@ class KickThreshold(Measure, name="threshold"):
     )
     precision: float = parameter("1", small, "relative, of the size found", default=1e-4)
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (
             Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
             Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),
@@ -255,16 +256,20 @@ class KickThreshold(Measure, name="threshold"):
             Output("threshold_limit", "1", f"what limits the {self.kick} kicks that are survived", BEYOND),
         )
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         direction = -1 if self.reverse else 1
         found, _, _ = threshold_brackets(
-            rig, vary, self.kick, direction=direction, reference=self.reference, precision=self.precision, threads=1,
-            progress=False,
+            block_of(rig), vary, self.kick, direction=direction, reference=self.reference, precision=self.precision,
+            threads=1, progress=False,
         )  # fmt: skip
         return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high,
                 "threshold_limit": found.beyond}  # fmt: skip
 
-    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
+        if isinstance(rig, Machine):
+            yield Problem("", "is not offered for machines yet")
+
+    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         return 5e-3
 
 
@@ -279,10 +284,10 @@ class FunctionMeasure:
     cost: float = 1e-3
     moves: ClassVar[bool] = False
 
-    def outputs(self, rig: Slider, varied: Sequence[str]) -> tuple[Output, ...]:
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         return (Output(self.name, self.unit, self.name.replace("_", " ")),)
 
-    def arrays(self, rig: Slider, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         if self.takes_arrays:
             return {self.name: self.function(rig, vary)}
         shape = np.broadcast_shapes(*(np.shape(a) for a in vary.values()))
@@ -291,7 +296,7 @@ class FunctionMeasure:
         found = np.array([self._at(rig, {n: float(c[i]) for n, c in columns.items()}) for i in range(size)])
         return {self.name: found.reshape(shape)}
 
-    def _at(self, rig: Slider, point: dict[str, float]) -> float:
+    def _at(self, rig: Slider | Machine, point: dict[str, float]) -> float:
         """NaN where the question has no answer; any other failure names the point."""
         try:
             return float(self.function(rig.with_values(point)))
@@ -302,10 +307,10 @@ class FunctionMeasure:
             message = f"failed with {type(error).__name__}: {error}; at {where}"
             raise ParameterError([Problem(f"map.compute.{self.name}", message)]) from error
 
-    def problems(self, rig: Slider, protocol: Protocol) -> Iterator[Problem]:
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         yield from ()
 
-    def seconds(self, rig: Slider, protocol: Protocol, probes: Vary) -> float:
+    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         return self.cost
 
     def definition(self) -> dict[str, Any]:

@@ -70,7 +70,10 @@ class SampleSettings(Settings):
 class MapSettings(Settings):
     """What to compute of which rigs; a further table, named after a result, for the options of each."""
 
-    compute: tuple[str, ...] = setting(Names("results, see below"), default=("status", "critical_stiffness"))
+    compute: tuple[str, ...] | None = setting(
+        Names("results, see below; unless given `status`, with `critical_stiffness` for a slider, `growth_rate` for a "
+              "machine"), default=None,
+    )  # fmt: skip
     chunk: int | None = setting(
         Whole("points computed in one go; by what a point costs unless given", 1, LARGEST_CHUNK), default=None
     )
@@ -86,10 +89,12 @@ class MapSettings(Settings):
 
     def inconsistencies(self) -> Iterator[Problem]:
         for one in self.options:
-            if one.name not in self.compute:
+            if one.name not in (self.compute or ()):
                 yield Problem(one.name, f"options of something that is not computed; add {one.name!r} to map.compute")
 
-    def measures(self) -> list[Any]:
-        """What is computed: with options as a record, else by name."""
+    def measures(self) -> list[Any] | None:
+        """What is computed: with options as a record, else by name; None where nothing is said."""
+        if self.compute is None:
+            return None
         with_options = {one.name: one for one in self.options}
         return [with_options.get(name, name) for name in self.compute]

@@ -10,11 +10,11 @@ from typing import Any
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
 from steadyslip.core.options import checked
-from steadyslip.core.records import parameters, resolve
+from steadyslip.core.records import resolve
 from steadyslip.files.specifications.layout import MAP, Section
 from steadyslip.files.specifications.read import Specification, read_specification, text_of
 from steadyslip.maps.plan.axes import Grid
-from steadyslip.maps.plan.map import Map
+from steadyslip.maps.plan.map import Map, protocol_parameters
 from steadyslip.maps.plan.settings import FIT_POINTS, GridSettings, MapSettings, RangeSettings, SampleSettings
 from steadyslip.protocol import Protocol
 
@@ -50,9 +50,8 @@ def read_map(path: str | PathLike[str], changes: Iterable[str] = ()) -> Map:
 def map_from_text(text: str, source: str = "map", changes: Iterable[str] = (), folder: Path = Path()) -> Map:
     """Read the text of such a file; see `read_map`."""
     spec = read_specification(text, source, changes, (TABLE,))
-    spec.refuse_machine()
     settings = spec.further.get(MAP)
-    plan = _Plan(spec, settings, folder) if spec.rig is not None and isinstance(settings, MapSettings) else None
+    plan = _Plan(spec, settings, folder) if spec.given is not None and isinstance(settings, MapSettings) else None
     spec.refuse(*(plan.placed() if plan is not None else ()))
     if plan is None or plan.found is None:
         raise InternalError("a map, or problems")
@@ -66,16 +65,17 @@ class _Plan:
         self.problems: list[Problem] = []
         self.found: Map | None = None
         self.spec, self.folder = spec, folder
-        rig = spec.rig
+        rig = spec.given
         if rig is None:
             raise InternalError("a rig")
-        self.known = rig.parameters() | parameters(spec.protocol or Protocol(), "protocol.")
+        self.rig = rig
+        self.known = rig.parameters() | protocol_parameters(rig, spec.protocol or Protocol())
         over, sampled = settings.over or {}, (settings.samples.over if settings.samples else None) or {}
         self.written = sorted([*over, *sampled], key=len, reverse=True)
         axes = {name: one.grid() if isinstance(one, GridSettings) else one for name, one in self._whole("over", over)}
-        arguments: dict[str, Any] = {"over": self._per_area("map.over", axes, rig.area), "chunk": settings.chunk}
+        arguments: dict[str, Any] = {"over": self._per_area("map.over", axes), "chunk": settings.chunk}
         if settings.samples is not None:
-            arguments["samples"] = self._samples(settings.samples, rig.area)
+            arguments["samples"] = self._samples(settings.samples)
         try:
             self.found = Map(rig, protocol=spec.protocol or Protocol(), compute=self._measures(settings), **arguments)
         except ParameterError as error:
@@ -93,11 +93,13 @@ class _Plan:
                     return self.spec.line(prefix + written)
         return self.spec.line(name)
 
-    def _measures(self, settings: MapSettings) -> list[Any]:
+    def _measures(self, settings: MapSettings) -> list[Any] | None:
         """What is computed; results whose options are wrong already are left out, unless nothing else is left."""
         names = [p.name.split(".") for p in self.spec.problems]
         faulty = {parts[1] for parts in names if len(parts) > 2 and parts[0] == MAP}
         every = settings.measures()
+        if every is None:
+            return None
         return [one for one in every if one not in faulty] or (["status"] if every else [])
 
     def _whole(self, place: str, over: Mapping[str, Any]) -> list[tuple[str, Any]]:
@@ -113,18 +115,19 @@ class _Plan:
                 found.append((name, one))
         return found
 
-    def _per_area(self, place: str, over: Mapping[str, Any], area: float | None) -> dict[str, Any]:
-        """Where the rig has an area, values are for the whole of it, as everywhere in its file."""
+    def _per_area(self, place: str, over: Mapping[str, Any]) -> dict[str, Any]:
+        """Where the rig or a contact has an area, values are for the whole of it, as everywhere in its file."""
         found: dict[str, Any] = {}
         for name, one in over.items():
             found[name] = one
             try:
-                role = self.known[resolve(name, self.known)].role
+                full = resolve(name, self.known)
             except UnknownNameError:
                 continue  # the map will say so
+            role, area = self.known[full].role, self.rig.area_of(full)
+            if area is None:
+                continue
             try:
-                if area is None:
-                    continue
                 if isinstance(one, Grid):
                     found[name] = replace(one, start=role.read(one.start, area), stop=role.read(one.stop, area))
                 elif isinstance(one, tuple):
@@ -136,12 +139,12 @@ class _Plan:
                 self.problems += [p.under(f"{place}.{name}") for p in error.problems]
         return found
 
-    def _samples(self, settings: SampleSettings, area: float | None) -> Any:
+    def _samples(self, settings: SampleSettings) -> Any:
         if settings.fit is not None:
             return self._of_fit(settings, settings.fit)
         whole = dict(self._whole("samples.over", settings.over or {}))
         found = replace(settings, over=whole, points=settings.points or 1).samples()
-        return replace(found, over=self._per_area("map.samples.over", found.over, area))
+        return replace(found, over=self._per_area("map.samples.over", found.over))
 
     def _of_fit(self, settings: SampleSettings, name: str) -> Any:
         from steadyslip.experiments import load_fit, normal_draws

@@ -24,7 +24,8 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.files.inputs import UnreadableFile, check_room, inside, read_bytes
-from steadyslip.files.specifications import slider_from_text
+from steadyslip.files.specifications import rig_from_text
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import COMPLETE, SAMPLE
 from steadyslip.maps.plan.map import Map, differences
@@ -122,7 +123,7 @@ class Store:
         """What to say of files that cannot be read."""
         return NotAvailable(f"{str(self.path)!r} is damaged ({what}: {error}); compute the map again to repair it")
 
-    def rig(self) -> Slider:
+    def rig(self) -> Slider | Machine:
         """The base rig.
 
         Raises
@@ -132,7 +133,7 @@ class Store:
         """
         if not self.rig_text:
             raise NotAvailable(f"the rig of {str(self.path)!r} has a law without a name, which cannot be read back")
-        return slider_from_text(self.rig_text, str(self.path))
+        return rig_from_text(self.rig_text, str(self.path))
 
     def region(self, number: int) -> tuple[slice, ...]:
         """The points of a chunk."""

@@ -5,13 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError
-from steadyslip.linear.status import ABSENT, UNKNOWN, without_edge
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, WORDS, status, without_edge
+from steadyslip.machine.machine import Machine
 from steadyslip.maps.view.cut import View
 from steadyslip.maps.view.result import MapResult
 from steadyslip.model.point import operating_point
 
 ASKED = 12
-_ABOUT_EDGES = ("critical_stiffness", "safety_factor", "margin")
+_ABOUT_EDGES = ("critical_stiffness", "safety_factor", "margin", "edge")
+_SAYS = {
+    ABSENT: WORDS[ABSENT],
+    UNKNOWN: WORDS[UNKNOWN],
+    STABLE: "stable at every value",
+    UNSTABLE: "stable at no value",
+}
 _INFINITE = {"growth_rate": "ill-posed", "threshold": "no kick in the range fails"}
 
 
@@ -49,6 +56,9 @@ def _reasons(found: MapResult, view: View, rows: np.ndarray) -> list[str]:
     try:
         rig = found.rig
         points = points_at(view, rows) if not view.bands else []
-        return [str(without_edge(operating_point(rig, one))) for one in points]
+        asked = [operating_point(rig, one) for one in points]
+        if isinstance(rig, Machine):
+            return [_SAYS[int(status(one))] for one in asked]
+        return [str(without_edge(one)) for one in asked]
     except (NotAvailable, ParameterError):
         return []

@@ -14,12 +14,16 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, shown_range
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.store.arrays import Store
 from steadyslip.maps.view import export
 
 BLOCK = 2**22  # points read at a time
-LINEAR = ("critical_stiffness", "safety_factor", "margin", "stable_stiffness", "growth_rate")
+LINEAR = (
+    "critical_stiffness", "safety_factor", "margin", "stable_stiffness", "growth_rate", "edge", "stable_values",
+    "frequency", "damping_ratio",
+)  # fmt: skip
 """Results that are missing where there is no steady sliding, or numbers are out of range, which `status` tells."""
 
 
@@ -43,7 +47,7 @@ class MapResult(Displayed):
         return self._store
 
     @property
-    def rig(self) -> Slider:
+    def rig(self) -> Slider | Machine:
         """The base rig; NotAvailable if it has a law that no file can refer to."""
         return self._store.rig()
 
@@ -127,11 +131,15 @@ class MapResult(Displayed):
             raise ParameterError([Problem("name", unknown_name("array", name, (*self.results, *self.parameters)))])
         return str(self._store.layout.arrays[name].attributes["units"])
 
-    @property
-    def area(self) -> float | None:
-        """Contact area of the rig, m^2; None where it has none, or is not known any more."""
+    def along(self, name: str) -> str | None:
+        """The parameter that a result is about, where it is about one in particular."""
+        given = self._store.layout.definition["compute"].get(name, {})
+        return given.get("along") if isinstance(given, dict) else None
+
+    def area(self, name: str) -> float | None:
+        """Contact area (m^2) for which people get a result or parameter as a total; None where in its own unit."""
         try:
-            return self.rig.area
+            return self.rig.area_of(name)
         except (NotAvailable, ParameterError):
             return None
 
@@ -185,22 +193,24 @@ class MapResult(Displayed):
         return self._store.read(name, region)
 
     def __str__(self) -> str:
-        (done, count), area = self.finished, self.area
+        done, count = self.finished
         lines = [self._store.layout.title]
         state = "complete" if done == count else f"{done} of {count} chunks; run it again for the rest"
         lines.append(f"  {'in ' + str(self.path):<22}  {state}")
-        for name, found in self.statistics().items():
+        statistics = self.statistics()
+        width = max([24, *(len(name) + 2 for name in statistics)])
+        for name, found in statistics.items():
             if self.words(name):
                 text = ", ".join(f"{word} {_percent(share)}" for word, share in found.items())
             elif "low" in found:
-                low, high, unit = found["low"], found["high"], self.unit(name)
+                low, high, unit, area = found["low"], found["high"], self.unit(name), self.area(name)
                 text = shown_range(low, high, unit, area) if low < high else shown(low, unit, area=area)
                 text += "" if found["share"] == 1 else f", for {_percent(found['share'])} of the points"
             else:
                 text = "nowhere"
             if name in LINEAR and "status" not in self.results and found.get("share", 1) < 1:
                 text += "; compute status as well to know of the rest"
-            lines.append(f"  {name:<24}{text}")
+            lines.append(f"  {name:<{width}}{text}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -211,7 +221,7 @@ class MapResult(Displayed):
         """Plain data in SI units: what is computed, how far, and its statistics."""
         (done, count), statistics = self.finished, self.statistics()
         ends = {name: {k: v for k, v in one.items() if k in ("low", "high")} for name, one in statistics.items()}
-        scaled = {name: outside(self.unit(name), self.area) for name, one in ends.items() if one}
+        scaled = {name: outside(self.unit(name), self.area(name)) for name, one in ends.items() if one}
         forces = {
             name: {end: value * factor for end, value in ends[name].items()} | {"unit": unit}
             for name, (factor, unit) in scaled.items()
@@ -224,7 +234,7 @@ class MapResult(Displayed):
             "results": {name: self.unit(name) for name in self.results},
             "chunks": {"finished": done, "all": count},
             "statistics": statistics,
-        } | ({"forces": {"area": self.area, "statistics": forces}} if forces else {})
+        } | ({"forces": {"area": self.area(next(iter(forces))), "statistics": forces}} if forces else {})
 
     def to_netcdf(self, path: str | PathLike[str]) -> None:
         """Write one netCDF file; what is not computed yet is missing there.

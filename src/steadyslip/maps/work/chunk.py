@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import OutOfRangeWarning, SteadyslipError
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.axes import Generated
 from steadyslip.maps.plan.map import AnyMeasure, Map, evaluate
@@ -36,7 +37,7 @@ class Job:
     """
 
     path: str
-    rig: Slider
+    rig: Slider | Machine
     protocol: Protocol
     compute: tuple[AnyMeasure, ...]
     sampling: Generated | None

@@ -1,0 +1,174 @@
+"""Measures of where stability changes: along the stiffness of a slider, or along any parameter that enters linearly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
+from steadyslip.core.quantities import outside
+from steadyslip.core.records import setting
+from steadyslip.core.roles import Text
+from steadyslip.linear import critical_stiffness, safety_factor, stable_stiffness
+from steadyslip.linear.polynomials import most_intervals
+from steadyslip.linear.response import has_closed_form
+from steadyslip.linear.stable_values import most_values, nearest_value, stable_intervals
+from steadyslip.linear.stiffness import stiffness_polynomials
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
+from steadyslip.maps.plan.measures import Measure, Output, Vary, block_of
+from steadyslip.model.point import operating_point
+from steadyslip.protocol import Protocol
+
+
+def _of_sliders(rig: Slider | Machine) -> Iterator[Problem]:
+    """What is about the stiffness k of a block is no question for a machine."""
+    if isinstance(rig, Machine):
+        yield Problem(
+            "", "is about the one stiffness of a slider, and a machine has several; compute 'edge' or 'stable_values' "
+            "with along = 'links.NAME.stiffness', a gain, or any other parameter",
+        )  # fmt: skip
+
+
+class CriticalStiffness(Measure, name="critical_stiffness"):
+    """Edge of the stable set nearest to the rig's own stiffness, of sliders; see `steadyslip.critical_stiffness`."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("critical_stiffness", "Pa/m", "critical stiffness"),)
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"critical_stiffness": critical_stiffness(block_of(rig), vary)}
+
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
+        yield from _of_sliders(rig)
+
+
+class StableStiffness(Measure, name="stable_stiffness"):
+    """All stable stiffnesses as intervals, of sliders; see `steadyslip.stable_stiffness`."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        values = operating_point(rig, None, [n for n in varied if n in rig.parameters()])
+        one = has_closed_form(values.model)
+        most = 1 if one else most_intervals(stiffness_polynomials(values)[0].shape[-1] - 1)
+        extra = (("interval", most), ("end", 2))
+        return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"stable_stiffness": stable_stiffness(block_of(rig), vary)}
+
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
+        yield from _of_sliders(rig)
+
+
+ALONG = "dotted name of the parameter that is meant, which must enter the equations linearly: a stiffness, a gain, ..."
+
+
+class Along(Measure):
+    """Base of measures of where stability changes along one parameter that enters the equations linearly."""
+
+    along: str | None = setting(Text(ALONG), default=None)
+
+    def name_of(self, rig: Slider | Machine) -> str:
+        """The full name of the parameter."""
+        return rig.resolve(self.along or "slider.stiffness")
+
+    def is_own(self, rig: Slider | Machine) -> bool:
+        """Whether it is the stiffness of a slider, for which there are closed forms."""
+        return not isinstance(rig, Machine) and self.name_of(rig) == "slider.stiffness"
+
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
+        if self.along is None and isinstance(rig, Machine):
+            yield Problem("along", f"missing; name a parameter that the machine has, such as {_example(rig)!r}")
+            return
+        try:
+            full = self.name_of(rig)
+            if not self.is_own(rig):
+                if not (value := rig.value(full)) or value < 0:
+                    raise ParameterError([Problem("along", f"{full} has no positive value; give it one first")])
+                stable_intervals(operating_point(rig), full)
+        except ParameterError as error:
+            yield from (Problem("along", problem.message) for problem in error.problems)
+        except SteadyslipError as error:
+            yield Problem("along", str(error))
+
+    def unit(self, rig: Slider | Machine) -> tuple[float, str]:
+        """The unit in which values are kept: that of the model, of a contact of a machine that of its user."""
+        full = self.name_of(rig)
+        return outside(rig.parameters()[full].role.unit, rig.area_of(full) if isinstance(rig, Machine) else None)
+
+    def room(self, rig: Slider | Machine, varied: Sequence[str]) -> int:
+        """How many intervals there may be."""
+        return most_values(operating_point(rig, None, [n for n in varied if n in rig.parameters()]))
+
+    def intervals(self, rig: Slider | Machine, vary: Vary) -> Any:
+        """Stable intervals in SI units, (..., m, 2)."""
+        if self.is_own(rig):
+            return stable_stiffness(block_of(rig), vary)
+        return stable_intervals(operating_point(rig, vary), self.name_of(rig))
+
+    def edge(self, rig: Slider | Machine, vary: Vary) -> tuple[Any, Any]:
+        """The nearest end of a stable interval, and the rig's own value, SI units."""
+        full = self.name_of(rig)
+        own = operating_point(rig, vary).named()[full]
+        return nearest_value(np.asarray(self.intervals(rig, vary)), own), own
+
+
+def _example(rig: Machine) -> str:
+    """A parameter that a machine has and whose edge is of interest."""
+    known = [name for name, one in rig.parameters().items() if one.value and one.role.kind != "delay"]
+    return next((name for name in known if rig.parameters()[name].role.kind == "stiffness"), known[0])
+
+
+class Edge(Along, name="edge"):
+    """Edge of the stable set of any parameter nearest to its own value, exactly; see `steadyslip.stable_values`."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        return (Output("edge", self.unit(rig)[1], f"edge of stability in {self.name_of(rig)}"),)
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"edge": self.edge(rig, vary)[0] * self.unit(rig)[0]}
+
+
+class StableValues(Along, name="stable_values"):
+    """All stable values of any parameter as intervals, exactly; see `steadyslip.stable_values`."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        extra = (("interval", self.room(rig, varied)), ("end", 2))
+        meaning = f"ends of the intervals in which {self.name_of(rig)} is stable"
+        return (Output("stable_values", self.unit(rig)[1], meaning, extra=extra),)
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"stable_values": np.asarray(self.intervals(rig, vary)) * self.unit(rig)[0]}
+
+
+class SafetyFactor(Along, name="safety_factor"):
+    """Stiffness, or another parameter, over where its edge is; see `steadyslip.safety_factor`."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        what = "stiffness over critical stiffness" if self.is_own(rig) else f"{self.name_of(rig)} over its edge"
+        return (Output("safety_factor", "1", what),)
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        return {"safety_factor": self.factor(rig, vary)}
+
+    def factor(self, rig: Slider | Machine, vary: Vary) -> Any:
+        """Value over edge."""
+        if self.is_own(rig):
+            return safety_factor(block_of(rig), vary)
+        edge, own = self.edge(rig, vary)
+        with np.errstate(all="ignore"):
+            return own / edge
+
+
+class LogMargin(SafetyFactor, name="margin"):
+    """Logarithm of the safety factor, ln(k/k_cr): zero at the edge, as far below it as above by the same factor."""
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        (factor,) = super().outputs(rig, varied)
+        return (Output("margin", "1", f"logarithm of {factor.meaning}"),)
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        with np.errstate(all="ignore"):
+            return {"margin": np.log(self.factor(rig, vary))}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from explored_pages import MOVED, Visit
+from explored_pages import FOLLOW, MOVED, Visit
 from rigs_of_theory import rig
 
 DISTURBED = {
@@ -72,6 +72,11 @@ def test_curves_are_those_of_the_disturbance_that_is_asked_for(browser, moved):
             visit.page.get_by_label(label).press("Tab")
             visit.told("slip event")
             assert curves.is_visible()
+        visit.page.evaluate(FOLLOW, "#friction.b=0.0145&slider.stiffness=1e-305")  # a period beyond all numbers
+        visit.told("too slowly to show; say how long the run lasts")
+        assert not curves.is_visible()
+        visit.page.evaluate(FOLLOW, "#friction.b=0.016")
+        visit.told("slip event")
         visit.page.get_by_label("disturbance", exact=True).select_option("blow")
         visit.told("a blow needs a mass")
         assert visit.page.get_by_label("size of the disturbance").get_attribute("placeholder") == ""

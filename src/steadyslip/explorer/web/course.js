@@ -149,7 +149,8 @@ export class Course {
     const disturbance = this.disturbance.value, { unit, usual, ratio, positive } = DISTURBANCES[disturbance];
     const period = Math.abs(lead.im > 0 ? (2 * Math.PI) / lead.im : 5 / (lead.re || 1)), per = unit === "Pa" ? area ?? 1 : 1, si = unit === "Pa" && area !== null ? "N" : unit;
     const until = this.length.value ? parse(this.length.value, "s", "s") : 12 * period;
-    const own = usual({ period, slip: this.mover.own.scales.x, sigma, tau: observed.shear_stress ?? sigma }) * per;
+    if (until === Infinity) throw new Error("a small disturbance grows or dies out too slowly to show; say how long the run lasts");
+    const own = usual({ period: Math.min(period, until), slip: this.mover.own.scales.x, sigma, tau: observed.shear_stress ?? sigma }) * per;
     const size = this.size.value ? parse(this.size.value.replace(/^×\s*/, ""), si, si) : own;
     if (!(until > 0)) throw new Error("the length of a run is above 0 s");
     if (ratio && !(size > 0)) throw new Error("the velocity is multiplied by a number above 0");

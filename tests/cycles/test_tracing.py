@@ -1,0 +1,206 @@
+"""How a branch of cycles is followed: what counts as a cycle, where it ends, what breaks off, how far steps go."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from dimensionless import A, unit_rig
+from rigs_of_theory import CONTACTS, rate_state, rig
+from steadyslip.motion.jobs import Options, prepare
+from steadyslip.nonlinear.continuation import Failure, Point, Track
+from steadyslip.nonlinear.kicks.spans import constant_inputs
+from steadyslip.nonlinear.orbits import flow as flow_module, tracer as tracer_module
+from steadyslip.nonlinear.orbits.cycle import SpecialCycle
+from steadyslip.nonlinear.orbits.flow import Flow, Runs
+from steadyslip.nonlinear.orbits.measure import measured
+from steadyslip.nonlinear.orbits.shooting import Shooting
+from steadyslip.nonlinear.orbits.special import Known, changes
+from steadyslip.nonlinear.orbits.tracer import STANDING, Tracer, _stands, _winds
+from steadyslip.nonlinear.orbits.verify import cycle_near
+
+
+def started(a_rig, **initial):
+    """Jobs of one run of a rig, and the kernel's state at its start, at the drive's velocity."""
+    one = np.ones(1)
+    jobs = prepare(a_rig, None, 1.0, {}, initial, Options())
+    jobs = replace(jobs, segments=constant_inputs(one, one * a_rig.drive.velocity, 0 * one, 0 * one))
+    state = np.zeros(Runs(jobs).size)
+    state[0], state[2:] = jobs.initial[0][0], jobs.initial[0][2:]
+    return jobs, state
+
+
+@pytest.mark.parametrize("mass", [0.0, 1.0])
+def test_motion_is_on_a_cycle_only_if_there_is_one(mass, damped):
+    """The cycle next to a motion is that of the branch; a motion that settles, or grows, is on none."""
+    rigs = [unit_rig("slip", 0.5, kappa, damping=0 if mass else 1e-3, mass=mass) for kappa in (0.4, 1.4)]
+    jobs, state = started(rigs[0], x=0.3)
+    found = cycle_near(Runs(jobs), state, patience=20)
+    (cycle,) = (damped if not mass else ss.cycles(rigs[0], doublings=0)).at(0.4 * A)
+    assert found.period == pytest.approx(cycle.period, rel=1e-8)
+    assert found.multipliers == pytest.approx(cycle.multipliers, rel=1e-5, abs=1e-8)
+    assert cycle_near(Runs(jobs), found._orbit.states[0]).period == pytest.approx(found.period, rel=1e-9)
+    jobs, state = started(rigs[1], x=0.3)
+    assert cycle_near(Runs(jobs), state, patience=20) is None
+
+
+def test_windings_that_close_in_on_a_value_are_an_end(damped):
+    def folds(values, periods):
+        return [
+            SpecialCycle("fold", replace(damped.cycles[0], value=v, period=p), (v, v), 0.0)
+            for v, p in zip(values, periods, strict=True)
+        ]
+
+    closing = 1.0 + (-0.5) ** np.arange(8.0)
+    assert _winds(folds(closing, np.arange(1.0, 9.0)))
+    assert not _winds(folds(closing, np.ones(8)))
+    assert not _winds(folds(closing[:4], np.arange(1.0, 5.0)))
+    assert not _winds(folds(1.0 + 0.1 * (-1.0) ** np.arange(8.0), np.arange(1.0, 9.0)))
+
+
+def test_parameter_that_stands_still_is_an_end(damped):
+    base = damped.cycles[0]
+
+    def along(values, periods):
+        return [replace(base, value=v, period=p) for v, p in zip(values, periods, strict=True)]
+
+    rounding = 1.0 + 1e-12 * (-1.0) ** np.arange(STANDING)
+    assert _stands(along(rounding, np.geomspace(1.0, 1.04, STANDING)))
+    assert not _stands(along(rounding, np.geomspace(1.0, 1.2, STANDING)))  # a canard that goes on
+    assert not _stands(along(1.0 + 1e-9 * np.arange(STANDING), np.ones(STANDING)))
+    assert not _stands(along(rounding[1:], np.ones(STANDING - 1)))
+
+
+def test_multipliers_are_not_read_where_the_parameter_stands_still(damped):
+    looked = []
+
+    def read(u):
+        looked.append(u)
+        raise Failure("enough")
+
+    def known(value, multiplier):
+        cycle = replace(damped.cycles[-1], value=value, multipliers=(multiplier, 0.01))
+        shooting = SimpleNamespace(flow=SimpleNamespace(size=3), multipliers=read)
+        return Known(Point(np.zeros(2), np.ones(2), 0.0, 1), shooting, cycle, np.zeros(2))
+
+    changes(known(1.0, -0.9), known(1.0 + 1e-13, -1.1), None, 1)
+    assert not looked
+    changes(known(1.0, -0.9), known(1.001, -1.1), None, 1)
+    assert looked
+
+
+def test_cycle_is_counted_once_round(damped):
+    """Run through twice or three times it closes too, and is told from a true one; Newton's method alone is not."""
+    (cycle,) = damped.at(0.8 * damped.onset.value)
+    flow = Flow(damped.rig.with_values({"stiffness": damped.onset.value}), "slider.stiffness")
+    orbit = cycle._orbit
+    for turns in (1, 2, 3, 6):
+        shooting = Shooting(flow, np.ones(1), True, damped.onset.value)
+        u = shooting.packed(replace(orbit, period=turns * orbit.period))
+        residual, _ = shooting.equations(u)
+        assert np.abs(residual).max() < 1e-7
+        assert measured(shooting, u).turns == {1: 1, 2: 2, 3: 3, 6: 2}[turns]
+    tracer = Tracer(flow, damped.onset, (0.0, 1.0), 10)
+    with pytest.raises(Failure, match="run through 2 times"):
+        tracer.resumed(replace(orbit, period=2 * orbit.period), 1.0)
+
+
+def test_sheet_that_breaks_off_is_found_again_by_simulation(damped, monkeypatch):
+    """What lies beyond is the same as without the break; the gap is said, and `at` simulates in it."""
+    onset, broken = damped.onset, 0.8 * damped.onset.value
+    real = Tracer.known
+
+    def known(self, shooting, point):
+        found = real(self, shooting, point)
+        if 0.7 * onset.value < found.cycle.value < broken:
+            raise Failure("a hole")
+        return found
+
+    monkeypatch.setattr(Tracer, "known", known)
+    branch = ss.cycles(damped.rig, between=(0.3 * onset.value, 1.1 * onset.value))
+    monkeypatch.undo()
+    assert len(branch.gaps) == 1
+    assert "a hole" in branch.broken[0]
+    assert "another sheet, found by simulation" in str(branch)
+    for share in (0.95, 0.75, 0.5):
+        (cycle,), (same,) = branch.at(share * onset.value), damped.at(share * onset.value)
+        assert cycle.period == pytest.approx(same.period, rel=1e-9)
+    assert branch.to_dict()["gaps"][0]["before"] == branch.gaps[0]
+
+
+def test_cycles_end_where_no_velocity_balances_the_forces(monkeypatch):
+    """A pad that lifts with velocity, without mass: forces fold, and what lies beyond has no velocity to tell.
+
+    The cycle comes as close to the fold as steps allow, which takes ever more of them, but not minutes.
+    """
+    monkeypatch.setattr("steadyslip.nonlinear.orbits.flow.MOST_STEPS", 20_000)
+    friction = rate_state(evolution=ss.PRZ(), regularised=True)
+    lift = next(contact for contact in CONTACTS if contact.name == "lift")
+    branch = ss.cycles(
+        rig(friction=friction, contact=lift, stiffness=9e9, drive=ss.PD(1e-6, kp=2e10, kd=1e9)), doublings=0
+    )
+    assert branch.end == tracer_module.ENDS["too many steps"]
+    assert len(branch) > 5
+    for name in ("peak_velocity", "lowest_velocity", "stress_drop"):
+        assert np.all(np.isfinite(branch[name]))
+
+
+def test_steps_are_long_where_equations_are_bent():
+    """x follows a slow curve, and an equation as steep as that of an unstable cycle holds it there."""
+
+    def steep(u):
+        x, p = u
+        off = x - 0.5 * p * p
+        return np.array([np.expm1(1e4 * off)]), np.array([[1e4, -1e4 * p]]) * np.exp(1e4 * off)
+
+    curve, points = Track(steep), []
+    first = curve.start(np.array([0.0, 0.0]), np.array([0.0, 1.0]))
+    for point in curve.follow(first, 0.01, 1e-9, 0.5):
+        points.append(point)
+        assert point.u[0] == pytest.approx(0.5 * point.u[1] ** 2, abs=1e-9)
+        if point.u[1] > 1:
+            break
+    assert len(points) < 30  # 95 along the tangent alone
+
+
+def test_what_lies_between_distant_neighbours_is_found_on_the_parabola_through_them():
+    """A tenth of a circle apart the tangent is five hundredths off; where equations are steep that is too far."""
+
+    def circle(u):
+        off = u @ u - 1
+        return np.array([np.expm1(40 * off)]), 80 * u[None] * np.exp(40 * off)
+
+    curve = Track(circle)
+    low = curve.start(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    high = curve.corrected(np.array([np.cos(0.6), np.sin(0.6)]), low.tangent, np.sin(0.6))
+    measure = lambda point: point.u[0] - np.cos(0.4)  # noqa: E731
+    found = curve.located(low, high, measure, measure(low), measure(high))[1]
+    assert found.u == pytest.approx([np.cos(0.4), np.sin(0.4)], abs=1e-9)
+
+
+def test_a_branch_begins_at_larger_cycles_where_small_ones_drown_in_rounding():
+    """An onset so nearly degenerate that the edge moves by a millionth while cycles grow a thousandfold."""
+    friction = ss.LuGre(mu_coulomb=0.1189310343, mu_static=0.1882742085, v_stribeck=1.6888334216e-3,
+                        viscous=2.3663122754, bristle_stiffness=255249.776917, bristle_damping=7.12855521)  # fmt: skip
+    contact = ss.InclinedSpring(preload=1292214.83, angle=-0.05289007)
+    heavy = ss.Slider(friction=friction, contact=contact, stiffness=1e10, mass=962.847238,
+                      drive=ss.Steady(1.5017969314e-3))  # fmt: skip
+    edge = ss.hopf(heavy).value
+    branch = ss.cycles(heavy, between=(0.5 * edge, 1.2 * edge))
+    assert branch.end.startswith("end of the range")
+    (cycle,) = branch.at(0.5 * edge * (1 + 1e-9))
+    assert cycle.stable
+    assert cycle.period == pytest.approx(5.8737658898e-5, rel=1e-6)  # of a long simulation
+
+
+def test_a_run_that_leads_nowhere_is_cut_short():
+    """Far more steps than the last run took are no continuation of it."""
+    flow = Flow(unit_rig("slip", 0.5, 0.4, damping=1e-3), "slider.stiffness")
+    setting, start = flow.setting(0.4), flow.steady(0.4)[None] + 0.1
+    flow.run(setting, start, np.array([1.0]))
+    before = flow.steps
+    with pytest.raises(Failure, match="too many steps"):
+        flow.run(setting, start, np.array([1e6]))
+    assert flow.steps - before <= 2 * flow_module.FEW_STEPS

@@ -1,0 +1,190 @@
+"""Slip events and what a run tells of itself: by their definition, whatever the steps, for laws that stick."""
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from dimensionless import A, unit_rig
+from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
+from steadyslip.core.roles import positive, real
+from steadyslip.kernels.layout import SLIP_EVENT
+from steadyslip.motion.jobs import Options, prepare
+
+
+def excursions(run):
+    """Slip events by their definition, from dense samples: (begin, end, peak) of each time ahead of the load point."""
+    t, v, load = run["t"], run["v"], run["load_velocity"]
+    drive = run.rig.drive.velocity
+    ahead = v > np.maximum(load, 1e-3 * drive)
+    edges = np.flatnonzero(np.diff(ahead.astype(int)))
+    found = []
+    for first in edges[~ahead[edges]] + 1:
+        later = edges[edges >= first]
+        if not len(later):
+            break
+        part = slice(first, later[0] + 1)
+        asked = np.where(load[part] > 1e-3 * drive, load[part], drive)
+        if np.any(v[part] >= SLIP_EVENT * np.maximum(asked, v[first - 1])):
+            found.append((t[first], t[later[0]], v[part].max()))
+    return found
+
+
+SLOW_LUGRE = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
+
+
+@pytest.mark.parametrize(
+    ("a_rig", "protocol", "count"),
+    [
+        (unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=1.03), 0),  # ringing, an overshoot of 2 %
+        (unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=3.0), 20),  # ringing from an overshoot of 13 times
+        (unit_rig("aging", 0.5, 1.5), ss.VelocityStep(at=5, to=0.1), 0),  # slowing down to a tenth
+        (unit_rig("aging", 0.5, 20.0), ss.Hold(at=5, duration=30.0), 0),
+        (unit_rig("aging", 0.5, 20.0), ss.SlideHoldSlide(at=5, hold=1, factor=10, slide=10, repeats=3), 0),
+        (unit_rig("aging", 0.5, 0.3, 1e-3), ss.VelocityStep(at=5, to=1.1) + ss.Hold(at=100, duration=50), None),
+    ],
+    ids=["overshoot", "ringing", "slower", "hold", "slide-hold-slide", "stick-slip"],
+)
+def test_slip_events_are_what_their_definition_says(a_rig, protocol, count):
+    """Against dense samples; an overshoot, a hold and slide-hold-slide on a stiff rig are not slip events."""
+    run = ss.simulate(a_rig, protocol, until=200.0, times=np.linspace(0, 200, 40001))
+    expected = excursions(run)
+    assert len(run.slip_events) == len(expected)
+    assert count is None or len(expected) == count
+    for slip, (begin, end, peak) in zip(run.slip_events, expected, strict=True):
+        assert (slip.begin, slip.end) == pytest.approx((begin, end), abs=0.006)
+        assert slip.peak_velocity >= peak * (1 - 1e-6)
+        assert slip.stress_drop > 0
+    assert sum(event.kind == "slip begins" for event in run.events) in (len(expected), len(expected) + 1)
+    if count is None:
+        assert len(expected) > 5
+        assert not any(100 < slip.begin < 150 for slip in run.slip_events)
+    many = ss.simulate_many(a_rig, {}, protocol, until=200.0)
+    assert many.events["events"] == len(expected)
+    if not expected:
+        assert np.isnan(many.events["event_begin"])
+        assert np.isnan(many.events["event_peak_velocity"])
+        assert many.events["event_stress_drop"] == 0
+
+
+def test_a_held_block_that_vibrates_makes_no_slip_events():
+    """With mass a held block swings about rest, through both signs of velocity."""
+    a_rig = rig(friction=SLOW_LUGRE, mass=1e8, stiffness=4e11)
+    protocol = ss.SlideHoldSlide(at=2.0, hold=1.0, factor=3.0, slide=3.0, repeats=3)
+    run = ss.simulate(a_rig, protocol, until=25.0, times=np.linspace(0, 25, 20001))
+    held = run["load_velocity"] == 0
+    assert np.sum(np.diff(np.sign(run["v"][held])) != 0) > 10
+    assert run.slip_events == ()
+
+
+def test_a_kick_during_a_hold_begins_where_it_is_given():
+    """The block had not come to rest: the slip event begins at the kick, not with the hold."""
+    protocol = ss.Hold(at=5.0, duration=40.0) + ss.NormalStressStep(at=6.0, by=-0.08)
+    run = ss.simulate(unit_rig("aging", 0.5, 1.5, 1e-3), protocol, until=60.0)
+    (slip, *_) = run.slip_events
+    assert slip.begin == pytest.approx(6.0)
+    assert slip.peak_velocity > 2.0
+
+
+def test_error_of_default_settings():
+    """What rtol = 1e-7 gives: 1e-7 to 1e-5 in ln v after six spirals, and after thirty cycles of stick-slip."""
+    for a_rig, until, kick, most in (
+        (rig(contact=CONTACTS[1], stiffness=9.5e9, friction=ONE_MEMORY[1]), 200.0, {"v": 1.01e-6}, 1e-6),
+        (unit_rig("aging", 0.5, 0.4, 1e-6), 600.0, {"v": 1.1}, 2e-5),
+        (unit_rig("slip", 0.5, 0.4, 0.0, 1e-6 / A), 460.0, {"x": 1.0}, 2e-5),
+    ):
+        ends = [ss.simulate(a_rig, until=until, initial=kick, rtol=rtol)["v"][-1] for rtol in (1e-7, 1e-11)]
+        assert abs(np.log(ends[0] / ends[1])) < most
+
+
+def test_coulomb_friction_sticks_and_breaks_loose_at_the_static_limit():
+    """Stuck blocks creep at less than a millionth; friction reaches μ_S σ before each slip, no more."""
+    friction = ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=1e-3, viscous=0.5)
+    contact = ss.Constant(preload=1e5)
+    a_rig = ss.Slider(friction=friction, contact=contact, stiffness=1e8, mass=100.0, drive=ss.Steady(1e-3))
+    run = ss.simulate(a_rig, ss.VelocityStep(at=0.01, to=1.1e-3), until=1.0)
+    assert run.status == "done"
+    assert len(run.slip_events) > 4
+    late = run["t"] > 0.3
+    assert run["shear_stress"][late].max() == pytest.approx(3e4, rel=2e-3)
+    stuck = late & (run["v"] < 1e-6)
+    assert np.sum(stuck) > 20
+    assert np.all(run["v"][stuck] > -1e-8)
+
+
+class Softening(ss.FrictionLaw):
+    """A law of one's own: strength falls with a saturating memory, and a kink."""
+
+    mu: float = ss.parameter("1", positive, "level")
+    a: float = ss.parameter("1", positive, "direct effect")
+    c: float = ss.parameter("1", real, "evolution effect")
+    length: float = ss.parameter("m", positive, "slip distance")
+    v_ref: float = ss.parameter("m/s", positive, "reference")
+
+    def memory(self):
+        return ("s",)
+
+    def strength(self, v, sigma, memory, tau):
+        import sympy as sp
+
+        bent = sp.Piecewise((memory[0], memory[0] > -1), (2 * memory[0] + 1, True))
+        return sigma * (self.mu + self.a * sp.log(v / self.v_ref) + self.c * sp.tanh(bent))
+
+    def rates(self, v, sigma, memory, tau):
+        import sympy as sp
+
+        return (-v / self.length * (memory[0] + sp.log(v / self.v_ref)),)
+
+    def steady_memory(self, v, sigma):
+        import sympy as sp
+
+        return (-sp.log(v / self.v_ref),)
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e9])
+def test_a_law_of_one_s_own_moves(mass):
+    from oracle import Oracle
+
+    law = Softening(mu=0.6, a=0.01, c=0.015, length=1e-6, v_ref=1e-6)
+    a_rig = rig(friction=law, mass=mass, stiffness=2e10, radiation_damping=1e10)
+    run = ss.simulate(a_rig, until=2.0, initial={"x": 5e-7}, rtol=1e-9)
+    assert run.status == "done"
+    expected = Oracle(a_rig).run(2.0, x=5e-7)
+    assert [run["x"][-1], run["v"][-1], run["s"][-1]] == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_summary_tells_the_same_whatever_the_steps():
+    """Extremes of velocity are located, not picked from samples."""
+
+    def lines(**options):
+        run = ss.simulate(unit_rig("slip", 0.5, 0.45, damping=1e-3), until=40.0, initial={"v": 1.5}, **options)
+        return str(run).splitlines()[1]
+
+    assert lines() == lines(rtol=1e-11) == lines(times=[0.0, 40.0])
+
+
+def test_a_method_that_would_compile_for_minutes_is_refused():
+    """Where each of many stages would solve the balance of forces; what `auto` and few stages do is not touched."""
+    rock = ss.RateState(a=0.014, b=0.016, d_c="1 um", mu_ref=0.7, v_ref="1 um/s", regularised=True)
+    slow = ss.Slider(
+        friction=rock, contact=ss.Constant(preload="5 MPa"), stiffness="12 GPa/m", drive=ss.Steady("1 um/s"),
+        radiation_damping=1e6,
+    )  # fmt: skip
+    assert prepare(slow, None, 1.0, {}, {}, Options()).reduction.unknown is not None
+    for run in (ss.simulate, lambda a_rig, **more: ss.simulate_many(a_rig, {"stiffness": [1e10, 2e10]}, **more)):
+        with pytest.raises(ss.ParameterError, match=r"13 stages.*allowed here: auto, tsit5, rodas4, rodas5p"):
+            run(slow, until=1.0, method="dop853")
+    for method in ("auto", "explicit", "rosenbrock", "rodas5p"):
+        assert prepare(slow, None, 1.0, {}, {}, Options(method=method)).reduction.unknown is not None
+
+
+def test_the_range_of_velocity_is_that_of_the_run_not_of_its_samples():
+    """A drop at a step lies between samples; the lowest and highest of the solver's own steps are met."""
+    plan = [ss.VelocityStep(at=10.0, to=1e-8), ss.VelocityStep(at=20.0, to=3e-6)]
+    a_rig = rig(stiffness=2e10)
+    whole = ss.simulate(a_rig, plan, until=30.0)
+    few = ss.simulate(a_rig, plan, until=30.0, times=[0.0, 30.0])
+    assert few["v"].min() > 1.5 * whole["v"].min()
+    assert few.velocities == pytest.approx(whole.velocities, rel=1e-9)
+    assert whole.velocities[0] <= whole["v"].min()
+    assert whole.velocities[1] >= whole["v"].max()
+    assert str(few).splitlines()[1].split(", at")[0] == str(whole).splitlines()[1].split(", at")[0]

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from javascript import Script
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Recorded, Sampled
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Kind, Layout, Recorded, Sampled
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
 from steadyslip.kernels.runner import TALLY
@@ -16,8 +16,8 @@ DRIVER = {"advance": "steadyslip.kernels.driver.lanes", "observe": "steadyslip.k
 CALL = f"""
 function run(machine, tables, times) {{
   const [constants, initial, settings, segments] = tables.map((t) => table(t.values, t.shape));
-  const {{ layout, routines }} = machine, size = layout[1];
-  const S = zeros(layout[30]), ids = zeros(1), cursor = zeros({len(Cursor)});
+  const {{ layout, routines }} = machine, size = layout[{Layout._fields.index("size")}];
+  const S = zeros(layout[{Layout._fields.index("rows")}]), ids = zeros(1), cursor = zeros({len(Cursor)});
   cursor[{Cursor.LAST_JOB}] = 1; cursor[{Cursor.BUSY}] = 1; cursor[{Cursor.PAUSED}] = -1;
   const point = {int(Sampled.STATE)} + size;
   const out = [zeros(1), zeros(1, {int(Final.POINT)} + point), zeros(1, {len(TALLY)}), zeros(1, times.length,

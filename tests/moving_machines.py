@@ -7,7 +7,8 @@ from scipy.integrate import solve_ivp
 import steadyslip as ss
 from machines import rate_state, surface
 from steadyslip.model.point import operating_point
-from steadyslip.model.reduction import SLOPES, TIME, P, Q, reduce_model
+from steadyslip.model.reducing import reduce_model
+from steadyslip.model.reduction import SLOPES, TIME, P, Q
 from steadyslip.model.scales import eliminable
 
 TIMES = np.linspace(0.0, 20.0, 201)

@@ -251,12 +251,19 @@ def test_a_plain_program_is_readable():
 
 def test_no_two_quantities_of_a_record_share_a_place():
     layout = make_layout(lanes=1, size=3, kept=4, constants=5, harmonics=2, stages=7, seen=2, own=3, events=8,
-                         massless=3, contacts=2)  # fmt: skip
+                         massless=3, unknowns=2, contacts=2)  # fmt: skip
     places = [(row, 1) for row in Row if row not in (Row.INPUT, Row.SLOPE)] + [(Row.INPUT, 3), (Row.SLOPE, 3)]
     places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 6)]
     places += [(layout.omega, 6), (layout.phase, 6), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
     places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 8), (layout.happened, 8), (layout.counted, 16)]
-    places += [(layout.guess, 2), (layout.elsewhere, 3), (layout.tallies, TALLIED), (layout.jumped, 4)]
+    places += [
+        (layout.guess, 2),
+        (layout.scale, 2),
+        (layout.earlier, 1),
+        (layout.elsewhere, 3),
+        (layout.tallies, TALLIED),
+        (layout.jumped, 4),
+    ]
     taken = [place + i for place, count in places for i in range(count)]
     assert sorted(taken) == list(range(layout.rows))
 

@@ -16,7 +16,7 @@ from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.windows import delay_set, linear_windows
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.range import quasi as operating_quasi
-from steadyslip.model.reduction import reduce_model
+from steadyslip.model.reducing import reduce_model
 
 
 def servo(gain, delay, mass=0.0):

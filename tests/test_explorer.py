@@ -24,7 +24,7 @@ from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
 from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
-from steadyslip.model.reduction import reduce_model
+from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales, posed
 from steadyslip.motion.jobs import prepare
 from users_laws import USERS, Turning

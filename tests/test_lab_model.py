@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_c
 from steadyslip.experiments.fitting.plan import make_plan
 from steadyslip.kernels.experiment import ExperimentProgram
 from steadyslip.kernels.runner import Runner
-from steadyslip.model.reduction import reduce_model
+from steadyslip.model.reducing import reduce_model
 from steadyslip.motion.jobs import Jobs
 
 CONSTANT = ss.Constant(steady_normal_stress=lab.STRESS)

@@ -11,7 +11,7 @@ import steadyslip as ss
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
-from steadyslip.model.reduction import reduce_model
+from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales, posed, weights
 from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare

@@ -23,7 +23,8 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
-from steadyslip.model.reduction import Reduction, W, reduce_model
+from steadyslip.model.reducing import reduce_model
+from steadyslip.model.reduction import Reduction, W
 from steadyslip.model.scales import LEAST_WEIGHT, Weights, eliminable, posed, sizes, weighed
 from steadyslip.motion.jobs import Options, automatic_method, numbers
 from steadyslip.protocol import (

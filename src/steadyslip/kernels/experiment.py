@@ -16,7 +16,8 @@ from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
 from steadyslip.model import Model, OperatingPoint
-from steadyslip.model.reduction import Reduction, W, reduce_model
+from steadyslip.model.reducing import reduce_model
+from steadyslip.model.reduction import Reduction, W
 from steadyslip.model.variational import with_directions
 
 LANES = 8  # one vector of doubles: sensitivities fill the registers

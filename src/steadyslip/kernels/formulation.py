@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import sympy as sp
 
@@ -12,9 +13,11 @@ from steadyslip.core.expressions import derivative
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Layout, make_layout
 from steadyslip.kernels.methods import METHODS, Method
+from steadyslip.kernels.nodes import Value
 from steadyslip.kernels.rosenbrock import Pattern
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
+from steadyslip.model.unknowns import Unknowns
 
 CHANNELS = ("v", "q", "p")
 LEVELS = ("constant", "linear", "harmonic")
@@ -68,9 +71,9 @@ class Formulation:
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | _INPUT_NAMES | _SLOPE_NAMES
         own = (one.variable.w for one in reduction.slidings if one.variable is not None)
         variables = {*reduction.state, *reduction.continuous, *INPUTS, *SLOPES[:3], *own}
-        if reduction.unknown is not None:
-            self.names[reduction.unknown] = "z"
-            variables.add(reduction.unknown)
+        self.unknowns = len(reduction.unknowns)
+        self.names |= {symbol: f"z{k}" for k, symbol in enumerate(reduction.unknowns)}
+        variables.update(reduction.unknowns)
         self.constants = Constants(variables)
         self._rates = [self._fixed(rate) for rate in reduction.rates]
         self.driven = self._answers_to_constants()
@@ -102,27 +105,26 @@ class Formulation:
             known = [*self.constants.symbols.values(), *self.varied_inputs]
             return sp.Add(*(derivative(e, c) * self.constants.rate_of(c, direction) for c in known if e.has(c)))
 
-        added = explicit(expression)
-        if self.reduction.residual is not None and self.reduction.unknown is not None:
-            residual, unknown = self._fixed(self.reduction.residual), self.reduction.unknown
-            added -= derivative(expression, unknown) * explicit(residual) / derivative(residual, unknown)
-        return added
+        return explicit(expression) + self._solved.followed(expression, list(map(explicit, self._solved.residuals)))
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
         """An entry of the Jacobian, with what changing constants add."""
         entry = self._fixed(matrix[i][k])
         if i not in self.driven:
             return entry
-        variable, unknown = self.reduction.state[k], self.reduction.unknown
-        entry += derivative(self.driven[i], variable)
-        if self.reduction.residual is not None and unknown is not None:
-            residual = self._fixed(self.reduction.residual)
-            entry -= (
-                derivative(self.driven[i], unknown) * derivative(residual, variable) / derivative(residual, unknown)
-            )
-        return entry
+        return entry + self._solved.along(self.driven[i], self.reduction.state[k])
 
     # -- the equations
+
+    @cached_property
+    def _solved(self) -> Unknowns:
+        """Unknowns and residuals in terms of constants."""
+        return Unknowns(self.reduction.unknowns, tuple(map(self._fixed, self.reduction.residuals)))
+
+    @staticmethod
+    def named(z: Sequence[Value]) -> dict[str, Value]:
+        """Values of the unknowns by what formulas call them."""
+        return {f"z{k}": value for k, value in enumerate(z)}
 
     def _formulas(self, expressions: Sequence[sp.Expr]) -> Formulas:
         return Formulas(expressions, self.names)
@@ -132,10 +134,12 @@ class Formulation:
         reduction, n = self.reduction, self.size
         seen = [[self._fixed(one.outputs[name]) for name in OUTPUTS] for one in reduction.slidings]
         outputs = [e for one in seen for e in one]
-        self.residual: Formulas | None = None
-        if reduction.unknown is not None and reduction.residual is not None:
-            pair = (reduction.residual, derivative(reduction.residual, reduction.unknown))
-            self.residual = self._formulas([self._fixed(e) for e in pair])
+        self.residuals: Formulas | None = None
+        matrix = reduction.solved.matrix
+        self.slopes = [(i, k) for i, row in enumerate(matrix) for k, slope in enumerate(row) if slope != 0]
+        if reduction.unknowns:
+            slopes = [matrix[i][k] for i, k in self.slopes]
+            self.residuals = self._formulas([self._fixed(e) for e in (*reduction.residuals, *slopes)])
         self.rates = self._formulas(self._rates)
         self.full = self._formulas(self._rates + [e for one in seen for e in one[:3]])
         also = [*reduction.further.values(), *(one.slip for one in reduction.slidings)]
@@ -153,8 +157,9 @@ class Formulation:
         self._write_velocity()
         known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | _INPUT_NAMES | _SLOPE_NAMES
         known |= {w: f"w{k}" for k, (w, _) in enumerate(reduction.restarts)}
-        pairs = [self._fixed(e) for w, balance in reduction.restarts for e in (balance, derivative(balance, w))]
-        self.restart = Formulas(pairs, known) if pairs else None
+        balances = [balance for _, balance in reduction.restarts]
+        balances += [derivative(balance, w) for balance in balances for w, _ in reduction.restarts]
+        self.restart = Formulas([self._fixed(e) for e in balances], known) if balances else None
         self.shift = self._formulas([self._fixed(e) for e in reduction.shifts])
         self.shares = self._formulas([self._fixed(e) for i in range(self.contacts) for e in self._shares(i)])
 
@@ -181,9 +186,7 @@ class Formulation:
         if own is None:
             raise InternalError("a single contact has its own velocity variable")
         inverse = own.w_of_v
-        variables = {*reduction.state, *reduction.continuous, *INPUTS}
-        if reduction.unknown is not None:
-            variables.add(reduction.unknown)
+        variables = {*reduction.state, *reduction.continuous, *INPUTS, *reduction.unknowns}
         alone = speed.free_symbols & variables == {own.w} and not inverse.free_symbols & variables
         if own.w not in reduction.state:
             return
@@ -199,7 +202,7 @@ class Formulation:
     def _made_layout(self) -> Layout:
         reduction, choice = self.reduction, self.choice
         massless = len(reduction.restarts)
-        own = [w for w, _ in reduction.restarts]
+        own = [w for w, _ in reduction.restarts if w not in reduction.unknowns]
         own += [one.variable.w for one in reduction.slidings if self.contacts == 1 and one.variable is not None]
         return make_layout(
             lanes=choice.lanes,
@@ -211,10 +214,11 @@ class Formulation:
             terms=self.terms,
             extra=choice.dense and self.method.all_stages > self.method.stages,
             massless=massless,
-            solved=massless > 0 and reduction.unknown is not None,
+            unknowns=self.unknowns,
+            solved=massless > 0 and self.unknowns > 0 and reduction.form != "eliminated",
             w=reduction.state.index(own[0]) if own and own[0] in reduction.state else -1,
             contacts=self.contacts,
             events=self.contacts * len(EVENTS) if choice.dense else 0,
             further=len(reduction.further),
-            watched=choice.lanes > 1 and self.speed is not None and reduction.unknown is None,
+            watched=choice.lanes > 1 and self.speed is not None and not reduction.unknowns,
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from steadyslip.kernels.driver.places import guess_at, marks_at, outputs_at, width
+from steadyslip.kernels.driver.places import earlier_at, further_at, guess_at, marks_at, outputs_at, unknown_at
 from steadyslip.kernels.events import faster
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Out, Row
@@ -62,18 +62,17 @@ class Kernel(Formulation):
         if self.choice.dense and self.limit is not None:
             for row, v in ((Row.W_LIMIT, faster(moments[0])), (Row.W_LP, moments[0].v_lp)):
                 record.program.store(row, self.limit(record.constants | {"v": v})[0])
-        record.keep_unknown()
+        record.keep_unknowns()
         return record.program
 
     def _outputs_program(self) -> Program:
         record = Evaluator(self, Program("outputs"))
         program, n = record.program, self.size
         point = record.inputs(program.number) | {f"y{i}": program.load(i, "y") for i in range(n)}
-        if self.reduction.unknown is not None:
-            record.z = program.load(n + Out.UNKNOWN, "y")
+        record.z = [program.load(unknown_at(self.layout, k), "y") for k in range(self.unknowns)]
         found = record.evaluated(self.outputs, point)
-        if self.reduction.unknown is not None:
-            program.store(n + Out.UNKNOWN, record.z, "y")
+        for k, z in enumerate(record.z):
+            program.store(unknown_at(self.layout, k), z, "y")
         each = len(OUTPUTS)
         seen = found[: each * self.contacts]
         advance = record.load_advance(program.number)
@@ -94,7 +93,7 @@ class Kernel(Formulation):
             for e, value in enumerate(record.marks(record.moments(point, seen))):
                 program.store(marks_at(self.layout) + e, value, "y")
         for i in range(len(self.reduction.further)):
-            program.store(width(self.layout) - self.layout.further + i, found[len(seen) + i], "y")
+            program.store(further_at(self.layout) + i, found[len(seen) + i], "y")
         return program
 
     def _restore_program(self) -> Program:
@@ -159,9 +158,9 @@ class Kernel(Formulation):
                 program.store(i, y, "y")
             if self.speed is not None:
                 program.store(self.size + Out.W_SLOPE, horner(slope_of(record.course(self.layout.w)), theta), "y")
-            unknown: Value = program.load(Row.Z)
-            if self.reduction.unknown is not None:
-                old = program.load(Row.Z_OLD)
-                unknown = old + theta * (unknown - old)
-            program.store(self.size + Out.UNKNOWN, unknown, "y")
+            for k in range(self.unknowns):
+                old, z = program.load(earlier_at(self.layout, k)), program.load(guess_at(self.layout, k))
+                program.store(unknown_at(self.layout, k), old + theta * (z - old), "y")
+            if not self.unknowns:
+                program.store(unknown_at(self.layout, 0), program.load(Row.Z), "y")
         return program

@@ -20,7 +20,7 @@ class Row(IntEnum):
     V, ACCELERATION, SIGMA = 0, 1, 2
     """Outputs at the end of the step."""
     Z, Z_SCALE = 3, 4
-    """The unknown of the balance, or a guess of it, and its scale."""
+    """The first unknown of the balances, or a guess of it, and its scale."""
     TAU, H, END = 5, 6, 7
     """Time since the start of the segment, next step, length of the segment."""
     START, STOP, SEGMENT = 8, 9, 10
@@ -53,7 +53,7 @@ class Row(IntEnum):
     NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 57, 58, 59, 60
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 61, 62, 63, 64, 65, 66
     Z_OLD = 67
-    """The unknown of the balance at the start of the last step."""
+    """The first unknown of the balances at the start of the last step."""
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
@@ -74,13 +74,15 @@ class Out(IntEnum):
     V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, UNKNOWN, PLACE, SHARE, COUNT = range(13)
     """V_LP is the velocity of the load point as the contact feels it, Q the disturbance, ADVANCE the way of the load
     point since the start of the segment. W_SLOPE is the slope of the dense output of the velocity variable and UNKNOWN
-    a guess of the unknown of the balance: outputs need both. PLACE is the distance slipped since the start of the run,
-    SHARE the slip rate in steady sliding over that of the first contact. Further contacts follow, COUNT numbers each,
-    then events, then what else is observed. What `observe` gives of a contact ends with ADVANCE."""
+    a guess of the first unknown of the balances: outputs need both. PLACE is the distance slipped since the start of
+    the run, SHARE the slip rate in steady sliding over that of the first contact. Further contacts follow, COUNT
+    numbers each, then events, what else is observed, and guesses of further unknowns. What `observe` gives of a contact
+    ends with ADVANCE."""
 
 
 class Setting(IntEnum):
-    """Columns of the settings of a trajectory; absolute tolerances of the state follow."""
+    """Columns of the settings of a trajectory; absolute tolerances of the state follow, then guesses and scales of
+    further unknowns."""
 
     RTOL, MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 0, 1, 2, 3, 4, 5, 6
     GUESS, Z_SCALE, FIRST_STEP, V_DRIVE, ATOL = 7, 8, 9, 10, 11
@@ -120,8 +122,8 @@ LOG_COLUMNS = 8
 """Kind, time, v, sigma, tau, T, slip, segment."""
 
 
-# A *point* is what is written down of a trajectory at a moment: the unknown of the balance, then the state. Where
-# forces balance at several velocities, the state alone does not say which of them is meant.
+# A *point* is what is written down of a trajectory at a moment: the first unknown of the balances, the state, then
+# further unknowns. Where forces balance at several velocities, the state alone does not say which of them is meant.
 
 
 class Sampled(IntEnum):
@@ -164,9 +166,11 @@ class Layout(NamedTuple):
     watched: int
     """Whether frequent events are found in all lanes at once."""
     massless: int
-    """How many balances fix a velocity variable after a jump."""
+    """How many balances are solved after a jump, for the unknowns and for velocity variables."""
+    unknowns: int
+    """How many unknowns balances fix at every moment."""
     solved: int
-    """Whether the balance has to be solved to restore the variables that jumps leave alone."""
+    """Whether the balances have to be solved to restore the variables that jumps leave alone."""
     w: int
     """Place in the state of the velocity variable, or the first of those that balances fix; -1 if none is there."""
     own: int
@@ -195,7 +199,11 @@ class Layout(NamedTuple):
     seen: int
     before: int
     guess: int
-    """Guesses of further velocity variables that balances fix."""
+    """Guesses of further unknowns and velocity variables that balances fix,"""
+    scale: int
+    """and their scales."""
+    earlier: int
+    """Further unknowns at the start of the last step."""
     elsewhere: int
     """Velocity, normal stress and velocity again at further contacts, the latter two as shares of the first's."""
     tallies: int
@@ -207,18 +215,20 @@ class Layout(NamedTuple):
 
 def make_layout(
     *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, terms: int = 0,
-    massless: int = 0, solved: bool = False, w: int = -1, own: int = 0, directions: int = 0, x: int = 0,
-    seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False, contacts: int = 1, further: int = 0,
+    massless: int = 0, unknowns: int = 0, solved: bool = False, w: int = -1, own: int = 0, directions: int = 0,
+    x: int = 0, seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False, contacts: int = 1,
+    further: int = 0,
 ) -> Layout:  # fmt: skip
     """Put the groups one behind the other."""
-    waves = INPUTS * harmonics
+    waves, further_ones = INPUTS * harmonics, max(massless, unknowns, 1) - 1
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "amplitude": waves, "omega": waves,
         "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages,
         "curve": size * terms if stages else 0,
         "mark": events, "happened": events, "counted": 2 * events, "seen": seen,
         "before": own if seen else 0,
-        "guess": max(massless - 1, 0), "elsewhere": 3 * (contacts - 1), "tallies": TALLIED * (contacts - 1),
+        "guess": further_ones, "scale": further_ones, "earlier": max(unknowns - 1, 0),
+        "elsewhere": 3 * (contacts - 1), "tallies": TALLIED * (contacts - 1),
         "jumped": 2 * contacts if events else 0,
     }  # fmt: skip
     places, position = {}, max(Row) + 1
@@ -227,8 +237,9 @@ def make_layout(
         position += count
     return Layout(
         lanes=lanes, size=size, kept=kept, constants=constants, harmonics=harmonics, stages=stages,
-        massless=massless, solved=int(solved), w=w, own=own, directions=directions, x=x, events=events,
-        watched=int(watched), extra=int(extra), contacts=contacts, further=further, rows=position, **places,
+        massless=massless, unknowns=unknowns, solved=int(solved), w=w, own=own, directions=directions, x=x,
+        events=events, watched=int(watched), extra=int(extra), contacts=contacts, further=further, rows=position,
+        **places,
     )  # fmt: skip
 
 
@@ -246,12 +257,14 @@ class Routines(NamedTuple):
     step : one step of every lane
     rates : rates, outputs and gap of the record's state
     outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events;
-        the unknown of the balance is looked for near ``array[size + Out.UNKNOWN]``, and stands there afterwards
+        the unknowns of the balances are looked for near ``array[size + Out.UNKNOWN]`` and what stands at the end, and
+        stand there afterwards
     restore : the variables that a jump leaves alone, from the record's state; what the load point moved is added up
     shift : these, when the load point has jumped ahead by `number`
     place : the record's state from them and from the velocity variables that balances fix
-    balance : ``array`` = residual and slope of each balance of forces at the record's guesses of velocity variables
-    dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`, `Out.UNKNOWN`
+    balance : ``array`` = residuals of the balances that are solved after a jump at the record's guesses, then their
+        derivatives, row by row
+    dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`, unknowns
     extend : the dense output of the last step, made ready for `dense`
     watch_lanes : of every lane: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed

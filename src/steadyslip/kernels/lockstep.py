@@ -62,6 +62,7 @@ class LockstepKernel(Formulation):
             constants=len(self.constants.all),
             own=self.own,
             directions=directions,
+            unknowns=self.unknowns,
             x=self.reduction.names.index("x"),
             seen=1 + directions,
         )
@@ -94,7 +95,7 @@ class LockstepKernel(Formulation):
         for i, value in enumerate(record.evaluated(self.rates if rates else self.seen, point)):
             record.program.store(place + i, value)
         if rates:
-            record.keep_unknown()
+            record.keep_unknowns()
         return record.program
 
     def input_rates(self) -> tuple[int, ...]:

@@ -8,14 +8,15 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+from steadyslip.kernels.driver.places import guess_at, scale_at
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.formulation import CHANNELS, OUTPUTS, Formulation
 from steadyslip.kernels.layout import Row
-from steadyslip.kernels.nodes import Loop, Node, Program, Value, as_node, larger, primitive, select, smaller, weighted
+from steadyslip.kernels.newton import solved
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, primitive, weighted
 from steadyslip.kernels.source import Formulas
 from steadyslip.protocol.inputs import integral_to, level_at, slope_at
 
-NEWTON_STEPS = 6
 Values = dict[str, Value]
 
 
@@ -79,21 +80,22 @@ class Moment:
         return self._output(4)
 
     def _output(self, place: int) -> Value:
-        found = self.record.kernel.outputs(self.record.constants | self.point | {"z": self.record.z})
+        record = self.record
+        found = record.kernel.outputs(record.constants | self.point | record.kernel.named(record.z))
         return found[len(OUTPUTS) * self.contact + place]
 
 
 class Evaluator:
-    """What every evaluation within one program reads: constants, inputs, the unknown."""
+    """What every evaluation within one program reads: constants, inputs, the unknowns."""
 
     def __init__(self, kernel: Formulation, program: Program, extended: bool = False) -> None:
         self.kernel, self.program = kernel, program
         self.extended = extended  # whether the dense output of the last step is there as polynomials
         layout, load = kernel.layout, program.load
         self.constants: Values = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
-        self.z: Value = 0.0
-        if kernel.reduction.unknown is not None:
-            self.z, self.z_scale = load(Row.Z), load(Row.Z_SCALE)
+        count = range(kernel.unknowns)
+        self.z: list[Value] = [load(guess_at(layout, k)) for k in count]
+        self.scales: list[Value] = [load(scale_at(layout, k)) for k in count]
 
     def inputs(self, moment: Value) -> Values:
         """Inputs and their slopes at a local time of the segment."""
@@ -127,34 +129,17 @@ class Evaluator:
         """The record's state and the inputs at a local time."""
         return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
 
-    def evaluated(self, formulas: Formulas, point: Values, solved: bool = True) -> list[Value]:
-        """Formulas at a point, the unknown solved for there."""
-        if solved and self.kernel.residual is not None:
-            self.z = self._solved(self.kernel.residual, point)
-        return formulas(self.constants | point | {"z": self.z})
+    def evaluated(self, formulas: Formulas, point: Values, found: bool = False) -> list[Value]:
+        """Formulas at a point, the unknowns solved for there unless they are `found`."""
+        given = self.constants | point
+        if self.z and not found:
+            self.z = solved(self.kernel, given, self.z, self.scales)
+        return formulas(given | self.kernel.named(self.z))
 
-    def _solved(self, residual: Formulas, point: Values) -> Value:
-        """Newton's method for the unknown, a fixed number of steps; the failure is NaN."""
-        reduction = self.kernel.reduction
-        linear = [one.variable.w for one in reduction.slidings if one.variable and one.variable.kind == "linear"]
-        clamped = bool(reduction.restarts) and reduction.unknown not in linear
-
-        def improved(z: Node) -> tuple[list[Value], list[Value]]:
-            value, slope = residual(self.constants | point | {"z": z})
-            change = value / slope
-            if clamped:
-                change = smaller(larger(change, -2.0), 2.0)
-            z = z - change
-            return [z], [z, change]
-
-        z, change = Loop(NEWTON_STEPS, [self.z], improved).outcome()
-        found: Value = select(abs(change) <= 1e-7 * abs(z) + 1e-9 * abs(self.z_scale), z, float("nan"))
-        return found
-
-    def keep_unknown(self) -> None:
-        """Store it, as a guess for the next time."""
-        if self.kernel.reduction.unknown is not None:
-            self.program.store(Row.Z, self.z)
+    def keep_unknowns(self) -> None:
+        """Store them, as guesses for the next time."""
+        for k, z in enumerate(self.z):
+            self.program.store(guess_at(self.kernel.layout, k), z)
 
     # -- the last step
 

@@ -11,12 +11,14 @@ import numpy as np
 
 from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
+from steadyslip.kernels.driver.places import searched
 from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import SETTINGS, Status
 from steadyslip.model import Model, OperatingPoint
-from steadyslip.model.reduction import Reduction, reduce_model
+from steadyslip.model.reducing import reduce_model
+from steadyslip.model.reduction import Reduction
 
 STATUSES = tuple(status.name.lower().replace("_", " ").replace("blow up", "blow-up") for status in Status)
 __all__ = ["LOG_KINDS", "SETTINGS", "STATUSES", "TALLY", "Runner", "runner"]
@@ -62,10 +64,10 @@ class Runner:
         return table
 
     def settings(self, values: Mapping[str, Any], atol: np.ndarray) -> np.ndarray:
-        """Rows of settings by name, then `atol` (rigs or 1, state), then guesses of further velocity variables."""
+        """Rows of settings by name, then `atol` (rigs or 1, state), then guesses and scales of further unknowns."""
         size = max([len(atol), *(np.size(value) for value in values.values())])
-        further = max(self.kernel.layout.massless - 1, 0)
-        table = np.zeros((size, len(SETTINGS) + self.kernel.size + further))
+        further = searched(self.kernel.layout) - 1
+        table = np.zeros((size, len(SETTINGS) + self.kernel.size + 2 * further))
         for column, name in enumerate(SETTINGS):
             table[:, column] = values[name]
         table[:, len(SETTINGS) : len(SETTINGS) + self.kernel.size] = atol

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from steadyslip.kernels.driver.places import earlier_at, guess_at
 from steadyslip.kernels.events import COUNTED, EVENTS
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import MOST_FAILURES, EventPlace, Row
@@ -93,7 +94,7 @@ class Step(Evaluator):
         kernel, method, n, h = self.kernel, self.kernel.method, self.kernel.size, self.h
         beginning = self.steady if self.steady is not None else self.inputs(self.tau)
         point = beginning | {f"y{i}": value for i, value in enumerate(self.old)}
-        entries = self.evaluated(kernel.jacobian, point, solved=False)
+        entries = self.evaluated(kernel.jacobian, point, found=True)
         jacobian = dict(zip(sorted(kernel.pattern), entries, strict=False))
         in_time = entries[len(jacobian) :]
         inverse = 1.0 / h
@@ -167,7 +168,7 @@ class Step(Evaluator):
         At a fold of the balance steps shrink to the rounding of time, change no state and are accepted for ever; only
         where the balance has to be solved there are folds.
         """
-        if self.kernel.reduction.unknown is None:
+        if not self.kernel.unknowns:
             return as_node(self.good, "bool")
         changed = moved - self.tau > INSTANT * moved
         for new, old, error in zip(self.new, self.old, self.atol, strict=True):
@@ -209,8 +210,9 @@ class Step(Evaluator):
             store(layout.state + i, select(good, self.new[i], self.old[i]))
             store(layout.rate + i, select(good, self.rates[i], self.first[i]))
         store(Row.ERROR, select(good, self.size, self.earlier))
-        if self.kernel.reduction.unknown is not None:
-            store(Row.Z, select(good, self.z, self.program.load(Row.Z)))
+        for k, z in enumerate(self.z):
+            place = guess_at(layout, k)
+            store(place, select(good, z, self.program.load(place)))
 
     def _keep_stages(self) -> None:
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
@@ -221,8 +223,8 @@ class Step(Evaluator):
                 store(layout.stage + s * n + i, stage[i])
         if layout.w >= 0:
             store(Row.W_RATE_OLD, self.first[layout.w])
-        if self.kernel.reduction.unknown is not None:
-            store(Row.Z_OLD, self.program.load(Row.Z))
+        for k in range(self.kernel.unknowns):
+            store(earlier_at(layout, k), self.program.load(guess_at(layout, k)))
         store(Row.EXTENDED, 0.0)
         store(Row.DONE, self.h)
         store(Row.TAU_OLD, self.tau)

@@ -15,7 +15,8 @@ from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
 from steadyslip.model.kinematics import kinematics
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import Reduction, can_eliminate
+from steadyslip.model.reducing import can_eliminate
+from steadyslip.model.reduction import Reduction
 
 Choose = Callable[[Any, Any, Any], Any]
 LEAST_WEIGHT = 1e-5  # in that of ln v, below which a memory variable is not eliminated: its inverse amplifies rounding
@@ -232,17 +233,20 @@ def _eliminable(point: OperatingPoint, index: int) -> int | None:
 
 
 @question
-def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], Any]:
+def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], tuple[Any, ...]]:
     """The size of each state variable that matters: one e-fold of velocity's worth, or a slip distance.
 
-    By name; and the size of the unknown that is left to solve for, which has no name among them.
+    By name; and the sizes of what is left to solve for, `Reduction.searched`, which has no name there; one at least.
     """
     speeds = [np.asarray(speed, dtype=float) for speed in slip_rates(point)]
     with np.errstate(all="ignore"):
         each = [
             sizes(weights(point, i), speed, reduction, np.where, i) for i, speed in enumerate(speeds)
         ]  # fmt: skip
-        return _together(point, reduction, speeds, each) if point.model.contacts[0].name else each[0]
+        if point.model.contacts[0].name:
+            return _together(point, reduction, speeds, each)
+        scales, unknown = each[0]
+        return scales, (unknown,)
 
 
 @question
@@ -259,7 +263,7 @@ def _coordinate_function(model: Model) -> Callable[..., list[Any]]:
 
 def _together(
     point: OperatingPoint, reduction: Reduction, speeds: list[Any], each: list[tuple[dict[str, Any], Any]]
-) -> tuple[dict[str, Any], Any]:
+) -> tuple[dict[str, Any], tuple[Any, ...]]:
     """Scales of a machine, from those at its contacts.
 
     A coordinate matters by what it slips at its contacts, or else by how far it moves in the shortest time that matters
@@ -297,16 +301,19 @@ def _together(
         if item.kind == "integral":
             sensed = [scales[f"{one.name}.x"] for one in model.coordinates if rate.has(one.displacement)]
             scales[item.name] = time * np.minimum.reduce(np.broadcast_arrays(*sensed))
-    if reduction.restarts:
-        own_w = {
-            one.variable.w: found["w"] for one, (found, _) in zip(reduction.slidings, each, strict=True) if one.variable
-        }
-        wanted = [own_w[w] for w, _ in reduction.restarts]
-        return scales, np.minimum.reduce(np.broadcast_arrays(*wanted))
-    frictions = [contact.friction for contact in model.contacts]
-    if reduction.unknown in frictions:
-        return scales, np.abs(weights(point, frictions.index(reduction.unknown)).direct)
-    return scales, np.minimum.reduce(np.broadcast_arrays(*(unknown for _, unknown in each)))
+    return scales, tuple(_searched(point, reduction, symbol, each) for symbol in reduction.searched) or (np.ones(1),)
+
+
+def _searched(
+    point: OperatingPoint, reduction: Reduction, symbol: sp.Symbol, each: list[tuple[dict[str, Any], Any]]
+) -> Any:
+    """The size of an unknown of a machine: of a velocity variable, a friction or an acceleration."""
+    for i, (one, (found, _)) in enumerate(zip(reduction.slidings, each, strict=True)):
+        if one.variable is not None and symbol is one.variable.w:
+            return found["w"]
+        if symbol is reduction.model.contacts[i].friction:
+            return np.abs(weights(point, i).direct)
+    return np.minimum.reduce(np.broadcast_arrays(*(unknown for _, unknown in each)))
 
 
 def shortest_time(scales: Mapping[str, Any]) -> Any:
@@ -344,7 +351,7 @@ def sizes(
         most = choose(own > 1e-3 * scale, own, 1e-3 * scale)
         scales[item.name] = choose((own > 0) & (most < scale), most, scale)
     scales |= {item.name: x * x / drive for item in reduction.model.integrals}
-    if reduction.restarts:
+    if reduction.model.is_single and reduction.restarts:
         return scales, scales["w"]
     force = choose(direct > by_slip * x, direct, by_slip * x) / found.by_unknown
     return scales, choose(force > drive * drive / x, force, drive * drive / x)

@@ -195,22 +195,23 @@ def _matching_memory(reduction: Reduction, point: OperatingPoint, x: Any, v: Any
 
 
 def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, velocity: Any) -> list[Any]:
-    """Where Newton's method starts for what is left to solve for: velocity variables that balances fix, or nothing."""
+    """Where the search starts for what is left to solve for: unknowns, and velocity variables that balances fix."""
     model, found = reduction.model, []
     memory = [initial[:, reduction.continuous.index(item.symbol)] for item in model.memory]
     own = {one.variable.w: i for i, one in enumerate(reduction.slidings) if one.variable is not None}
-    for w, _ in reduction.restarts:
-        slip = velocity if model.is_single else slip_rates(point)[own[w]]
-        found.append(point.evaluate(_velocity_variable(reduction, own[w]), slip, *memory)[0])
-    if reduction.unknown in model.steady and not found:
-        found = [point.evaluate(_steady_unknown(reduction))[0]]
+    steady = point.evaluate(_steady_unknowns(reduction))
+    for symbol, value in zip(reduction.searched, steady, strict=True):
+        if symbol in own:
+            slip = velocity if model.is_single else slip_rates(point)[own[symbol]]
+            value = point.evaluate(_velocity_variable(reduction, own[symbol]), slip, *memory)[0]
+        found.append(value)
     return found or [0.0]
 
 
 @question
-def _steady_unknown(reduction: Reduction) -> Callable[..., list[Any]]:
-    """The unknown in steady sliding."""
-    return reduction.model.function([reduction.model.steady[reduction.unknown]])
+def _steady_unknowns(reduction: Reduction) -> Callable[..., list[Any]]:
+    """What is searched for, in steady sliding; zero for velocity variables, which follow from velocities."""
+    return reduction.model.function(reduction.model.steady.get(s, sp.Integer(0)) for s in reduction.searched)
 
 
 @question

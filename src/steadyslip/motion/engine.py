@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.kernels.driver.looking import hold
+from steadyslip.kernels.driver.places import breadth, point_at, unknown_at, width
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Recorded, Row, Sampled, Setting
+from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Recorded, Row, Setting
 from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.motion.jobs import Jobs
 
@@ -25,6 +27,7 @@ INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATU
 @dataclass
 class Outcome:
     """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only; `tables` it was given.
+    `size` is the length of the state.
 
     ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`.
     """
@@ -36,6 +39,7 @@ class Outcome:
     log: np.ndarray
     recorded: np.ndarray
     tables: tuple[np.ndarray, ...]
+    size: int
 
     @property
     def steps(self) -> np.ndarray:
@@ -44,18 +48,18 @@ class Outcome:
 
     @property
     def point(self) -> np.ndarray:
-        """Where each ended, (jobs, 1 + state)."""
+        """Where each ended, (jobs, 1 + state + further unknowns)."""
         return self.final[:, Final.POINT :]
 
     @property
     def unknown(self) -> np.ndarray:
-        """The unknown of the balance where each ended, (jobs,)."""
+        """The first unknown of the balances where each ended, (jobs,)."""
         return self.final[:, Final.POINT]
 
     @property
     def state(self) -> np.ndarray:
         """Where each ended, (jobs, state)."""
-        return self.final[:, Final.STATE :]
+        return self.final[:, Final.STATE : Final.STATE + self.size]
 
 
 class Call:
@@ -73,11 +77,11 @@ class Call:
         self.cursor = np.zeros(len(Cursor), dtype=np.int64)
         self.cursor[[Cursor.LAST_JOB, Cursor.BUSY, Cursor.PAUSED]] = size, lanes, -1
         self.status = np.zeros(size, dtype=np.int64)
-        self.final = np.full((size, Final.STATE + layout.size), np.nan)
+        self.final = np.full((size, Final.POINT + breadth(layout)), np.nan)
         self.tally = np.full((size, layout.contacts * len(TALLY)), np.nan)
-        self.samples = np.full((size, len(times), Sampled.STATE + layout.size), np.nan)
+        self.samples = np.full((size, len(times), breadth(layout)), np.nan)
         self.log = np.zeros((0, LOG_COLUMNS))
-        self.recorded = np.zeros((0, Recorded.STATE + layout.size))
+        self.recorded = np.zeros((0, Recorded.POINT + breadth(layout)))
 
     def go(self, quota: int) -> int:
         """0 done, 1 a buffer is full, 2 quota used up."""
@@ -93,15 +97,19 @@ class Call:
 
     def cut_off(self) -> None:
         """Where the job of the only lane is, as its end: it will not go on."""
-        reached = self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED, Row.Z]]
-        first = self.layout.state
-        self.final[0] = [self.time(), *reached, *self.work[first : first + self.layout.size]]
+        layout, y = self.layout, np.empty(width(self.layout))
+        hold(self.work, layout, y)
+        self.final[0, : Final.POINT] = [self.time(), *self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED]]]
+        self.final[0, Final.STATE : Final.STATE + layout.size] = y[: layout.size]
+        for k in range(max(layout.unknowns, 1)):
+            self.final[0, Final.POINT + point_at(layout, k)] = y[unknown_at(layout, k)]
 
     def outcome(self) -> Outcome:
         self.status[self.status == 0] = INTERRUPTED
         return Outcome(
             self.status, self.final, self.tally, self.samples,
             self.log[: self.cursor[Cursor.LOGGED]], self.recorded[: self.cursor[Cursor.RECORDED]], self.tables,
+            self.layout.size,
         )  # fmt: skip
 
 

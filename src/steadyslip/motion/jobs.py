@@ -21,7 +21,8 @@ from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import in_range, require_range
-from steadyslip.model.reduction import Reduction, reduce_model
+from steadyslip.model.reducing import reduce_model
+from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import eliminable, natural_scales, posed, resolved, shortest_time, slip_rates
 from steadyslip.model.start import guesses, initial_values
 from steadyslip.protocol import Protocol, Segments, pack
@@ -132,25 +133,28 @@ class Jobs:
         point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
         velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
-        first, *further = guesses(self.reduction, point, initial, velocity)
+        first, *others = guesses(self.reduction, point, initial, velocity)
         ask = _kept_settings if point.size == 1 else _settings
         settings = ask(point, machine, self.reduction, self.options)
         settings = settings.repeat(max(len(settings), np.size(first)) // len(settings), axis=0)
         settings[:, Setting.GUESS] = first
-        for k, value in enumerate(reversed(further), start=1):
-            settings[:, -k] = value
+        for column, value in enumerate(others, start=Setting.ATOL + machine.kernel.size):
+            settings[:, column] = value
         settings[:, Setting.WATCH], settings[:, Setting.RECORD] = watch, record
         return machine.constants(point), initial, settings, self.segments.rows(start, stop)
 
 
 def _settings(point: OperatingPoint, machine: Runner, reduction: Reduction, options: Options) -> np.ndarray:
     """Rows of settings, but for what depends on the start and on what is wanted."""
-    scales, unknown = natural_scales(point, reduction)
+    scales, (unknown, *others) = natural_scales(point, reduction)
     sizes = np.column_stack(np.broadcast_arrays(*(np.atleast_1d(scales[name]) for name in reduction.names)))
     speed = slip_rates(point)[0]
     way = scales["x"] if "x" in scales else speed * shortest_time(scales)
     own = numbers(speed, np.atleast_1d(point.sigmas[0]), way, unknown, options)
-    return machine.settings(own | {"watch": 0.0, "record": 0.0, "guess": 0.0}, options.rtol * sizes)
+    settings = machine.settings(own | {"watch": 0.0, "record": 0.0, "guess": 0.0}, options.rtol * sizes)
+    for column, value in enumerate(others, start=settings.shape[1] - len(others)):
+        settings[:, column] = value
+    return settings
 
 
 _kept_settings = question(_settings)
@@ -180,7 +184,7 @@ def automatic_method(reduction: Reduction, rtol: float = np.inf) -> str:
     kinds = [one.variable.kind for one in reduction.slidings if one.variable is not None]
     if any(one.inertial for one in reduction.model.coordinates) or "linear" in kinds:
         return "rodas4"
-    return "dop853" if rtol <= TIGHT and reduction.unknown is None else "tsit5"
+    return "dop853" if rtol <= TIGHT and not reduction.unknowns else "tsit5"
 
 
 def prepare(
@@ -281,7 +285,7 @@ def targets(rig: Slider | Machine, plan: Protocol) -> tuple[str, str]:
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:
     """A method with so many stages that an equation to be solved in each takes minutes to compile."""
-    if reduction.unknown is None or METHODS[method] not in TABLEAUS:
+    if not reduction.unknowns or METHODS[method] not in TABLEAUS:
         return
     stages = {name: make().stages for name, make in TABLEAUS.items()}
     if stages[METHODS[method]] > MOST_SOLVED:

@@ -93,8 +93,8 @@ def observe(
     lane, segment : ndarray of int (points,)
     time : ndarray (points,)
         Since the start of the run.
-    points : ndarray (points, 1 + state)
-        The unknown of the balance (NaN where it is not known), then the state: see `Sampled`.
+    points : ndarray (points, 1 + state + further unknowns)
+        Unknowns of the balances (NaN where they are not known) around the state: see `Sampled`.
     tables : tuple of ndarray, optional
         Those of the jobs from `first` on, if they are at hand.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from steadyslip.kernels.driver.looking import look_back, look_now
-from steadyslip.kernels.driver.places import kinds, marks_at, outputs_at, tally_at, velocity_at
+from steadyslip.kernels.driver.places import guess_at, kinds, marks_at, outputs_at, tally_at, unknown_at, velocity_at
 from steadyslip.kernels.driver.slip import note, outrun, quicken
 from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
 
@@ -69,7 +69,8 @@ def follow(
         note(R, layout, kind, tau, y, log, cursor)
         if kind % (2 * each) == Kind.LOST:
             R[Row.TAU] = tau
-            R[Row.Z] = y[layout.size + Out.UNKNOWN]
+            for k in range(max(layout.unknowns, 1)):
+                R[guess_at(layout, k)] = y[unknown_at(layout, k)]
             for i in range(layout.size):
                 R[layout.state + i] = y[i]
             for i in range(count):  # what would have come later was counted by the step

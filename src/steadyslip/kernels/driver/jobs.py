@@ -6,7 +6,7 @@ import math
 
 from steadyslip.kernels.driver.crossings import before_jump, crossed, follow
 from steadyslip.kernels.driver.looking import look_now
-from steadyslip.kernels.driver.places import guess_at, kinds, tally_at, velocity_at
+from steadyslip.kernels.driver.places import guess_at, kinds, point_at, scale_at, searched, tally_at, velocity_at
 from steadyslip.kernels.driver.samples import await_sample, record_now, record_step, take_samples
 from steadyslip.kernels.driver.segments import clock, enter_segment
 from steadyslip.kernels.driver.slip import note
@@ -64,8 +64,10 @@ def load_job(
     S[Row.H * lanes + lane] = own[Setting.FIRST_STEP]
     for i in range(layout.size):
         S[(layout.atol + i) * lanes + lane] = own[Setting.ATOL + i]
-    for k in range(1, layout.massless):
+    count = searched(layout)
+    for k in range(1, count):
         S[guess_at(layout, k) * lanes + lane] = own[Setting.ATOL + layout.size + k - 1]
+        S[scale_at(layout, k) * lanes + lane] = own[Setting.ATOL + layout.size + count + k - 2]
     S[Row.ACTIVE * lanes + lane] = 1.0
 
 
@@ -136,9 +138,10 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
     final[row, Final.SEGMENT] = R[Row.SEGMENT]
     final[row, Final.ACCEPTED] = R[Row.ACCEPTED]
     final[row, Final.REJECTED] = R[Row.REJECTED]
-    final[row, Final.POINT] = R[Row.Z]
     for i in range(layout.size):
         final[row, Final.STATE + i] = R[layout.state + i]
+    for k in range(max(layout.unknowns, 1)):
+        final[row, Final.POINT + point_at(layout, k)] = R[guess_at(layout, k)]
     first, counted = Row.PEAK_SIZE - Row.EVENTS, 2 * kinds(layout)
     for c in range(layout.contacts):
         place = c * (tally.shape[1] // layout.contacts)
@@ -160,13 +163,13 @@ def go_on(
     samples, log, recorded = results[3], results[4], results[5]
     good = R[Row.GOOD] > 0.0
     if layout.massless > 0 and layout.w >= 0:
-        for k in range(layout.massless):
-            R[guess_at(layout, k)] = R[layout.state + layout.w + k]  # for after the next jump
+        for k in range(layout.unknowns, layout.massless):
+            R[guess_at(layout, k)] = R[layout.state + layout.w + k - layout.unknowns]  # for after the next jump
     if layout.stages > 0 and good:
         lost = R[Row.WATCH] > 0.0 and follow(R, layout, routines, cursor, log, y, order)
         take_samples(R, layout, routines, j - j0, times, samples, False, y)
         if R[Row.RECORD] > 0.0 and lost:
-            record_now(R, layout, cursor, recorded)
+            record_now(R, layout, cursor, recorded, y)
         elif R[Row.RECORD] > 0.0:
             record_step(R, layout, routines, cursor, recorded, y)
         if lost:
@@ -190,7 +193,7 @@ def go_on(
         await_sample(R, times)
         R[Row.H] = h
         if R[Row.RECORD] > 0.0:
-            record_now(R, layout, cursor, recorded)
+            record_now(R, layout, cursor, recorded, y)
         if R[Row.WATCH] > 0.0:
             crossed(R, layout, routines, cursor, log, y)
     return Status.RUNNING
@@ -216,7 +219,7 @@ def attend(
         ids[lane] = j
         if start_job(R, layout, routines, j, cursor, results[4], arrays, y):
             if R[Row.RECORD] > 0.0:
-                record_now(R, layout, cursor, results[5])
+                record_now(R, layout, cursor, results[5], y)
             return
         finish(R, layout, j - cursor[Cursor.FIRST_JOB], Status.NO_VELOCITY, results)
     ids[lane] = -1

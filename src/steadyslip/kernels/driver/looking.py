@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, call
+from steadyslip.kernels.driver.places import guess_at, unknown_at
+from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
+
+
+def hold(R: Array, layout: Layout, y: Array) -> None:
+    """The record's state and unknowns, in y."""
+    for i in range(layout.size):
+        y[i] = R[layout.state + i]
+    for k in range(max(layout.unknowns, 1)):
+        y[unknown_at(layout, k)] = R[guess_at(layout, k)]
 
 
 def look_now(R: Array, layout: Layout, routines: Routines, tau: float, y: Array) -> None:
     """The record's state and outputs, at tau into the segment, in y."""
-    for i in range(layout.size):
-        y[i] = R[layout.state + i]
-    y[layout.size + Out.UNKNOWN] = R[Row.Z]
+    hold(R, layout, y)
     call(routines.outputs, R, tau, y)
 
 
 def between(R: Array, layout: Layout, routines: Routines, theta: float, y: Array) -> None:
-    """The state at the fraction theta of the last step, in y, and near which the unknown of the balance is there."""
+    """The state at the fraction theta of the last step, in y, and near which the unknowns of the balances are."""
     if R[Row.EXTENDED] == 0.0:
         call(routines.extend, R, 0.0, y)
     call(routines.dense, R, theta, y)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.driver.looking import between
+from steadyslip.kernels.driver.looking import between, hold
+from steadyslip.kernels.driver.places import point_at, unknown_at
 from steadyslip.kernels.driver.segments import clock
-from steadyslip.kernels.layout import Array, Cursor, Layout, Out, Recorded, Routines, Row, Sampled
+from steadyslip.kernels.layout import Array, Cursor, Layout, Recorded, Routines, Row, Sampled
 
 BETWEEN = 3  # points that are recorded between the ends of a step whose dense output has stages of its own
 
@@ -31,31 +32,29 @@ def take_samples(
         if at_end:
             if times[k] > clock(R, R[Row.TAU]):
                 break
-            for i in range(layout.size):
-                y[i] = R[layout.state + i]
-            y[layout.size + Out.UNKNOWN] = R[Row.Z]
+            hold(R, layout, y)
         else:
             if times[k] >= R[Row.STOP] or (tau >= R[Row.TAU] and not arrived):
                 break
             between(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
-        samples[row, k, Sampled.UNKNOWN] = y[layout.size + Out.UNKNOWN]
         for i in range(layout.size):
             samples[row, k, Sampled.STATE + i] = y[i]
+        for j in range(max(layout.unknowns, 1)):
+            samples[row, k, point_at(layout, j)] = y[unknown_at(layout, j)]
         k += 1
     R[Row.TAKEN] = k
     await_sample(R, times)
 
 
-def record(
-    R: Array, layout: Layout, tau: float, unknown: float, state: Array, first: int, cursor: Array, recorded: Array
-) -> None:
-    """Write down a point, its state the numbers from `first` of an array, at tau into the segment."""
+def record(R: Array, layout: Layout, tau: float, y: Array, cursor: Array, recorded: Array) -> None:
+    """Write down the point that y holds, at tau into the segment."""
     i = cursor[Cursor.RECORDED]
     recorded[i, Recorded.TIME] = clock(R, tau)
     recorded[i, Recorded.SEGMENT] = R[Row.SEGMENT]
-    recorded[i, Recorded.POINT] = unknown
     for c in range(layout.size):
-        recorded[i, Recorded.STATE + c] = state[first + c]
+        recorded[i, Recorded.STATE + c] = y[c]
+    for j in range(max(layout.unknowns, 1)):
+        recorded[i, Recorded.POINT + point_at(layout, j)] = y[unknown_at(layout, j)]
     cursor[Cursor.RECORDED] = i + 1
 
 
@@ -64,11 +63,11 @@ def record_step(R: Array, layout: Layout, routines: Routines, cursor: Array, rec
     for i in range(1, BETWEEN + 1 if layout.extra > 0 else 1):
         theta = i / (BETWEEN + 1)
         between(R, layout, routines, theta, y)
-        unknown = y[layout.size + Out.UNKNOWN]
-        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], unknown, y, 0, cursor, recorded)
-    record_now(R, layout, cursor, recorded)
+        record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], y, cursor, recorded)
+    record_now(R, layout, cursor, recorded, y)
 
 
-def record_now(R: Array, layout: Layout, cursor: Array, recorded: Array) -> None:
+def record_now(R: Array, layout: Layout, cursor: Array, recorded: Array, y: Array) -> None:
     """Write down where the record is."""
-    record(R, layout, R[Row.TAU], R[Row.Z], R, layout.state, cursor, recorded)
+    hold(R, layout, y)
+    record(R, layout, R[Row.TAU], y, cursor, recorded)

@@ -44,11 +44,12 @@ def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, 
     begin_segment(R, layout, 1, 0, row)
     call(routines.shift, R, row[2], y)
     R[Row.LOAD_MOVED] += row[2]
+    good = True
     if layout.massless > 0:  # velocity variables before the jump are the guesses
-        solve_balances(R, layout, routines, y)
+        good = solve_balances(R, layout, routines, y)
     call(routines.place, R, 0.0, y)
     call(routines.rates, R, 0.0, y)
-    good = math.isfinite(R[Row.V])
+    good = good and math.isfinite(R[Row.V])
     for i in range(layout.size):
         good = good and math.isfinite(R[layout.rate + i])
     return good

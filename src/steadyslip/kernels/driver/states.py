@@ -7,39 +7,56 @@ import math
 import numpy as np
 
 from steadyslip.kernels.driver.balance import solve_balances
-from steadyslip.kernels.driver.places import outputs_at, width
+from steadyslip.kernels.driver.places import (
+    earlier_at,
+    further_at,
+    guess_at,
+    outputs_at,
+    point_at,
+    scale_at,
+    searched,
+    unknown_at,
+    width,
+)
 from steadyslip.kernels.driver.segments import begin_segment, set_inputs
 from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Sampled, Setting, call
 
 
 def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
-    """Constants of a rig, and its guess of the unknown."""
+    """Constants of a rig, and its guesses of the unknowns."""
     for i in range(layout.constants):
         R[layout.constant + i] = constants[own if constants.shape[0] > 1 else 0, i]
-    R[Row.Z] = settings[own if settings.shape[0] > 1 else 0, Setting.GUESS]
-    R[Row.Z_SCALE] = settings[own if settings.shape[0] > 1 else 0, Setting.Z_SCALE]
+    row, count = own if settings.shape[0] > 1 else 0, searched(layout)
+    R[Row.Z] = settings[row, Setting.GUESS]
+    R[Row.Z_SCALE] = settings[row, Setting.Z_SCALE]
+    for k in range(1, count):
+        R[guess_at(layout, k)] = settings[row, Setting.ATOL + layout.size + k - 1]
+        R[scale_at(layout, k)] = settings[row, Setting.ATOL + layout.size + count + k - 2]
 
 
 def place_point(R: Array, layout: Layout, routines: Routines, points: Array, m: int, y: Array) -> None:
-    """Bring point m into a record and into y, balance solved where there is one left to solve.
+    """Bring point m into a record and into y, balances solved where there are some left to solve.
 
-    Where the point does not tell its unknown (NaN), what the record has is the guess.
+    Where the point does not tell its unknowns (NaN), what the record has are the guesses.
     """
-    if math.isfinite(points[m, Sampled.UNKNOWN]):
-        R[Row.Z] = points[m, Sampled.UNKNOWN]
+    for k in range(max(layout.unknowns, 1)):
+        if math.isfinite(points[m, point_at(layout, k)]):
+            R[guess_at(layout, k)] = points[m, point_at(layout, k)]
     for i in range(layout.size):
         R[layout.state + i] = points[m, Sampled.STATE + i]
         y[i] = points[m, Sampled.STATE + i]
     if layout.solved:
         for i in range(layout.kept):
             R[layout.continuous + i] = points[m, Sampled.STATE + i]
-        near = R[Row.Z]
-        solve_balances(R, layout, routines, y)
-        if not math.isfinite(R[Row.Z]):
-            R[Row.Z] = near
-        for i in range(layout.size):  # what `solve_balance` left there
+        for k in range(layout.unknowns):
+            R[earlier_at(layout, k)] = R[guess_at(layout, k)]
+        if not solve_balances(R, layout, routines, y):
+            for k in range(layout.unknowns):
+                R[guess_at(layout, k)] = R[earlier_at(layout, k)]
+        for i in range(layout.size):  # what `solve_balances` left there
             y[i] = points[m, Sampled.STATE + i]
-    y[layout.size + Out.UNKNOWN] = R[Row.Z]
+    for k in range(max(layout.unknowns, 1)):
+        y[unknown_at(layout, k)] = R[guess_at(layout, k)]
 
 
 def go_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array, s: int, k: int, y: Array) -> None:
@@ -60,10 +77,10 @@ def observe(
 ) -> None:  # fmt: skip
     """Outputs and continuous variables at given points.
 
-    `points` is (m, 1 + size); `own` (m,) the rig's row, `segment` and `times` where and when in its protocol, since the
-    start of the run. `values` is (8 contacts + kept + further, m): `Out` up to ADVANCE of each contact, which is
-    here the way of the load point since the start of the run, the variables that jumps leave alone, and what else is
-    observed.
+    `points` is (m, 1 + size + further unknowns); `own` (m,) the rig's row, `segment` and `times` where and when in its
+    protocol, since the start of the run. `values` is (8 contacts + kept + further, m): `Out` up to ADVANCE of each
+    contact, which is here the way of the load point since the start of the run, the variables that jumps leave alone,
+    and what else is observed.
     """
     R, y = np.zeros(layout.rows), np.empty(width(layout))
     rig = -1
@@ -89,7 +106,7 @@ def observe(
             values[Out.W_SLOPE * c + Out.ADVANCE, m] += moved
         place = Out.W_SLOPE * layout.contacts + layout.kept
         for i in range(layout.further):
-            values[place + i, m] = y[width(layout) - layout.further + i]
+            values[place + i, m] = y[further_at(layout) + i]
         call(routines.restore, R, 0.0, y)
         R[Row.LOAD_MOVED] = moved
         for i in range(layout.kept):
@@ -100,7 +117,7 @@ def field(
     layout: Layout, routines: Routines, constants: Array, settings: Array, points: Array, inputs: Array, own: Array,
     values: Array,
 ) -> None:  # fmt: skip
-    """Rates (m, size) at given points, (m, 1 + size).
+    """Rates (m, size) at given points, (m, 1 + size + further unknowns).
 
     `inputs` (m, 7) holds v_lp, q, p, their slopes and the time, `own` the rig.
     """

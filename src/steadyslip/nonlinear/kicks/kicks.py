@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
-from steadyslip.model.reduction import reduce_model
+from steadyslip.model.reducing import reduce_model
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood

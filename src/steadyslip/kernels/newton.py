@@ -1,0 +1,87 @@
+"""Newton's method for the unknowns of a Model within a program: rounds without branches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from steadyslip.core.errors import InternalError
+from steadyslip.kernels.formulation import Formulation
+from steadyslip.kernels.nodes import Loop, Node, Value, as_node, larger, select, smaller
+
+NEWTON_STEPS = 6
+LARGEST = 2.0  # change of a velocity variable that is a logarithm, or like one, in a round
+
+
+def solved(
+    kernel: Formulation, given: Mapping[str, Value], near: Sequence[Value], scales: Sequence[Value]
+) -> list[Value]:
+    """The unknowns at the values that are given, by a fixed number of rounds; the failure is NaN, in all of them."""
+    residuals, n = kernel.residuals, kernel.unknowns
+    if residuals is None:
+        raise InternalError("residuals where there are unknowns")
+    clamped = _clamped(kernel)
+
+    def improved(*z: Node) -> tuple[Sequence[Value], Sequence[Value]]:
+        found = residuals({**given, **kernel.named(z)})
+        changes = eliminated(dict(zip(kernel.slopes, found[n:], strict=True)), found[:n])
+        for k in clamped:
+            changes[k] = smaller(larger(changes[k], -LARGEST), LARGEST)
+        after = [own - change for own, change in zip(z, changes, strict=True)]
+        return after, [*after, *changes]
+
+    found = Loop(NEWTON_STEPS, near, improved).outcome()
+    small = [
+        abs(change) <= 1e-7 * abs(z) + 1e-9 * abs(as_node(scale))
+        for z, change, scale in zip(found[:n], found[n:], scales, strict=True)
+    ]
+    good = small[0]
+    for one in small[1:]:
+        good = good & one
+    return [select(good, z, float("nan")) for z in found[:n]]
+
+
+def _clamped(kernel: Formulation) -> list[int]:
+    """Unknowns that are velocity variables, but for velocities themselves."""
+    reduction = kernel.reduction
+    variables = [one.variable for one in reduction.slidings if one.variable is not None]
+    own = {variable.w for variable in variables if variable.kind != "linear"}
+    return [k for k, symbol in enumerate(reduction.unknowns) if symbol in own]
+
+
+def eliminated(matrix: Mapping[tuple[int, int], Value], right: Sequence[Value]) -> list[Value]:
+    """The solution of linear equations, whose largest entry of each column is brought to the diagonal; entries that are
+    not there are zero whatever the numbers.
+    """
+    n, right = len(right), list(right)
+    rows = [{k: value for (i, k), value in matrix.items() if i == row} for row in range(n)]
+    for k in range(n):
+        below = [i for i in range(k + 1, n) if k in rows[i]]
+        for i in below:
+            if k not in rows[k]:
+                rows[k], rows[i], right[k], right[i] = rows[i], rows[k], right[i], right[k]
+                continue
+            swapped = abs(as_node(rows[i][k])) > abs(as_node(rows[k][k]))
+            top, bottom = rows[k], rows[i]
+            rows[k], rows[i] = {}, {}
+            for c in sorted({*top, *bottom}):
+                rows[k][c] = select(swapped, bottom.get(c, 0.0), top.get(c, 0.0))
+                rows[i][c] = select(swapped, top.get(c, 0.0), bottom.get(c, 0.0))
+            right[k], right[i] = select(swapped, right[i], right[k]), select(swapped, right[k], right[i])
+        if k not in rows[k]:
+            raise InternalError("equations that fix their unknowns")
+        for i in below:
+            if k not in rows[i]:
+                continue
+            share = rows[i].pop(k) / rows[k][k]
+            for c, value in rows[k].items():
+                if c > k:
+                    rows[i][c] = rows[i].get(c, 0.0) - share * value
+            right[i] = right[i] - share * right[k]
+    found: dict[int, Value] = {}
+    for k in reversed(range(n)):
+        known = right[k]
+        for c, value in found.items():
+            if c in rows[k]:
+                known = known - rows[k][c] * value
+        found[k] = known / rows[k][k]
+    return [found[k] for k in range(n)]

@@ -1,0 +1,75 @@
+"""Unknowns that equations fix together at every moment, and how they follow what the equations depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import sympy as sp
+
+from steadyslip.core.errors import InternalError
+from steadyslip.core.expressions import derivative
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """As many unknowns as residuals, which are zero in motion.
+
+    Attributes
+    ----------
+    symbols : tuple of sympy.Symbol
+    residuals : tuple of sympy.Expr
+    """
+
+    symbols: tuple[sp.Symbol, ...]
+    residuals: tuple[sp.Expr, ...]
+
+    @cached_property
+    def matrix(self) -> list[list[sp.Expr]]:
+        """Derivative of each residual in each unknown."""
+        return [[derivative(residual, symbol) for symbol in self.symbols] for residual in self.residuals]
+
+    def followed(self, expression: sp.Expr, pushed: Sequence[sp.Expr]) -> sp.Expr:
+        """How an expression changes through the unknowns, when the residuals are pushed away from zero by so much."""
+        own = [(k, derivative(expression, symbol)) for k, symbol in enumerate(self.symbols) if expression.has(symbol)]
+        if not own:
+            return sp.Integer(0)
+        changes = self.changes(pushed)
+        return sp.Add(*(slope * changes[k] for k, slope in own))
+
+    def along(self, expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
+        """Derivative of an expression in a variable, the unknowns following so that the residuals stay zero."""
+        own = [derivative(residual, variable) for residual in self.residuals]
+        return derivative(expression, variable) + self.followed(expression, own)
+
+    def changes(self, pushed: Sequence[sp.Expr]) -> list[sp.Expr]:
+        """What the unknowns change by: −M⁻¹ `pushed`, M the `matrix`, by elimination without multiplying out."""
+        rows, factors = self._factors
+        right = [-one for one in pushed]
+        for i, k, factor in factors:
+            right[i] -= factor * right[k]
+        found: dict[int, sp.Expr] = {}
+        for k in reversed(range(len(rows))):
+            row, entries = rows[k]
+            known = sp.Add(*(entries[c] * change for c, change in found.items()))
+            found[k] = (right[row] - known) / entries[k]
+        return [found[k] for k in range(len(rows))]
+
+    @cached_property
+    def _factors(self) -> tuple[list[tuple[int, list[sp.Expr]]], list[tuple[int, int, sp.Expr]]]:
+        """Upper triangle, each row with the number of its equation; which multiple of k equation i loses, in turn."""
+        rows, factors = list(enumerate(map(list, self.matrix))), []
+        for k in range(len(rows)):
+            pivot = next((i for i in range(k, len(rows)) if rows[i][1][k] != 0), None)
+            if pivot is None:
+                raise InternalError("equations that fix their unknowns")
+            rows[k], rows[pivot] = rows[pivot], rows[k]
+            above, own = rows[k]
+            for i in range(k + 1, len(rows)):
+                below, entries = rows[i]
+                if entries[k] != 0:
+                    factor = entries[k] / own[k]
+                    factors.append((below, above, factor))
+                    rows[i] = below, [a if b == 0 else a - factor * b for a, b in zip(entries, own, strict=True)]
+        return rows, factors

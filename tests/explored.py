@@ -8,19 +8,24 @@ from types import SimpleNamespace
 
 import numpy as np
 
+import steadyslip as ss
 from javascript import Script
 from steadyslip.explorer.equations import linear_part
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
-from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge
+from steadyslip.linear.modes import mode_of
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE, on_edge, status
 from steadyslip.model.point import operating_point
 from steadyslip.verdict.analyze import numbers_of
+from steadyslip.verdict.numbers import linear_numbers
+
+BAR = 1e-12
 
 
 @cache
 def library():
     web = files("steadyslip.explorer.web")
-    modules = [web.joinpath(name).read_text(encoding="utf-8") for name in ("polynomials.js", "linear.js")]
+    modules = [web.joinpath(name).read_text(encoding="utf-8") for name in ("polynomials.js", "modes.js", "linear.js")]
     return javascript.as_script(javascript.runtime(), *modules)
 
 
@@ -35,6 +40,61 @@ class Explored:
     def __call__(self, rig, branch=0):
         point = operating_point(rig, None, self.present)
         return self.script("linear.set(values).assess(branch)", values=list(map(float, point.arguments)), branch=branch)
+
+
+class ExploredMachine(Explored):
+    """The same of a machine, with the stable values of one of its parameters and its mode in words."""
+
+    def __init__(self, machine):
+        super().__init__(machine)
+        self.names = list(operating_point(machine).model.parameters)
+
+    def __call__(self, machine, name=None):
+        """What JavaScript says; `name` is the parameter of the bar."""
+        point = operating_point(machine)
+        bar = self.names.index(machine.resolve(name)) if name else -1
+        ask = """(() => {
+          linear.bar = bar;
+          const found = linear.set(values).assess();
+          return { ...found, said: found.mode && words(found.mode, linear.facts.shape) };
+        })()"""
+        return self.script(ask, values=list(map(float, point.arguments)), bar=bar)
+
+
+def differences(explored, machine, names=()):
+    """How far JavaScript is from Python on a machine: what is not the same, in words; nothing where all is."""
+    point, found = operating_point(machine), explored(machine)
+    expected = int(status(point))
+    if expected != found["status"]:
+        return [f"status {found['status']} for {expected}"]
+    if expected not in (STABLE, UNSTABLE):
+        return []
+    wrong = []
+    with np.errstate(all="ignore"):
+        numbers = linear_numbers(point)
+    own = np.array(numbers["eigenvalues"])
+    theirs = np.array([complex(s["re"], s["im"]) for s in found["eigenvalues"]])
+    if bool(on_edge(point)) != found["onEdge"]:
+        wrong.append("the edge")
+    if len(own) != len(theirs) or np.any(np.abs(own - theirs) > BAR * np.abs(own)):
+        wrong.append(f"eigenvalues {own} for {theirs}")
+    if np.isfinite(numbers["growth_rate"]):
+        said = mode_of(machine, point, complex(own[0].real, abs(own[0].imag))).words()
+        if said != found["said"]:
+            wrong.append(f"the mode: {found['said']!r} for {said!r}")
+    for name in names:
+        try:
+            exact = ss.stable_values(machine, name)
+        except ss.NotAvailable:
+            exact = None
+        bar = explored(machine, name)["intervals"]
+        if (exact is None) != (bar is None):
+            wrong.append(f"whether {name} is linear")
+        elif exact is not None:
+            mine = np.array([[one["low"], one["high"] or np.inf] for one in bar]).reshape(-1, 2)
+            if mine.shape != exact.shape or not np.allclose(mine, exact, rtol=BAR, atol=0):
+                wrong.append(f"stable values of {name}: {mine.tolist()} for {exact.tolist()}")
+    return wrong
 
 
 @dataclass

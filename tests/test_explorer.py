@@ -16,7 +16,8 @@ from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.explorer.assembly import _dense, _narrow, parts
-from steadyslip.explorer.equations import _judged, _stable_set, linear_part, program
+from steadyslip.explorer.equations import _judged, _stable_set, linear_part
+from steadyslip.explorer.programs import program
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
@@ -66,7 +67,7 @@ def polynomial_programs(n):
     several = _stable_set(n)
     text = "".join(javascript.text(one) for one in (whole, *several))
     facts = {"parameters": list(map(str, names)), "degree": n, "squares": len(several[0].stores) - 2, "closed": False,
-             "observed": []}  # fmt: skip
+             "contacts": [""], "searched": [False], "joint": False, "observed": []}  # fmt: skip
     return f"{text}const own = new Linear({{ coefficients, edges, onAxis, stableAt }}, {json.dumps(facts)});"
 
 

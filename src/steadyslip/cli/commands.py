@@ -218,11 +218,11 @@ def explore(
     """A page for the browser: the verdict as the rig's values are moved. It needs nothing else, and can be sent on."""
     from steadyslip.explorer import explore as run
     from steadyslip.files.output import check_output
-    from steadyslip.files.specifications import read_slider
+    from steadyslip.files.specifications import read_rig
 
     if output is not None:
         check_output([output], [".html"])
-    found = run(read_slider(rig, changes or ()), title=rig.stem, branch=branch)
+    found = run(read_rig(rig, changes or ()), title=rig.stem, branch=branch)
     if output is None:
         say(f"opened {found.open()}")
         return

@@ -22,14 +22,19 @@ from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.search import Search
+from steadyslip.linear.stable_values import linear_set
 from steadyslip.linear.status import STABLE, UNSTABLE, status
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import operating_point
+from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
+from steadyslip.model.sliding import ABSENT
 from steadyslip.verdict.analyze import numbers_of
+from steadyslip.verdict.machine import PHRASES
+from steadyslip.verdict.numbers import linear_numbers
 
 MODULES = (
-    "dom", "quantities", "polynomials", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map", "locus",
+    "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map", "locus",
     "facts", "mover", "sketch", "course", "leaving", "page",
 )  # fmt: skip
 """Modules of the page, each after those that it imports."""
@@ -43,7 +48,7 @@ POLICY = (
 _SENTINEL = 1.2345678901e-211  # first of the numbers that stand for values in the template of a rig file
 
 
-def page(rig: Slider, title: str, branch: int) -> str:
+def page(rig: Slider | Machine, title: str, branch: int) -> str:
     """The text of the file."""
     return document(f"{title} – steadyslip", style(), fragment(rig, title, branch))
 
@@ -64,7 +69,7 @@ def style() -> str:
     return _web("style.css")
 
 
-def fragment(rig: Slider, title: str, branch: int) -> str:
+def fragment(rig: Slider | Machine, title: str, branch: int) -> str:
     """The explorer as a part of a document; several may be in one.
 
     Raises
@@ -91,11 +96,13 @@ def safe(known: Mapping[str, Any]) -> str:
     return data
 
 
-def parts(rig: Slider, title: str, branch: int) -> tuple[str, dict[str, Any]]:
+def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str, Any]]:
     """The code of a page, which declares ``mount``, ``render``, ``programs`` and ``library``, and its data."""
     text, facts = linear_part(rig)
     machine, driven, moving, still = "null", "const advance = null, observe = null;", None, ""
     try:
+        if isinstance(rig, Machine):
+            raise NotAvailable("motion of machines is not on pages yet")
         machine, moving = motion_part(rig, branch)
         driven = driver()
     except NotAvailable as refused:  # the verdict can be shown all the same
@@ -104,7 +111,7 @@ def parts(rig: Slider, title: str, branch: int) -> tuple[str, dict[str, Any]]:
     library = [_web(f"{name}.js") for name in LIBRARY]
     script = _narrow(javascript.as_script(javascript.runtime(), *modules))
     worker = _narrow(javascript.as_script(javascript.runtime(), *library)) + _dense(driven)
-    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still, "sketch": sketch(rig)}
+    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still, "sketch": sketch(rig) if isinstance(rig, Slider) else ""}
     code = (
         f"{script}\nconst programs = {_dense(text)};\n"
         f"const library = () => {{\n{worker}\nconst machine = {_dense(machine)};\n"
@@ -129,7 +136,7 @@ def _dense(text: str) -> str:
     return re.sub(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *", r"\1", re.sub(r"^ +", "", text, flags=re.M))
 
 
-def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:
+def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Everything about a rig but its equations."""
     from steadyslip import __version__
 
@@ -137,32 +144,66 @@ def _data(rig: Slider, title: str, branch: int, facts: Mapping[str, Any]) -> dic
     places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
     point = operating_point(rig, None, present_zeros(rig), branch)
     axial = "slider.axial_stiffness"
-    stiffness = axial if axial in names else rig.stiffness_name()
     return {
         "title": title,
         "version": __version__,
         "branch": branch,
-        "area": rig.area,
+        "area": rig.area if isinstance(rig, Slider) else None,
         "parameters": [_parameter(rig, name, branch) for name in names],
         "facts": dict(facts),
         "places": places,
         "fixed": [float(np.asarray(value)) for value in point.arguments],
         "axial": names.index(axial) if axial in names else -1,
         "speed": "drive.velocity",
-        "stiffness": stiffness if stiffness in names else None,
         "toml": _template(rig, names),
+        **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else {"stiffness": _stiffness(rig, names)}),
         "checks": _checks(rig, names, branch),
     }
 
 
-def _varied(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Address]:
+def _stiffness(rig: Slider, names: list[str]) -> str | None:
+    """The parameter that the bar of a slider is about."""
+    stiffness = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
+    return stiffness if stiffness in names else None
+
+
+def _of_machine(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dict[str, Any]:
+    """What a page says of machines alone: the parameters that its bar can be about, areas of contacts, phrases."""
+    bars, first = _bars(rig, names)
+    areas = [f"contacts.{name}.area" for name in rig.contacts]
+    return {
+        "stiffness": first,
+        "bars": bars,
+        "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
+        "phrases": {**PHRASES, "absent": ABSENT},
+    }
+
+
+def _bars(rig: Machine, names: list[str]) -> tuple[list[str], str | None]:
+    """Parameters that enter linearly, and of the stiffnesses and gains among them that with the nearest edge."""
+    point, ends = operating_point(rig), {}
+    if not point.exists:
+        return [], None
+    for name in names:
+        found = linear_set(point, name)
+        if found is not None:
+            own = float(rig.value(name) or 0.0)
+            edges = found.edges[found.changes]
+            ends[name] = float(np.min(np.abs(np.log(edges / own)), initial=np.inf))
+    stiff = {name: ends[name] for name in rig.of_kind("stiffness") if name in ends}
+    return list(ends), min(stiff or ends, key=lambda name: (stiff or ends)[name], default=None)
+
+
+def _varied(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Address]:
     """The parameters that a page can vary: those in the equations that matter to the verdict.
 
     An axial stiffness stands in place of that along the sliding.
     """
-    known = set(facts["parameters"]) - {"slider.stiffness"} | {"slider.axial_stiffness"}
-    if rig.axial_stiffness is None and rig.stiffness is not None:
-        known |= {"slider.stiffness"}
+    known = set(facts["parameters"])
+    if isinstance(rig, Slider):
+        known = known - {"slider.stiffness"} | {"slider.axial_stiffness"}
+        if rig.axial_stiffness is None and rig.stiffness is not None:
+            known |= {"slider.stiffness"}
     return {
         name: one
         for name, one in rig.parameters().items()
@@ -170,14 +211,21 @@ def _varied(rig: Slider, facts: Mapping[str, Any]) -> dict[str, Address]:
     }
 
 
-def _parameter(rig: Slider, name: str, branch: int) -> dict[str, Any]:
+def _outside(rig: Slider | Machine, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a page tells a parameter; areas of a machine may vary, so that stresses stay those."""
+    return outside(unit, rig.area) if isinstance(rig, Slider) else (1.0, unit)
+
+
+def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     one = rig.parameters()[name]
     domain, value = one.role.domain, float(one.value or 0.0)
-    factor, unit = outside(one.role.unit, rig.area)
+    factor, unit = _outside(rig, one.role.unit)
     natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
+    group, label = _group(rig, name)
     return {
         "name": name,
-        "label": _label(name, rig.parameters()),
+        "group": group,
+        "label": label,
         "doc": one.role.doc,
         "unit": unit,
         "factor": factor,
@@ -192,6 +240,18 @@ def _parameter(rig: Slider, name: str, branch: int) -> dict[str, Any]:
     }
 
 
+_MEMBERS = {"bodies": "body", "links": "link", "contacts": "contact"}
+
+
+def _group(rig: Slider | Machine, name: str) -> tuple[str, str]:
+    """The heading that a parameter stands below, and what it is called there."""
+    kind, _, rest = name.partition(".")
+    if isinstance(rig, Machine) and kind in _MEMBERS:
+        member, _, own = rest.partition(".")
+        return f"{_MEMBERS[kind]} {member}", own
+    return kind, _label(name, rig.parameters())
+
+
 def _label(name: str, names: Iterable[str]) -> str:
     """A name below the heading of its part: the last word, or all behind the part where several end so."""
     part, _, rest = name.partition(".")
@@ -200,13 +260,13 @@ def _label(name: str, names: Iterable[str]) -> str:
     return last if len(alike) == 1 else rest
 
 
-def _template(rig: Slider, names: list[str]) -> str:
+def _template(rig: Slider | Machine, names: list[str]) -> str:
     """The rig file with a place for each value, in SI units per unit area, so that every digit comes back."""
     marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
     lines = rig_to_text(twin(rig, marks)).splitlines()
     for i, name in enumerate(names):
         one = rig.parameters()[name].role
-        factor, _ = outside(one.unit, rig.area)
+        factor, _ = outside(one.unit, rig.area_of(name))
         written = {repr(marks[name]), repr(marks[name] * factor), f'"{marks[name]!r} {one.unit}"'}
         for k, line in enumerate(lines):
             key, _, value = line.partition(" = ")
@@ -215,9 +275,9 @@ def _template(rig: Slider, names: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _checks(rig: Slider, names: list[str], branch: int) -> list[dict[str, Any]]:
+def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
     """Answers of Python at the rig's own numbers and at some others, for the page to compare."""
-    stiff = "slider.axial_stiffness" if "slider.axial_stiffness" in names else rig.stiffness_name()
+    stiff = _stiffness(rig, names) if isinstance(rig, Slider) else _bars(rig, names)[1]
     changes: list[dict[str, float]] = [{}]
     for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
         if name in names:
@@ -226,11 +286,11 @@ def _checks(rig: Slider, names: list[str], branch: int) -> list[dict[str, Any]]:
     for change in changes:
         other = rig.with_values(change) if change else rig
         word = " and ".join(f"{name} = {value!r}" for name, value in change.items()) or "the rig itself"
-        found.append({"name": word, **_answer(other, names, branch)})
+        found.append({"name": word, **_answer(other, names, branch, stiff)})
     return found
 
 
-def _answer(rig: Slider, names: list[str], branch: int) -> dict[str, Any]:
+def _answer(rig: Slider | Machine, names: list[str], branch: int, bar: str | None) -> dict[str, Any]:
     point = operating_point(rig, None, present_zeros(rig), branch)
     answer: dict[str, Any] = {
         "values": [float(rig.value(name) or 0.0) for name in names],
@@ -241,7 +301,16 @@ def _answer(rig: Slider, names: list[str], branch: int) -> dict[str, Any]:
     require_range(point)
     if answer["status"] in (STABLE, UNSTABLE):
         with np.errstate(all="ignore"):
-            numbers = numbers_of(rig, point)
-        answer["critical"] = numbers.get("critical_stiffness")
+            numbers = numbers_of(rig, point) if isinstance(rig, Slider) else linear_numbers(point)
+        answer["critical"] = numbers.get("critical_stiffness") if isinstance(rig, Slider) else _end(rig, point, bar)
         answer["eigenvalues"] = [[s.real, s.imag] for s in numbers["eigenvalues"]]
     return answer
+
+
+def _end(rig: Machine, point: OperatingPoint, name: str | None) -> float | None:
+    """The end of the stable values of a parameter that is nearest to its own."""
+    found = None if name is None else linear_set(point, name)
+    if found is None or name is None or not np.any(found.changes):
+        return None
+    edges = found.edges[found.changes]
+    return float(edges[np.argmin(np.abs(edges - float(rig.value(name) or 0.0)))])

@@ -1,67 +1,42 @@
-"""The linear part of a rig's Model as programs: functions of its parameters and the steady normal stress.
+"""The linear part of a rig's Model as programs: functions of its parameters and the steady normal stresses.
 
-Each program reads the record R, the parameters in the Model's order and behind them σss, and writes the array y.
 `web/linear.js` asks them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.records import conditions, twin
+from steadyslip.explorer.modes import mode_part
+from steadyslip.explorer.programs import program
+from steadyslip.explorer.sliding import searched, steady_programs
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
 from steadyslip.kernels.printers import javascript
-from steadyslip.kernels.source import Formulas
 from steadyslip.linear import crossing, cubic
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.response import has_closed_form, response
 from steadyslip.linear.status import ON_THE_EDGE
 from steadyslip.linear.stiffness import interval_ingredients
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
 from steadyslip.model.sliding import observed_in_steady_sliding
-from steadyslip.model.steady import GRID, SOLVED, steady_equation
-
-Then = Callable[[list[Node]], Sequence[Value]]
+from steadyslip.model.steady import GRID, SOLVED, joint_equation
 
 
-def model_of(rig: Slider) -> Model:
+def model_of(rig: Slider | Machine) -> Model:
     """The rig's Model with what a page can vary from zero kept in it."""
     return build_model(rig, present_zeros(rig))
 
 
-def program(
-    model: Model, name: str, expressions: Sequence[Any], number: sp.Symbol | None = None, then: Then | None = None
-) -> Program:
-    """Expressions in the Model's parameters, σss and perhaps one number more as a program.
-
-    What `then` makes of their values is stored instead of them, if it is given.
-
-    Raises
-    ------
-    NotAvailable
-        If an expression contains what cannot be printed; it is named.
-    """
-    made = Program(name)
-    names = {symbol: f"p{i}" for i, symbol in enumerate(model.arguments)}
-    if number is not None:
-        names[number] = "number"
-    formulas = Formulas(expressions, names)
-    values = {n: made.load(i) for i, n in enumerate(names.values()) if n in formulas.symbols and n != "number"}
-    values["number"] = made.number
-    found = list(map(as_node, formulas(values)))
-    for place, value in enumerate(found if then is None else then(found)):
-        made.store(place, value, "y")
-    return made
-
-
-def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
+def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
     """The linear part as an expression of JavaScript, and what must be known about it.
 
     Returns
@@ -69,56 +44,78 @@ def linear_part(rig: Slider) -> tuple[str, dict[str, Any]]:
     text : str
         An object of functions.
     facts : dict
-        ``parameters`` (dotted names in the order of R), ``affine`` (whether `steady` gives σss; else `residual` is to
-        be solved), ``degree`` of the characteristic polynomial, ``closed`` (whether the `interval` of the closed form
+        ``parameters`` (dotted names in the order of R), ``contacts`` (their names), ``searched`` (of which of them the
+        `residual` is to be solved for σss; those of others `steady` gives), ``joint`` (whether all σss follow
+        together), ``degree`` of the characteristic polynomial, ``closed`` (whether the `interval` of the closed form
         exists), ``edge`` (what rounding alone can make), ``grid`` (how many stresses steady sliding is searched on, and
         the powers of ten that it runs from and to), ``solved`` (misfit of a root as a share of the stress),
-        ``observed`` (names, units and meanings of what `observables` gives).
+        ``observed`` (names, units and meanings of what `observables` gives), of machines also what `mode_part` says.
+
+    Raises
+    ------
+    NotAvailable
+        If an equation contains what cannot be printed, or acts with a delay.
     """
     model = model_of(rig)
-    equation = steady_equation(model)
+    if model.delays:
+        raise NotAvailable(
+            "the page judges by a polynomial, and the characteristic equation of a rig with delay is none; "
+            "steadyslip analyze and boundary take it, and stable_values in Python"
+        )
     coefficients = characteristic_coefficients(model)
-    without, slope = stiffness_split(model)
-    names, observables = observed_in_steady_sliding(model)
-    closed, meanings = (
-        has_closed_form(model),
-        {"spring_stress": "with the damping to the ground", **rig.friction.meanings()},
-    )
+    names, observables = _observed(model)
+    meanings = _meanings(rig)
+    closed, further = has_closed_form(model), {}
     programs = [
-        _steady(model) if equation.affine else program(model, "residual", [_mismatch(model)]),
+        *steady_programs(model),
         program(model, "allowed", [_allowed(rig, model)]),
         program(model, "coefficients", coefficients, then=_judged),
-        program(model, "split", [*without, *slope]),
         program(model, "statics", _static_terms(model), then=lambda terms: [crossing.share_left(terms, select)]),
         program(model, "observables", observables),
-        program(model, "stiffness", [model.axial_share or 1, model.gain]),
     ]
+    if isinstance(rig, Machine):
+        modes, further = mode_part(rig, model)
+        programs += [_linear_split(len(coefficients)), *modes]
+    else:
+        without, slope = stiffness_split(model)
+        programs.append(program(model, "split", [*without, *slope]))
+        programs.append(program(model, "stiffness", [model.axial_share or 1, model.gain]))
+    edges = [] if closed else _stable_set(len(coefficients) - 1)
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
-    else:
-        programs += _stable_set(len(coefficients) - 1)
     facts = {
         "parameters": list(model.parameters),
-        "affine": equation.affine,
+        "contacts": [contact.name for contact in model.contacts],
+        "searched": searched(model),
+        "joint": joint_equation(model) is not None,
         "degree": len(coefficients) - 1,
-        "squares": 0 if closed else len(programs[-3].stores) - 2,
+        "squares": len(edges[0].stores) - 2 if edges else 0,
         "closed": closed,
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
         "solved": SOLVED,
         "observed": [[name, model.observables[name][1], meanings.get(name, "")] for name in names],
-    }
+    } | further
+    programs += edges
     text = "".join(javascript.text(one) for one in programs)
     return f"(() => {{\n{text}return {{ {', '.join(one.name for one in programs)} }};\n}})()", facts
 
 
-def _steady(model: Model) -> Program:
-    """σss (NaN where there is none), its coupling and its load, where that is a formula."""
-    equation = steady_equation(model)
-    sigma, slope = sp.sympify(equation.sigma), sp.sympify(equation.slope)
-    exists = sp.And(slope < 1, sp.StrictGreaterThan(sigma, 0, evaluate=False))
-    load = sigma if equation.given else sigma * (1 - slope)
-    return program(model, "steady", [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, load])
+def _meanings(rig: Slider | Machine) -> dict[str, str]:
+    """What friction laws say of the names of their states."""
+    if isinstance(rig, Machine):
+        own = ((name, one.friction.meanings()) for name, one in rig.contacts.items())
+        return {f"{name}.{key}": words for name, meant in own for key, words in meant.items()}
+    return {"spring_stress": "with the damping to the ground", **rig.friction.meanings()}
+
+
+def _observed(model: Model) -> tuple[list[str], list[sp.Expr]]:
+    """What is shown of steady sliding: not the places of bodies, which count from there, nor what stands still."""
+    names, values = observed_in_steady_sliding(model)
+    unseen = {f"{one.name}.x" for one in model.coordinates}
+    unseen |= {f"{one.name}.v" for one in model.coordinates if one.speed == 0}
+    kept = [(name, value) for name, value in zip(names, values, strict=True) if name not in unseen]
+    return [name for name, _ in kept], [value for _, value in kept]
 
 
 def _static_terms(model: Model) -> list[sp.Expr]:
@@ -126,6 +123,8 @@ def _static_terms(model: Model) -> list[sp.Expr]:
     if has_closed_form(model):
         part = response(model)
         return [part.k, part.mu * part.k * part.B2, part.mu * part.B3]
+    if not model.is_slider:
+        return list(sp.Add.make_args(characteristic_coefficients(model)[0]))
     without, slope = stiffness_split(model)
     return [without[0], model.parameters["slider.stiffness"] * slope[0]]
 
@@ -169,11 +168,20 @@ def _interval(ingredients: list[Node]) -> Sequence[Value]:
     return cubic.without_gain(low, high, gain, select)
 
 
-def _mismatch(model: Model) -> sp.Expr:
-    return model.contact.steady_stress - model.contact.sigma_ss
+def _linear_split(count: int) -> Program:
+    """p and q of coefficients that are linear in a parameter, from them at three values of it; whether they are."""
+    made = Program("linear")
+    low, own, high = ([made.load(start + i) for i in range(count)] for start in (0, count, 2 * count))
+    p, q, straight = crossing.linear_split(low, own, high, select)
+    largest: Value = 0.0
+    for one in q:
+        largest = abs(one) + largest
+    for place, value in enumerate([*p, *q, select(straight & (as_node(largest) > 0), 1.0, 0.0)]):
+        made.store(place, value, "y")
+    return made
 
 
-def _allowed(rig: Slider, model: Model) -> sp.Expr:
+def _allowed(rig: Slider | Machine, model: Model) -> sp.Expr:
     """1 where the conditions that several numbers obey together hold, else 0."""
     symbols: dict[str, Any] = dict(model.parameters)
     relations = [condition.holds for _, condition in conditions(twin(rig, symbols))]

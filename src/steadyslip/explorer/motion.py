@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.explorer.equations import program
+from steadyslip.explorer.programs import program
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import LOG_COLUMNS, SETTINGS, Cursor, Final, Kind, Out, Recorded, Setting
@@ -85,7 +85,7 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
     programs = [
         program(model, "constants", list(kernel.constants.symbols)),
         program(model, "scales", _weighed(model), then=partial(_scales, reduction, eliminate)),
-        program(model, "start", _start(reduction), BLOW),
+        program(model, "start", _start(reduction), [BLOW]),
         program(model, "dashpot", [-sp.diff(model.definitions[model.contact.spring], model.contact.velocity)]),
     ]
     segments = [_segments(name, piece) for name, piece in DISTURBANCES.items()]

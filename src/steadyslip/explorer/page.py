@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.explorer.assembly import page
 from steadyslip.files.standalone import Standalone
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 
@@ -20,11 +22,11 @@ class Explorer(Standalone):
     html : str
         The whole file.
     title : str
-    rig : Slider
+    rig : Slider or Machine
     branch : int
     """
 
-    rig: Slider = field(repr=False)
+    rig: Slider | Machine = field(repr=False)
     branch: int = field(default=0, repr=False)
 
     def widget(self) -> Any:
@@ -41,12 +43,12 @@ class Explorer(Standalone):
 
 
 @checked(title=NAME, branch=BRANCH)
-def explore(rig: Slider, *, title: str = "rig", branch: int = 0) -> Explorer:
+def explore(rig: Slider | Machine, *, title: str = "rig", branch: int = 0) -> Explorer:
     """A page that shows how a rig's verdict depends on its parameters.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
         With any law, contact and drive; users' own laws too.
     title : str, optional
         What the page calls the rig.
@@ -61,6 +63,11 @@ def explore(rig: Slider, *, title: str = "rig", branch: int = 0) -> Explorer:
     Raises
     ------
     NotAvailable
-        If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
+        If an equation contains what cannot be printed as JavaScript or acts with a delay, or numbers leave the range
+        of floating point.
+    ParameterError
+        If a machine, which slides steadily in one way, is asked for another `branch`.
     """
+    if branch and isinstance(rig, Machine):
+        raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
     return Explorer(page(rig, title, branch), title, rig, branch)

@@ -7,10 +7,11 @@ from typing import Any
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.explorer.assembly import parts, safe, style
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 
-def widget(rig: Slider, title: str, branch: int) -> Any:
+def widget(rig: Slider | Machine, title: str, branch: int) -> Any:
     """A widget of a rig.
 
     Returns
@@ -48,7 +49,7 @@ def _kind() -> type:
 
         values = traitlets.Dict().tag(sync=True)
 
-        def __init__(self, rig: Slider, **options: Any) -> None:
+        def __init__(self, rig: Slider | Machine, **options: Any) -> None:
             self._origin = rig
             super().__init__(**options)
 
@@ -62,7 +63,7 @@ def _kind() -> type:
             return {name: float(value) for name, value in together.items()}
 
         @property
-        def rig(self) -> Slider:
+        def rig(self) -> Slider | Machine:
             """The rig with the values of the page."""
             changed = {n: v for n, v in self.values.items() if v != self._origin.value(n)}
             return self._origin.with_values(changed) if changed else self._origin

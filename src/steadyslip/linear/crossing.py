@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 
 ROUNDING = 8 * float(np.finfo(float).eps)  # share of two terms below which what is left of them is none
+APART = 1e6  # factor between the values of a parameter at which `linear_split` is told a polynomial
+_LEFT = 1e-13  # share of its terms that rounding leaves of a difference that is zero
+_LINEAR = 1e-10  # share of a coefficient that rounding alone can make
 Polynomial = Sequence[Any]
 
 
@@ -77,6 +80,28 @@ def real_edges(p: Polynomial, q: Polynomial, choose: Callable[..., Any] = np.whe
     """The k at which a root is zero, and that at which the highest coefficient vanishes, where one is infinite."""
     none = (abs(p[-1]) <= 0) & (abs(q[-1]) <= 0)
     return -p[0] / q[0], choose(none, -p[-2] / q[-2], -p[-1] / q[-1])
+
+
+def linear_split(
+    low: Polynomial, own: Polynomial, high: Polynomial, choose: Callable[..., Any] = np.where
+) -> tuple[list[Any], list[Any], Any]:
+    """p and q of a polynomial p + f q, from it at f = 1/`APART`, 1 and `APART`; and whether it is one."""
+    p: list[Any] = []
+    q: list[Any] = []
+    straight: Any = True
+
+    def beyond(difference: Any, of: Any) -> Any:
+        """Without what rounding alone leaves of nothing, which would be an edge at a value of 1e-20."""
+        return choose(abs(difference) <= _LEFT * abs(of), 0.0, difference)
+
+    for first, middle, last in zip(low, own, high, strict=True):
+        slope = beyond(last - first, last) / (APART - 1 / APART)
+        rest = beyond(first - slope / APART, first)
+        good = abs(middle - (rest + slope)) <= _LINEAR * (abs(rest) + abs(slope))
+        straight = straight & good if p else good
+        p.append(rest)
+        q.append(slope)
+    return p, q, straight
 
 
 def is_hurwitz(c: Polynomial, choose: Callable[..., Any]) -> Any:

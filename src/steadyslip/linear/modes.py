@@ -24,6 +24,13 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import delays_of
 from steadyslip.model.sliding import explain_absence
 
+WORDS = {
+    "judder": "judders|judder", "drift": "drifts|drift", "still": "hardly moves|hardly move",
+    "opposed": " against each other", "the": "the {name}", "and": " and ", "normal": " (normal)",
+    "both": " (along and normal)", "share": "{name} by {share} of that",
+    "energy": "; {share} of the energy is in the {name}",
+}  # fmt: skip
+"""What modes are told in, for one thing and for several; pages tell theirs in the same words."""
 MOVES, HARDLY = 0.5, 0.1  # of the largest amplitude: from the first a body judders, below the second it hardly moves
 
 
@@ -53,20 +60,19 @@ class Mode(Displayed):
         leads = [name for name, size in sizes.items() if size >= MOVES]
         rest = [name for name, size in sizes.items() if HARDLY <= size < MOVES]
         still = [name for name, size in sizes.items() if size < HARDLY]
-        does = "judder" if self.eigenvalue.imag else "drift"
         movers = _merged(leads)
-        parts = [f"{_listed(movers)} {does if len(movers) > 1 else does + 's'}"]
+        parts = [f"{_listed(movers)} {_does('judder' if self.eigenvalue.imag else 'drift', movers)}"]
         if len(leads) == 2 and self._opposed(*leads):
-            parts[0] += " against each other"
+            parts[0] += WORDS["opposed"]
         if rest:
-            shares = [f"{name.replace(NORMAL, ' (normal)')} by {percent(sizes[name])} of that" for name in rest]
+            shares = [WORDS["share"].format(name=_called(name), share=percent(sizes[name])) for name in rest]
             parts.append(", ".join(shares))
         if still:
-            parts.append(f"{_listed(still)} hardly {'move' if len(still) > 1 else 'moves'}")
+            parts.append(f"{_listed(still)} {_does('still', still)}")
         text = ", ".join(parts)
         if self.energy:
             most = max(self.energy, key=lambda name: self.energy[name])
-            text += f"; {percent(round(self.energy[most], 3))} of the energy is in {_plain(most)}"
+            text += WORDS["energy"].format(share=percent(round(self.energy[most], 3)), name=most.partition(".")[2])
         return text
 
     def _opposed(self, one: str, other: str) -> bool:
@@ -84,23 +90,28 @@ class Mode(Displayed):
         return "\n".join(rows)
 
 
+def _does(what: str, names: list[str]) -> str:
+    """What one thing does, or several do."""
+    return WORDS[what].split("|")[len(names) > 1]
+
+
+def _called(name: str) -> str:
+    return name.replace(NORMAL, WORDS["normal"])
+
+
 def _merged(names: list[str]) -> list[str]:
     """A body that moves along the slide and away from it, once."""
     both = {name for name in names if name + NORMAL in names}
     return [
-        f"{n} (along and normal)" if n in both else n
+        n + WORDS["both"] if n in both else n
         for n in names
         if n.removesuffix(NORMAL) == n or n[: -len(NORMAL)] not in both
     ]
 
 
 def _listed(names: list[str]) -> str:
-    words = [f"the {name.replace(NORMAL, ' (normal)')}" for name in names]
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
-
-
-def _plain(name: str) -> str:
-    return f"the {name.partition('.')[2]}"
+    words = [WORDS["the"].format(name=_called(name)) for name in names]
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + WORDS["and"] + words[-1]
 
 
 @checked()
@@ -127,8 +138,8 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     entries = np.array([float(e) for e in point.evaluate(function)]).reshape(size, size, len(powers))
     with np.errstate(all="ignore"):
         late = np.exp(-s * delays_of(point))
-        matrix = entries @ np.array([s ** own[0] * np.prod(late ** np.array(own[1:])) for own in powers])
-        shape = _null_vector(matrix)
+        factors = np.array([s ** own[0] * np.prod(late ** np.array(own[1:])) for own in powers])
+        shape = _null_vector(entries @ factors, np.abs(entries) @ np.abs(factors))
     if not np.all(np.isfinite(shape)):
         raise NotAvailable("the shape of this mode leaves the range of floating point")
     places = dict(zip((one.name for one in model.coordinates), shape, strict=False))
@@ -144,47 +155,66 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     return Mode(s, {n: complex(a / largest) for n, a in scaled.items()}, _energies(rig, places, s))
 
 
-def _null_vector(matrix: np.ndarray) -> np.ndarray:
-    """The vector that a singular matrix takes to zero; rows and columns of very different size are balanced first."""
+def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """The vector that a singular matrix takes to zero; rows and columns of very different size are balanced first.
+
+    `sizes` are those of the terms of each entry: a row that the eigenvalue makes zero must not count by its rounding.
+    """
     columns = np.ones(len(matrix))
     for _ in range(3):
-        rows = np.max(np.abs(matrix * columns), axis=1, keepdims=True)
-        columns = columns / np.maximum(np.max(np.abs(matrix * columns / rows), axis=0), 1e-300)
-    scaled = matrix * columns / np.max(np.abs(matrix * columns), axis=1, keepdims=True)
+        rows = np.max(sizes * columns, axis=1, keepdims=True)
+        columns = columns / np.maximum(np.max(sizes * columns / rows, axis=0), 1e-300)
+    scaled = matrix * columns / np.max(sizes * columns, axis=1, keepdims=True)
     if not np.all(np.isfinite(scaled)):
         return np.full(len(matrix), np.nan)
     return np.asarray(np.linalg.svd(scaled)[2][-1].conj() * columns)
 
 
-def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[str, float]:
-    """Shares of kinetic and elastic energy, averaged over a cycle."""
-    mechanism: Mechanism = rig.mechanism()
-    found: dict[str, float] = {}
+@dataclass(frozen=True)
+class Store:
+    """Something that holds energy: `weight` |amplitude of the row|², times |s|² where it is `kinetic`."""
 
-    def add(name: str, energy: float) -> None:
-        found[name] = found.get(name, 0.0) + energy
+    name: str
+    kinetic: bool
+    weight: Any
+    row: Mapping[str, Any]
 
-    for one in mechanism.coordinates:
-        if one.inertia:
-            add(f"bodies.{one.name.removesuffix(NORMAL)}", float(one.inertia) * abs(s * places[one.name]) ** 2)
+
+def stores(mechanism: Mechanism) -> list[Store]:
+    """What holds energy in a mechanism, of numbers or of symbols; one name may have several."""
+    names = {one.name for one in mechanism.coordinates}
+    found = [
+        Store(f"bodies.{one.name.removesuffix(NORMAL)}", True, one.inertia, {one.name: 1})
+        for one in mechanism.coordinates
+        if one.inertia
+    ]
     for element in mechanism.elements:
-        stretch = sum(float(c) * places[name] for name, c in element.senses.items() if name in places)
-        beside = not element.delay and {n: c for n, c in element.senses.items() if n in places} == dict(element.acts)
+        row = {n: c for n, c in element.senses.items() if n in names}
+        beside = not element.delay and row == dict(element.acts)
         if element.stiffness and (element.name or beside):  # a controller that sees where it acts is a spring, too
-            add(element.name or "drive.controller", float(element.stiffness) * abs(stretch) ** 2)
+            found.append(Store(element.name or "drive.controller", False, element.stiffness, row))
     for touch in mechanism.touches:
         if touch.separation and touch.contact.is_compliant():
-            apart = sum(c * places[name] for name, c in touch.separation.items())
-            add(f"contacts.{touch.name}", float(touch.area) * _stiffness_of(touch) * abs(apart) ** 2)
+            found.append(Store(f"contacts.{touch.name}", False, touch.area * _stiffness_of(touch), touch.separation))
+    return found
+
+
+def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[str, float]:
+    """Shares of kinetic and elastic energy, averaged over a cycle."""
+    found: dict[str, float] = {}
+    for one in stores(rig.mechanism()):
+        stretch = sum(float(c) * places[name] for name, c in one.row.items())
+        energy = float(one.weight) * abs(s * stretch if one.kinetic else stretch) ** 2
+        found[one.name] = found.get(one.name, 0.0) + energy
     total = sum(found.values())
     return {name: value / total for name, value in found.items()} if total > 0 and np.isfinite(total) else {}
 
 
-def _stiffness_of(touch: Touch) -> float:
+def _stiffness_of(touch: Touch) -> Any:
     """Normal stiffness of a contact, from its law."""
     at_rest = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     apart = replace(at_rest, separation=1.0)
-    return float(touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart))
+    return touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart)
 
 
 @question

@@ -13,7 +13,8 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
-from steadyslip.linear.polynomials import Array, StableSet, most_intervals, quietly, stable_set
+from steadyslip.linear.crossing import APART, linear_split
+from steadyslip.linear.polynomials import Array, StableSet, columns, most_intervals, quietly, stable_set
 from steadyslip.linear.stiffness import in_chunks
 from steadyslip.linear.windows import delay_set, linear_windows
 from steadyslip.machine.machine import Machine
@@ -22,9 +23,6 @@ from steadyslip.model.linearisation import characteristic_terms
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import quasi, require_range
 
-_APART = 1e6  # factor between the values at which the polynomial is looked at
-_LEFT = 1e-13  # share of its terms that rounding leaves of a difference that is zero
-_ROUNDING = 1e-10  # share of a coefficient that rounding alone can make
 _WINDOWS = 8  # of a rig with delay that arrays of them have room for
 
 
@@ -134,22 +132,21 @@ def _linear_sets(point: OperatingPoint, name: str) -> Array:
     place = list(point.model.parameters).index(name)
     own = np.broadcast_to(np.asarray(point.arguments[place], dtype=float), point.shape)
     size = np.where(own > 0, own, 1.0)
-    factors = np.array([1 / _APART, 1.0, _APART])
+    factors = np.array([1 / APART, 1.0, APART])
     arguments = list(point.arguments)
     arguments[place] = factors.reshape(3, *(1,) * size.ndim) * size
     c = quasi(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
     known = np.all(np.isfinite(c), axis=(0, -1))
-    p, q, bent = _split(c, factors)
+    p, q, bent = _split(c)
     if np.any(known & (bent | ~np.any(q, axis=-1))):
         raise _not_linear(name)
     return np.where(known[..., None, None], stable_set(p, q).intervals * size[..., None, None], np.nan)
 
 
-def _split(c: Array, factors: Array) -> tuple[Array, Array, Array]:
+def _split(c: Array) -> tuple[Array, Array, Array]:
     """p and q of p + f q from values at three factors f, first axis; and where these do not lie on a line."""
-    q = _beyond_rounding(c[2] - c[0], c[2]) / (factors[2] - factors[0])
-    p = _beyond_rounding(c[0] - factors[0] * q, c[0])
-    return p, q, np.any(np.abs(c[1] - (p + q)) > _ROUNDING * (np.abs(p) + np.abs(q)), axis=-1)
+    p, q, straight = linear_split(*(columns(one) for one in c))
+    return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
 
 
 @quietly
@@ -162,12 +159,12 @@ def linear_set(point: OperatingPoint, name: str) -> StableSet | None:
     if not value > 0:
         return None
     place = list(point.model.parameters).index(name)
-    factors = np.array([1 / _APART, 1.0, _APART])
+    factors = np.array([1 / APART, 1.0, APART])
     arguments = [a if i != place else value * factors for i, a in enumerate(point.arguments)]
     c, h = quasi(point.with_arguments(arguments, (3,)))
     if not np.all(np.isfinite(c)):
         return None
-    p, q, bent = _split(c, factors)
+    p, q, bent = _split(c)
     if np.any(bent) or not np.any(q):
         return None
     late = bool(point.model.delays)
@@ -187,7 +184,3 @@ def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
     c, _ = quasi(point)
     return delay_set(c[0], c[1]) if np.all(np.isfinite(c)) else None
 
-
-def _beyond_rounding(difference: Array, of: Array) -> Array:
-    """A difference without what rounding alone leaves of nothing, which would be an edge at a value of 1e-20."""
-    return np.where(np.abs(difference) <= _LEFT * np.abs(of), 0.0, difference)

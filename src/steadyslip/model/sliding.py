@@ -25,6 +25,19 @@ from steadyslip.model.range import require_range
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 
 
+ABSENT = {
+    "lock-up": "lock-up{at}. The pull raises friction by more than itself: 1 − μss dσ/dτ = {margin}, must be > 0",
+    "lift-off": "lift-off{at}. The motion takes away more normal {force} than the contact has: {load} less {taken} "
+    "leaves {left}, must be > 0",
+    "no solution": "no positive normal {force} satisfies the contact law at the steady shear {force}{at}",
+    "together": "lock-up{at}. Contacts press on each other by more than they are pressed: 1 − gain = {margin}, must be "
+    "> 0",
+    "lifted": "lift-off{at}. Its normal force would be {left}, must be > 0",
+    "at": " at contact {name}",
+}
+"""Why there is no steady sliding; pages say it in the same words."""
+
+
 @dataclass(frozen=True)
 class SteadySliding(Displayed):
     """One state of steady sliding.
@@ -238,32 +251,29 @@ def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | No
     """Why a contact that depends on no other has no steady normal stress."""
     equation = steady_equation(point.model, place)
     name = point.model.contacts[place].name
-    at = f" at contact {name}" if name else ""
+    at = _at(name)
     force = "force" if name else "stress"
     if equation.parts is None:
-        return NoSteadySliding(
-            f"no steady sliding{at}: no positive normal {force} satisfies the contact law at the steady shear {force}",
-            "no solution",
-        )
+        return _absence("no solution", ABSENT["no solution"].format(at=at, force=force))
     load, offset, slope = (float(part) for part in equation.parts(*point.arguments))
     mu = _friction_coefficient(point, place)
     if not slope < 1:
         margin = 1 - slope
         hint = law.lock_up(mu)
-        return NoSteadySliding(
-            f"no steady sliding: lock-up{at}. The pull raises friction by more than itself: "
-            f"1 − μss dσ/dτ = {margin:.4g}, must be > 0" + (f"; {hint}" if hint else ""),
-            "lock-up",
-            margin,
-        )
-    remaining = load + offset
-    return NoSteadySliding(
-        f"no steady sliding: lift-off{at}. The motion takes away more normal {force} than the contact has: "
-        f"{shown(load, 'Pa', area=area)} less {shown(-offset, 'Pa', area=area)} leaves "
-        f"{shown(remaining, 'Pa', area=area)}, must be > 0",
-        "lift-off",
-        remaining,
-    )
+        words = ABSENT["lock-up"].format(at=at, margin=f"{margin:.4g}") + (f"; {hint}" if hint else "")
+        return _absence("lock-up", words, margin)
+    left = load + offset
+    had, taken, remains = (shown(one, "Pa", area=area) for one in (load, -offset, left))
+    words = ABSENT["lift-off"].format(at=at, force=force, load=had, taken=taken, left=remains)
+    return _absence("lift-off", words, left)
+
+
+def _at(name: str) -> str:
+    return ABSENT["at"].format(name=name) if name else ""
+
+
+def _absence(kind: str, words: str, *margin: float) -> NoSteadySliding:
+    return NoSteadySliding(f"no steady sliding: {words}", kind, *margin)
 
 
 def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySliding:
@@ -275,20 +285,12 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
         gains, modes = np.linalg.eig(matrix)
         leading = np.abs(modes[:, np.argmin(np.abs(gains - gain))])
         name = contacts[int(np.argmax(leading))].name
-        return NoSteadySliding(
-            f"no steady sliding: lock-up at contact {name}. Contacts press on each other by more than they are "
-            f"pressed: 1 − gain = {1 - gain:.4g}, must be > 0",
-            "lock-up",
-            float(1 - gain),
-        )
+        words = ABSENT["together"].format(at=_at(name), margin=f"{1 - gain:.4g}")
+        return _absence("lock-up", words, float(1 - gain))
     least = int(np.argmin(sigma))
     force = point.evaluate(point.model.function([contacts[least].area]))[0] * sigma[least]
-    return NoSteadySliding(
-        f"no steady sliding: lift-off at contact {contacts[least].name}. Its normal force would be "
-        f"{shown(float(force), 'N')}, must be > 0",
-        "lift-off",
-        float(force),
-    )
+    words = ABSENT["lifted"].format(at=_at(contacts[least].name), left=shown(float(force), "N"))
+    return _absence("lift-off", words, float(force))
 
 
 @question

@@ -78,11 +78,13 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
 class JointEquation:
     """The steady normal stresses of contacts that press on each other: σ = A σ + b.
 
-    ``parts(*arguments)`` gives A, row by row, and b.
+    ``parts(*arguments)`` gives A, row by row, and b; `matrix` and `rest` are the same in symbols.
     """
 
     size: int
     parts: Callable[..., Any]
+    matrix: tuple[tuple[sp.Expr, ...], ...]
+    rest: tuple[sp.Expr, ...]
 
     def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
         """A (..., n, n) and b (..., n)."""
@@ -115,16 +117,16 @@ def joint_equation(model: Model) -> JointEquation | None:
         If some contact is not linear in the stresses.
     """
     sigmas = [contact.sigma_ss for contact in model.contacts]
-    slopes = [[derivative(contact.steady_stress, sigma) for sigma in sigmas] for contact in model.contacts]
+    slopes = tuple(tuple(derivative(contact.steady_stress, one) for one in sigmas) for contact in model.contacts)
     size = len(sigmas)
     if all(slopes[i][j] == 0 for i in range(size) for j in range(size) if i != j):
         return None
     if any(slope.free_symbols & set(sigmas) for row in slopes for slope in row):
         raise NotAvailable("contacts that press on each other must be linear in the stresses; these are not")
     nothing = dict.fromkeys(sigmas, sp.Integer(0))
-    rest = [contact.steady_stress.xreplace(nothing) for contact in model.contacts]
-    arguments = list(model.parameters.values())
-    return JointEquation(size, array_function(arguments, [*(slope for row in slopes for slope in row), *rest]))
+    rest = tuple(contact.steady_stress.xreplace(nothing) for contact in model.contacts)
+    parts = array_function(list(model.parameters.values()), [*(slope for row in slopes for slope in row), *rest])
+    return JointEquation(size, parts, slopes, rest)
 
 
 def steady_stresses(model: Model, arguments: Arguments, branch: int) -> tuple[Any, ...]:

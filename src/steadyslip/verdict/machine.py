@@ -98,21 +98,29 @@ def analyze_machine(machine: Machine) -> MachineAnalysis:
     return replace(found, reason=_reason(found))
 
 
+PHRASES = {
+    "ill-posed": "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls at "
+    "once by more than mass, direct effect and dampings provide, so any small lag grows at once",
+    "on edge": "neither verdict should be relied on: the least change of a number decides",
+    "dies out": "every small disturbance dies out",
+    "nearest": "the nearest edge is that of {name}: {side} {value} {beyond}",
+    "stable": "it is stable",
+    **BEYOND,
+}
+"""What is said of machines; pages say it in the same words."""
+
+
 def _reason(found: MachineAnalysis) -> str:
     """What grows, or how near the nearest edge is, in one sentence."""
     if found.growth_rate == math.inf:
-        return (
-            "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls at once by "
-            "more than mass, direct effect and dampings provide, so any small lag grows at once"
-        )
+        return PHRASES["ill-posed"]
     if found.on_edge:
-        return "neither verdict should be relied on: the least change of a number decides"
+        return PHRASES["on edge"]
     first = next((one for one in found.margins if one.edge is not None), None)
+    hint = "" if first is None else f"; {_nearest(found, first)}"
     if not found.stable:
-        grows = "an oscillation grows" if found.eigenvalues[0].imag else "a disturbance grows without oscillating"
-        hint = "" if first is None else f"; {_nearest(found, first)}"
-        return grows + hint
-    return "every small disturbance dies out" + ("" if first is None else f"; {_nearest(found, first)}")
+        return PHRASES["oscillatory" if found.eigenvalues[0].imag else "divergence"] + hint
+    return PHRASES["dies out"] + hint
 
 
 def _nearest(found: MachineAnalysis, margin: Margin) -> str:
@@ -122,8 +130,8 @@ def _nearest(found: MachineAnalysis, margin: Margin) -> str:
         return ""
     side = "above" if edge.value > margin.value else "below"
     value = shown(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
-    beyond = "it is stable" if edge.stable == side else BEYOND.get(edge.kind, edge.kind)
-    return f"the nearest edge is that of {margin.parameter}: {side} {value} {beyond}"
+    beyond = PHRASES["stable"] if edge.stable == side else PHRASES.get(edge.kind, edge.kind)
+    return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=beyond)
 
 
 def _sliding(steady: SteadyMachine | None) -> str:

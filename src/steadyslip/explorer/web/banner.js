@@ -2,7 +2,8 @@
 import { make, put, svg, tell } from "./dom.js";
 import { ABSENT } from "./linear.js";
 import { ticks } from "./plot.js";
-import { headline, kindOf, quantity, reason } from "./words.js";
+import { shown } from "./quantities.js";
+import { headline, kindBeyond, kindOf, machineReason, quantity, reason } from "./words.js";
 
 const DECADE = Math.log(10); // on both sides of what is marked
 
@@ -19,9 +20,10 @@ function placed(box, rows, name) {
 }
 
 export class Banner {
-  /** @param {any} data @param {string[]} differs what this browser computes otherwise than Python did */
-  constructor(data, differs) {
-    this.data = data;
+  /** @param {import("./page.js").Page} page @param {string[]} differs what this browser computes otherwise than Python did */
+  constructor(page, differs) {
+    this.page = page;
+    this.data = page.rig.data;
     this.sentence = make("h1", {});
     this.reason = make("p", {});
     this.paths = ["unstable", "unknown", "stable"].map((name) => svg("path", { class: name }));
@@ -30,20 +32,44 @@ export class Banner {
     this.bar = make("div", { className: "bar", role: "img" }, svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, ...this.paths), this.marks, this.labels);
     this.notice = make("p", { className: "notice", role: "status" });
     if (differs.length) this.notice.textContent = `This browser computes otherwise than Python did (${differs.slice(0, 3).join("; ")}): do not rely on this page.`;
-    this.box = make("section", { className: "verdict", "aria-label": "verdict" }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), this.bar, this.notice);
+    const { bars, parameters, stiffness } = this.data;
+    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...(bars ?? []).map((name) => make("option", { value: name, textContent: name, selected: name === stiffness })));
+    this.choice.addEventListener("change", () => page.tell(parameters.findIndex((one) => one.name === this.choice.value)));
+    this.values = make("p", { className: "values", hidden: !bars?.length }, make("label", {}, "stable values of ", this.choice));
+    this.box = make("section", { className: "verdict", "aria-label": "verdict" }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice);
   }
 
-  show(answer, drive) {
+  show(answer) {
+    const { parameters, speed, phrases } = this.data, { values } = this.page.rig, drive = parameters.findIndex((one) => one.name === speed);
     this.box.dataset.kind = kindOf(answer);
-    tell(this.sentence, headline(answer, drive));
-    tell(this.reason, reason(answer, this.data));
+    tell(this.sentence, headline(answer, shown(values[drive], parameters[drive].unit)));
+    if (!phrases || !this.page.tracks) tell(this.reason, phrases ? this.told(answer) : reason(answer, this.data));
     this.showBar(answer);
+  }
+
+  /** The reason of a machine with its nearest edge, once that is known. @param {any} answer @param {any} [first] */
+  showNearest(answer, first) {
+    if (this.data.phrases) tell(this.reason, this.told(answer, first));
+  }
+
+  told(answer, first) {
+    const { rig } = this.page, own = Array.from(rig.set(rig.values).R);
+    if (!first) return machineReason({ ...answer, own }, this.data);
+    const one = this.data.parameters[first.i], kind = kindBeyond(rig.assess(this.page.with(first.i, first.landing)));
+    const edge = { name: one.name, side: first.at > rig.values[first.i] ? "above" : "below", value: shown(first.at * one.factor, one.unit), kind };
+    return machineReason({ ...answer, own }, this.data, edge);
   }
 
   /** The stable stiffnesses, controller's gain included, on a logarithmic bar, with the rig's own. */
   showBar(answer) {
     const { gain } = answer, own = answer.stiffness + gain; // a controller's gain counts as the sentence counts it
-    const stiffness = (k) => quantity(k, "Pa/m", this.data.area);
+    const { phrases, parameters, area } = this.data, chosen = parameters[this.page.rig.bar];
+    const stiffness = (k) => (phrases ? shown(k * chosen.factor, chosen.unit) : quantity(k, "Pa/m", area));
+    if (answer.intervals === null || (phrases && !(own > 0))) {
+      this.bar.hidden = true;
+      put(this.bar, "aria-label", "it does not enter linearly here");
+      return;
+    }
     const intervals = answer.intervals.map(({ low, high }) => ({ low: low + gain, high: high + gain }));
     const ends = answer.intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k)).map((k) => k + gain);
     const marks = [...ends, own, gain].filter((k) => k > 0);
@@ -58,16 +84,16 @@ export class Banner {
     const least = gain > 0 ? `M0 0H${x(gain)}V10H0Z` : ""; // less than the gain alone is not to be had
     const drawn = `M0 0H100V10H0Z|${least}|${intervals.map((one) => `M${x(one.low)} 0H${x(one.high)}V10H${x(one.low)}Z`).join("")}`.split("|");
     this.paths.forEach((path, n) => put(path, "d", drawn[n]));
-    const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low)), per = this.data.area ?? 1;
+    const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low)), per = phrases ? chosen.factor : area ?? 1;
     const scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).map((k) => k / per).filter((k) => x(k) > 6 && x(k) < 94);
     const marked = [...scale.map((k) => ["tick", x(k), ""]), ["own", x(own), ""], ...ends.map((k) => ["edge", x(k), ""])];
-    const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `${gain > 0 ? "gain" : "stiffness"}${gain > 0 && own > gain ? " and stiffness" : ""} now ${stiffness(own)}`],
+    const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `${phrases ? "" : gain > 0 ? "gain" : "stiffness"}${gain > 0 && own > gain ? " and stiffness" : ""} now ${stiffness(own)}`.trim()],
       ...(own > gain && gain > 0 && !ends.length ? [["", within(gain), `the gain alone ${stiffness(gain)}`]] : []),
       ...ends.map((k) => ["", within(k), `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`])];
     placed(this.marks, marked, "i");
     placed(this.labels, labels, "span");
     const words = intervals.map(({ low: a, high: b }) => (b < Infinity ? `${stiffness(a)} to ${stiffness(b)}` : a > gain ? `above ${stiffness(a)}` : "any"));
-    const what = gain > 0 ? `stiffness and gain together, of which the gain is ${stiffness(gain)}` : "stiffness";
+    const what = phrases ? `values of ${chosen.name}` : gain > 0 ? `stiffness and gain together, of which the gain is ${stiffness(gain)}` : "stiffness";
     put(this.bar, "aria-label", `stable ${what}: ${words.join(", or ") || "none"}`);
   }
 }

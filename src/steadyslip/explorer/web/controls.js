@@ -14,9 +14,8 @@ export class Controls {
     this.box = make("section", { className: "controls", "aria-label": "parameters" });
     let group = "";
     this.rows = page.rig.data.parameters.map((one, i) => {
-      const first = one.name.split(".")[0];
-      if (first !== group) this.box.append(make("h2", { textContent: first }));
-      group = first;
+      if (one.group !== group) this.box.append(make("h2", { textContent: one.group }));
+      group = one.group;
       const row = this.row(one, i);
       this.box.append(row.box);
       return row;

@@ -35,9 +35,9 @@ export class Course {
     this.box = make("section", { className: "motion", "aria-label": "motion" }, make("h2", { textContent: "What does it do?" }));
     this.told = make("p", { className: "told", role: "status" });
     this.done = make("p", { className: "hint" }); // to the rig, and when
-    this.sketch = new Sketch(sketch);
+    this.sketch = /** @type {any} */ (sketch ? new Sketch(sketch) : null);
     if (!this.mover) {
-      this.box.append(make("p", { className: "told", textContent: `No motion on this page: ${still}.` }), this.sketch.canvas);
+      this.box.append(make("p", { className: "told", textContent: `No motion on this page: ${still}.` }), ...(this.sketch ? [this.sketch.canvas] : []));
       return;
     }
     this.build();

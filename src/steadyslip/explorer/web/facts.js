@@ -2,6 +2,7 @@
 import { make, put, svg, tell } from "./dom.js";
 import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
 import { Locus } from "./locus.js";
+import { words } from "./modes.js";
 import { digits, shown } from "./quantities.js";
 import { inside } from "./rig.js";
 import { quantity } from "./words.js";
@@ -21,10 +22,11 @@ function rewrite(list, rows, row, many) {
   rows.forEach((words, n) => words.forEach((text, k) => tell(many === 1 ? list.children[n].children[k] : list.children[many * n + k], text)));
 }
 
-function legend() {
+/** @param {string} others what the dots of the locus are drawn for */
+function legend(others) {
   const key = (words, ...drawn) => make("span", {}, svg("svg", { class: "locus", viewBox: "0 0 14 14", "aria-hidden": "true" }, ...drawn), words);
   const dots = [svg("path", { class: "dot", d: DOTS, "stroke-width": 1.8 }), svg("path", { class: "dot", d: LARGER, "stroke-width": 4.2 })];
-  return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key("at other stiffnesses, the larger the stiffer", ...dots));
+  return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key(others === "values" ? "at other values of what the bar shows, the larger the higher" : "at other stiffnesses, the larger the stiffer", ...dots));
 }
 
 export class Facts {
@@ -40,21 +42,22 @@ export class Facts {
       make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: "one parameter changed, the others as they are; press to go there" }), this.near),
       this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
       this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas,
-        legend()));
+        this.shape = make("p", { className: "mode" }), legend(page.rig.data.phrases ? "values" : "stiffnesses")));
   }
 
   /** Numbers. @param {any} answer */
   show(answer) {
-    const { rig } = this.page, { area } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
+    const { rig } = this.page, { area, phrases } = rig.data, absent = answer.status === ABSENT || answer.status === UNKNOWN;
     this.sliding.hidden = this.swings.hidden = absent;
-    const facts = [["normal stress", answer.sigma, "Pa", ""], ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/_/g, " "), answer.observed[name], unit, meaning])];
+    tell(this.shape, answer.mode ? `In the leading mode ${words(answer.mode, rig.data.facts.shape)}.` : "");
+    const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/_/g, " "), answer.observed[name], unit, meaning])];
     rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(area && unit === "Pa" ? name.replace("stress", "force") : name) + (meaning && `: ${meaning}`), quantity(value, unit, area)]),
       () => [make("dt", {}), make("dd", {})], 2);
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
       const time = shown(Math.LN2 / Math.abs(s.re), "s");
-      const words = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
-      return words.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // a number stays with its unit
+      const row = [`${digits(s.re)} 1/s`, s.im > 0 ? `period ${shown((2 * Math.PI) / s.im, "s")}` : "none", s.re > 0 ? `doubles in ${time}` : `halves in ${time}`];
+      return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // a number stays with its unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
     this.locus.show(answer);

@@ -1,17 +1,22 @@
 // What a rig's linear equations say at given parameters: steady sliding, verdict, stable stiffness, eigenvalues.
 // The equations themselves are generated (steadyslip/explorer/equations.py).
+import { modeOf } from "./modes.js";
 import { dampingOfPairs, roots } from "./polynomials.js";
 
 /** @typedef {import("./polynomials.js").Complex} Complex */
 /** @typedef {{low: number, high: number}} Interval */
 /** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
-/** @typedef {{parameters: string[], affine: boolean, degree: number, squares: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
- *   observed: [string, string, string][]}} Facts */
+/** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, degree: number, squares: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
+ *   observed: [string, string, string][], coordinates?: string[], matrix?: any, stores?: any, shape?: any}} Facts */
 
 const NEARLY_REAL = 1e-6, SAME = 1e-9; // imaginary part of a root that is tried as real; two edges that are one
+const FORMULA = 4, REAL = 1e-9; // numbers that `steady` gives of a contact; imaginary part of a gain that is real but for rounding
+const APART = [1e-6, 1, 1e6]; // factors on a parameter at which the polynomial is looked at
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
 
 export class Linear {
+  bar = -1; // of a machine, the parameter whose stable values are told
+
   /**
    * @param {Programs} programs
    * @param {Facts} facts
@@ -20,13 +25,15 @@ export class Linear {
     this.programs = programs;
     this.facts = facts;
     this.count = facts.parameters.length;
-    this.R = new Float64Array(this.count + 1);
-    this.y = new Float64Array(Math.max(8, 2 * facts.degree + 4, facts.squares + 2, facts.observed.length));
+    this.mixed = facts.searched.some(Boolean) && !facts.searched.every(Boolean);
+    const contacts = facts.contacts.length, many = facts.degree + 1;
+    this.R = new Float64Array(this.count + contacts);
+    this.y = new Float64Array(Math.max(8, 2 * many + 4, facts.squares + 2, facts.observed.length, FORMULA * contacts, ...(facts.matrix ? [facts.matrix[1].length, 2 + contacts + facts.stores.length * 4 + 2 * many] : [])));
     this.c = new Float64Array(facts.degree + 3); // whether all roots are on the left, and it is ill-posed, behind coefficients
   }
 
-  /** What a program gives. @param {string} name @param {number} many @param {number} [number] @param {Float64Array} [from] */
-  ask(name, many, number = 0, from = this.R) {
+  /** What a program gives. @param {string} name @param {number} many @param {Float64Array} [from] @param {number} [number] */
+  ask(name, many, from = this.R, number = 0) {
     this.programs[name](from, number, this.y);
     return Array.from(this.y.subarray(0, many));
   }
@@ -37,18 +44,11 @@ export class Linear {
     return this;
   }
 
-  /** All steady normal stresses, rising; and whether numbers left the range of floating point. */
-  stresses() {
-    if (!this.facts.affine) return { found: this.searched(), lost: false, slope: NaN, load: NaN };
-    const [sigma, slope, load] = this.ask("steady", 3);
-    return { found: sigma > 0 ? [sigma] : [], lost: !Number.isFinite(slope) || !Number.isFinite(load), slope, load };
-  }
-
-  /** Roots of the balance over the grid of stresses, each bracketed by a change of sign. */
-  searched() {
-    const { grid: [many, first, last], solved } = this.facts, found = [], at = (sigma) => {
-      this.R[this.count] = sigma;
-      this.programs.residual(this.R, 0, this.y);
+  /** Roots of the balance of a contact over the grid of stresses, each bracketed by a change of sign. */
+  sought(contact) {
+    const { grid: [many, first, last], solved } = this.facts, found = [], program = this.programs[`residual${contact}`], at = (sigma) => {
+      this.R[this.count + contact] = sigma;
+      program(this.R, 0, this.y);
       return this.y[0];
     };
     let low = 10 ** first, below = at(low);
@@ -64,19 +64,53 @@ export class Linear {
     return found;
   }
 
+  /** Put the steady normal stresses into R: ABSENT or UNKNOWN where there are none, STABLE where there are. */
+  settle(branch = 0) {
+    const { R, y, count, programs, facts: { contacts, searched, joint } } = this;
+    if (joint) return this.together();
+    if (!searched.every(Boolean)) programs.steady(R, 0, y);
+    let status = STABLE;
+    const from = this.mixed ? y.slice(0, FORMULA * contacts.length) : y; // a search writes there, too
+    for (let i = 0; i < contacts.length; i++) {
+      let sigma = NaN;
+      if (searched[i]) sigma = this.sought(i)[branch];
+      else {
+        const at = FORMULA * i;
+        if (!Number.isFinite(from[at + 1]) || !Number.isFinite(from[at + 2])) return UNKNOWN;
+        if (branch === 0) sigma = from[at];
+      }
+      R[count + i] = sigma;
+      if (!(sigma > 0)) status = ABSENT;
+    }
+    return status;
+  }
+
+  /** The same where contacts press on each other. */
+  together() {
+    const { R, y, count, programs, facts: { contacts: { length: many } } } = this;
+    programs.steady(R, 0, y);
+    for (let i = many; i <= 2 * many; i++) if (!Number.isFinite(y[i])) return UNKNOWN;
+    let status = this.gain() < 1 ? STABLE : ABSENT;
+    for (let i = 0; i < many; i++) {
+      R[count + i] = y[i];
+      if (!(y[i] > 0 && y[i] < Infinity)) status = ABSENT;
+    }
+    return status;
+  }
+
+  /** The largest real gain with which contacts press on each other. */
+  gain() {
+    const many = this.facts.contacts.length, real = roots(this.y.subarray(many, 2 * many + 1)).filter((s) => Math.abs(s.im) <= REAL * Math.hypot(s.re, s.im));
+    return real.reduce((most, s) => Math.max(most, s.re), -Infinity);
+  }
+
   /** ABSENT, STABLE, UNSTABLE (ill-posed too) or UNKNOWN: what charts and tracks are painted with, so it makes no arrays. */
   status(branch = 0) {
     const { R, c, y, programs } = this;
     programs.allowed(R, 0, y);
     if (y[0] !== 1) return UNKNOWN;
-    let sigma = NaN;
-    if (this.facts.affine) {
-      programs.steady(R, 0, y);
-      if (!Number.isFinite(y[1]) || !Number.isFinite(y[2])) return UNKNOWN;
-      if (branch === 0) sigma = y[0];
-    } else sigma = this.searched()[branch];
-    if (!(sigma > 0)) return ABSENT;
-    R[this.count] = sigma;
+    const settled = this.settle(branch);
+    if (settled !== STABLE) return settled;
     programs.coefficients(R, 0, c);
     const { degree } = this.facts;
     for (let i = 0; i <= degree; i++) if (!Number.isFinite(c[i])) return UNKNOWN;
@@ -85,28 +119,72 @@ export class Linear {
 
   /** The whole answer at the parameters that are set. */
   assess(branch = 0) {
-    const status = this.status(branch), { found, slope, load } = this.stresses();
-    const answer = { status, sigma: found.length > branch ? found[branch] : NaN, states: found.length, slope, load };
-    if (status === ABSENT || status === UNKNOWN) return { ...answer, ...NOTHING };
-    this.R[this.count] = answer.sigma;
-    const degree = this.facts.degree, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1;
-    const eigenvalues = roots(c), both = this.ask("split", 2 * degree + 2);
-    const p = both.slice(0, degree + 1), q = both.slice(degree + 1), own = this.R[this.facts.parameters.indexOf("slider.stiffness")];
-    const { intervals, ends } = this.stableStiffness(p, q), [statics] = this.ask("statics", 1);
+    const { facts, R, count } = this, status = this.status(branch);
+    const answer = { status, sigma: R[count], sigmas: Array.from(R.subarray(count)) };
+    if (status === ABSENT || status === UNKNOWN) return { ...answer, ...this.absence(status), ...NOTHING };
+    const degree = facts.degree, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1, eigenvalues = roots(c);
+    const { p, q, own, gain, share, intervals, ends } = this.varied(c, branch), [statics] = this.ask("statics", 1);
     const critical = ends.length ? ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a)) : null;
-    const [share, gain] = this.ask("stiffness", 2);
     const at = critical === null ? [] : roots(p.map((v, i) => v + critical * q[i]));
     const swing = at.filter((s) => s.im > 0).sort((a, b) => Math.abs(a.re) / a.im - Math.abs(b.re) / b.im)[0];
     const edgewise = swing && Math.abs(swing.re) < 1e-6 * swing.im ? swing.im : 0;
-    const observed = this.ask("observables", this.facts.observed.length);
+    const observed = this.ask("observables", facts.observed.length);
     return {
       ...answer, eigenvalues, intervals, ends, p, q, critical, share, gain, stiffness: own,
       illPosed,
       side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
       frequency: critical === null ? null : edgewise,
-      onEdge: !illPosed && this.edgeDecides(eigenvalues, statics <= this.facts.edge),
-      observed: Object.fromEntries(this.facts.observed.map(([name], i) => [name, observed[i]])),
+      onEdge: !illPosed && this.edgeDecides(eigenvalues, statics <= facts.edge),
+      observed: Object.fromEntries(facts.observed.map(([name], i) => [name, observed[i]])),
+      mode: facts.shape && !illPosed && eigenvalues.length ? modeOf(this, eigenvalues[0]) : null,
     };
+  }
+
+  /** Why there is no steady sliding: the contact, and the numbers that say so. */
+  absence(status) {
+    const { facts: { contacts, searched, joint }, R, y, count } = this;
+    if (status === UNKNOWN) return {};
+    if (joint) {
+      this.programs.steady(R, 0, y);
+      const gain = this.gain(), least = contacts.reduce((best, _, i) => (R[count + i] < R[count + best] ? i : best), 0);
+      return { contact: least, gain, load: R[count + least] };
+    }
+    const i = contacts.findIndex((_, n) => !(R[count + n] > 0));
+    if (searched[i]) return { contact: i, searched: true };
+    const [, slope, left, load] = this.ask("steady", FORMULA * contacts.length).slice(FORMULA * i);
+    return { contact: i, slope, load: left, had: load };
+  }
+
+  /** p + θ q, the own θ, and where that is stable: θ is a slider's stiffness, or of a machine what its bar shows. */
+  varied(c, branch) {
+    const { facts: { degree, parameters } } = this;
+    if (this.programs.split) {
+      const both = this.ask("split", 2 * degree + 2), p = both.slice(0, degree + 1), q = both.slice(degree + 1), [share, gain] = this.ask("stiffness", 2);
+      return { p, q, share, gain, own: this.R[parameters.indexOf("slider.stiffness")], ...this.stableStiffness(p, q) };
+    }
+    const own = this.R[this.bar], split = this.bar >= 0 && own > 0 ? this.linearIn(this.bar, branch) : null;
+    if (!split) return { p: c, q: c.map(() => 0), own, share: 1, gain: 0, intervals: null, ends: [] };
+    const { intervals, ends } = this.stableSet(split.p, split.q);
+    return {
+      p: split.p, q: split.q.map((v) => v / own), own, share: 1, gain: 0,
+      intervals: intervals.map(({ low, high }) => ({ low: low * own, high: high * own })), ends: ends.map((k) => k * own),
+    };
+  }
+
+  /** p and q of p + f q, f a factor on a parameter; null where it does not enter so. @param {number} place */
+  linearIn(place, branch) {
+    const { R, facts: { degree }, count } = this, many = degree + 1, told = new Float64Array(3 * many), own = R[place], sigmas = R.slice(count);
+    const known = APART.every((factor, n) => {
+      R[place] = own * factor;
+      const there = this.settle(branch) === STABLE;
+      if (there) told.set(this.ask("coefficients", many), n * many);
+      return there;
+    });
+    R[place] = own;
+    R.set(sigmas, count);
+    if (!known || !told.every(Number.isFinite)) return null;
+    const found = this.ask("linear", 2 * many + 1, told);
+    return found[2 * many] === 1 ? { p: found.slice(0, many), q: found.slice(many, 2 * many) } : null;
   }
 
   /** Whether a root on the axis decides: no other grows. @param {Complex[]} found @param {boolean} neutral whether one is zero */
@@ -126,8 +204,8 @@ export class Linear {
 
   /** The same by trial: between all k at which a root may cross the axis, the verdict is one. */
   stableSet(p, q) {
-    const both = Float64Array.of(...p, ...q), [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2, 0, both), cuts = [still, infinite];
-    for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, re, both)[0]);
+    const both = Float64Array.of(...p, ...q), [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2, both), cuts = [still, infinite];
+    for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, both, re)[0]);
     const found = cuts.filter((k) => k > 0 && Number.isFinite(k)).sort((a, b) => a - b);
     const apart = [0, ...found.filter((k, i) => i === 0 || k > found[i - 1] * (1 + SAME)), Infinity];
     const ratios = p.map((v, i) => Math.abs(v / q[i])).filter((r) => r > 0 && Number.isFinite(r)), natural = ratios.length ? Math.max(...ratios) : 1;
@@ -135,7 +213,7 @@ export class Linear {
     let before = false;
     for (let i = 0; i + 1 < apart.length; i++) {
       const low = apart[i], high = apart[i + 1], inner = low > 0 ? Math.sqrt(low) * Math.sqrt(high) : high / 2, last = low > 0 ? 2 * low : natural;
-      const stable = this.ask("stableAt", 1, high === Infinity ? last : inner, both)[0] === 1;
+      const stable = this.ask("stableAt", 1, both, high === Infinity ? last : inner)[0] === 1;
       if (i > 0 && stable !== before) ends.push(low);
       if (stable && before) intervals[intervals.length - 1].high = high;
       else if (stable) intervals.push({ low, high });

@@ -51,7 +51,7 @@ export class Locus {
     put(this.decays, "d", drawn(eigenvalues.filter((s) => !(s.re > 0)), cross));
     put(this.grows, "d", drawn(eigenvalues.filter((s) => s.re > 0), cross));
     const seen = eigenvalues.filter(shows).length;
-    put(this.canvas, "aria-label", `eigenvalues in the complex plane, ${seen} of ${eigenvalues.length} in view; dots: as the stiffness rises`);
+    put(this.canvas, "aria-label", `eigenvalues in the complex plane, ${seen} of ${eigenvalues.length} in view; dots: as what the bar shows rises`);
   }
 
   frame(half, across, up) {

@@ -23,9 +23,7 @@ export class Chart {
       const select = make("select", { "aria-label": which ? "parameter upwards" : "parameter across" },
         ...parameters.map((one, i) => make("option", { value: String(i), textContent: one.name })));
       select.addEventListener("change", () => {
-        const chosen = Number(select.value);
-        if (chosen === this.axes[1 - which]) this.axes[1 - which] = this.axes[which];
-        this.axes[which] = chosen;
+        this.put(which, Number(select.value));
         this.show();
       });
       return select;
@@ -42,6 +40,12 @@ export class Chart {
     this.box = make("section", { className: "map", "aria-label": "chart of stability" }, make("h2", { textContent: "Where is it stable?" }),
       make("p", { className: "pick" }, make("label", {}, "across ", this.choices[0]), make("label", {}, "up ", this.choices[1]), make("small", { textContent: "drag the point, or use the arrow keys" })),
       this.canvas, make("p", { className: "key" }, ...this.key));
+  }
+
+  /** A parameter on an axis; where it is on the other, they change places. @param {number} which @param {number} chosen */
+  put(which, chosen) {
+    if (chosen === this.axes[1 - which]) this.axes[1 - which] = this.axes[which];
+    this.axes[which] = chosen;
   }
 
   drag(event, same) {
@@ -63,7 +67,7 @@ export class Chart {
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
     this.choices.forEach((select, which) => (select.value = String(this.axes[which])));
-    const rows = (facts.affine ? ROWS : ROWS_SEARCHED) / (this.page.sliding ? 2 : 1); // finer once the hand rests
+    const rows = (facts.searched.some(Boolean) ? ROWS_SEARCHED : ROWS) / (this.page.sliding ? 2 : 1); // finer once the hand rests
     const others = rig.values.filter((_, n) => n !== i && n !== j).concat(i, j, ...ranges[i], ...ranges[j], box.width).join();
     if (others !== this.painted || rows > this.rows) { // the point alone may move: then the regions stay
       [this.painted, this.rows] = [others, rows];

@@ -14,7 +14,7 @@ export class Motion {
     this.machine = machine;
     this.facts = facts;
     this.driver = driver;
-    this.R = new Float64Array(facts.parameters.length + 1);
+    this.R = new Float64Array(facts.parameters.length + 2); // behind the parameters σss and the blow
     this.log = []; // rows to write on, kept from run to run
     this.recorded = [];
     this.points = [];
@@ -22,15 +22,16 @@ export class Motion {
     this.y = new Float64Array(Math.max(facts.constants, 3 + facts.settings, facts.kept + 1, facts.segments * facts.segment) + 1);
   }
 
-  ask(name, many, number = 0) {
-    this.machine[name](this.R, number, this.y);
+  ask(name, many) {
+    this.machine[name](this.R, 0, this.y);
     return Array.from(this.y.subarray(0, many));
   }
 
   /** Parameters and steady normal stress. @param {ArrayLike<number>} values @param {number} sigma */
   set(values, sigma) {
     this.R.set(values);
-    this.R[this.R.length - 1] = sigma;
+    this.R[values.length] = sigma;
+    this.R[values.length + 1] = 1;
     this.drive = this.R[this.facts.parameters.indexOf("drive.velocity")];
     const [x, posed, share, ...settings] = this.ask("scales", 3 + this.facts.settings);
     this.scales = { x, posed: posed > 0, share };
@@ -51,7 +52,8 @@ export class Motion {
   tables(disturbance, size, at, until) {
     const { facts } = this, constants = zeros(1, facts.all), start = zeros(1, facts.kept), settings = zeros(1, facts.settings);
     constants[0].set(this.ask("constants", facts.constants));
-    const found = this.ask("start", facts.kept + 1, disturbance === "blow" ? size : 1);
+    this.R[facts.parameters.length + 1] = disturbance === "blow" ? size : 1;
+    const found = this.ask("start", facts.kept + 1);
     start[0].set(found.slice(0, facts.kept));
     settings[0].set(this.settings);
     if (!facts.inertial) settings[0][facts.guess] = found[facts.kept];

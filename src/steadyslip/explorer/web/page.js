@@ -43,7 +43,7 @@ export class Page {
     this.future = /** @type {number[][]} */ ([]);
     this.sliding = false;
     this.differs = this.rig.differences();
-    this.banner = new Banner(data, this.differs);
+    this.banner = new Banner(this, this.differs);
     if (!told) this.rig.values = this.fromAddress();
     root.classList.add("steadyslip");
     this.measure();
@@ -59,7 +59,7 @@ export class Page {
     this.home = data.parameters.map((_, i) => rangeOf(rig, i));
     this.fit(rig.values);
     this.tracks = data.parameters.map((_, i) => this.track(i));
-    const k = Math.max(0, data.parameters.findIndex((one) => one.name === data.stiffness)), [first] = this.edges().filter((edge) => edge.i !== k);
+    const k = Math.max(0, rig.bar), [first] = this.edges().filter((edge) => edge.i !== k);
     rig.values = values;
     this.fit(values);
     this.controls = new Controls(this);
@@ -155,8 +155,9 @@ export class Page {
 
   /** The slider of the stiffness reaches to the critical one, which other parameters move. */
   follow() {
-    const { answer, rig: { data, values } } = this, i = data.parameters.findIndex((one) => one.name === data.stiffness);
+    const { answer, rig: { data, values, bar: i } } = this;
     if (i < 0 || answer.critical === null) return;
+    if (data.phrases) return this.reach(i, answer.critical);
     const { critical, share, gain, stiffness } = answer, { name } = data.parameters[i];
     if (i === data.axial) this.reach(i, critical / share);
     else if (name === "slider.stiffness") this.reach(i, critical);
@@ -277,9 +278,8 @@ export class Page {
   }
 
   judge() {
-    const { data, values } = this.rig;
     this.answer = this.rig.assess();
-    this.banner.show(this.answer, values[data.parameters.findIndex((one) => one.name === data.speed)]);
+    this.banner.show(this.answer);
   }
 
   /** The values in the address. */
@@ -287,6 +287,13 @@ export class Page {
     try {
       history.replaceState(null, "", this.rig.hash() || location.pathname + location.search);
     } catch { /* a frame without an address of its own */ }
+  }
+
+  /** Another parameter on the bar. @param {number} i */
+  tell(i) {
+    this.rig.bar = i;
+    this.chart.put(1, i);
+    this.redraw();
   }
 
   redraw() {
@@ -297,6 +304,7 @@ export class Page {
     if (!this.controls) return;
     this.tracks = this.rig.data.parameters.map((_, i) => this.track(i));
     if (!this.sliding) this.tracks.forEach((track, i) => track.length > 1 || this.seek(i));
+    this.banner.showNearest(this.answer, this.edges()[0]);
     this.controls.show();
     this.chart.show();
     this.facts.show(this.answer);

@@ -2,12 +2,12 @@
 import { Linear, UNKNOWN } from "./linear.js";
 
 /**
- * @typedef {{name: string, label: string, unit: string, factor: number, value: number, natural: number, doc: string,
+ * @typedef {{name: string, group: string, label: string, unit: string, factor: number, value: number, natural: number, doc: string,
  *   low: number | null, high: number | null, lowAllowed: boolean, highAllowed: boolean, whole: boolean,
  *   allowed: string}} Parameter
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
  *   axial: number, toml: string, branch: number, checks: any[], speed: string, area: number | null,
- *   stiffness: string | null, motion: any, still: string, sketch: string}} Data
+ *   stiffness: string | null, bars?: string[], areas?: number[], phrases?: any, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
@@ -20,6 +20,7 @@ export class Rig {
     this.vector = new Float64Array(data.facts.parameters.length);
     this.trial = new Float64Array(data.parameters.length);
     this.spring = data.facts.parameters.indexOf("slider.stiffness");
+    this.bar = data.parameters.findIndex((one) => one.name === data.stiffness);
   }
 
   /** The Model's parameters for some values of the page's. @param {ArrayLike<number>} values */
@@ -32,6 +33,17 @@ export class Rig {
       this.linear.set(model);
     }
     return this.linear;
+  }
+
+  /** The parameter whose stable values are told; of a slider it is the stiffness. */
+  get bar() {
+    return this.told;
+  }
+
+  set bar(i) {
+    const { phrases, facts, parameters } = this.data;
+    this.told = i;
+    if (phrases) this.linear.bar = i < 0 ? -1 : facts.parameters.indexOf(parameters[i].name);
   }
 
   /** @param {number[]} [values] */
@@ -67,7 +79,7 @@ export class Rig {
 
   /** Answers of Python that travel with the page, compared: what differs, in words. */
   differences() {
-    const found = [];
+    const found = /** @type {string[]} */ ([]);
     for (const check of this.data.checks) {
       const answer = this.assess(check.values), name = check.name;
       if (answer.status !== check.status) found.push(`${name}: the verdict`);

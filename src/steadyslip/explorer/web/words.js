@@ -1,5 +1,6 @@
 // What answers and motions are called: the sentences of the page.
 import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { fill } from "./modes.js";
 import { digits, shown } from "./quantities.js";
 
 /** A stress, or a force where the rig has an area. */
@@ -15,9 +16,8 @@ export function kindOf(answer) {
   return answer.onEdge ? "edge" : answer.status === STABLE ? "stable" : "unstable";
 }
 
-/** The sentence. @param {number} drive m/s */
-export function headline(answer, drive) {
-  const speed = shown(drive, "m/s");
+/** The sentence. @param {string} speed of the drive */
+export function headline(answer, speed) {
   return {
     none: `No steady sliding at ${speed}`, unknown: "Numbers outside what a rig can have", edge: `On the edge of stability at ${speed}`,
     stable: `Stable: steady sliding at ${speed}`, unstable: `Unstable: steady sliding at ${speed}`,
@@ -40,6 +40,31 @@ export function reason(answer, data) {
   const along = data.axial >= 0 ? ` (${stiffness(edge / share)} along the axis)` : "";
   const tail = alone ? `, ${answer.side} which sliding is stable.${period}` : `, the nearest edge of what is stable.${period}`;
   return `${what}${stiffness(total)}${gain ? ", are" : " is"} ${ratio(total / edge)} times the critical ${stiffness(edge)}${along}${tail}`;
+}
+
+/** What is said of a machine: what becomes of disturbances, and the nearest edge. @param {any} answer @param {any} data @param {any} [edge] */
+export function machineReason(answer, { phrases, facts, areas }, edge) {
+  const sentence = (text) => text[0].toUpperCase() + text.slice(1) + ".";
+  if (answer.status === UNKNOWN) return "A number leaves its range, or breaks a condition that several obey together.";
+  if (answer.status === ABSENT) {
+    const { absent } = phrases, at = fill(absent.at, { name: facts.contacts[answer.contact] }), area = areas[answer.contact] < 0 ? 1 : answer.own[areas[answer.contact]];
+    const force = (stress) => shown(stress * area, "N");
+    if (answer.searched) return sentence(fill(absent["no solution"], { force: "force", at }));
+    if (answer.gain !== undefined) return sentence(answer.gain < 1 ? fill(absent.lifted, { at, left: force(answer.load) }) : fill(absent.together, { at, margin: digits(1 - answer.gain) }));
+    if (!(answer.slope < 1)) return sentence(fill(absent["lock-up"], { at, margin: digits(1 - answer.slope) }));
+    return sentence(fill(absent["lift-off"], { at, force: "force", load: force(answer.had), taken: force(answer.had - answer.load), left: force(answer.load) }));
+  }
+  if (answer.illPosed) return sentence(phrases["ill-posed"]);
+  if (answer.onEdge) return sentence(phrases["on edge"]);
+  const what = answer.status === STABLE ? phrases["dies out"] : phrases[answer.eigenvalues[0].im ? "oscillatory" : "divergence"];
+  return sentence(edge ? `${what}; ${fill(phrases.nearest, { ...edge, beyond: phrases[edge.kind] })}` : what);
+}
+
+/** What kind of change an edge is, by what is behind it. @param {any} answer there */
+export function kindBeyond(answer) {
+  if (answer.status === STABLE) return "stable";
+  if (answer.status === ABSENT) return answer.searched ? "no solution" : (answer.gain ?? answer.slope) < 1 ? "lift-off" : "lock-up";
+  return answer.illPosed ? "ill-posed" : answer.eigenvalues[0]?.im ? "oscillatory" : "divergence";
 }
 
 /** How many times something is something else: with as many digits as tell it from once. */

@@ -1,0 +1,51 @@
+"""What a page needs to tell how a machine moves in a mode: its characteristic matrix, speeds, and what holds energy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from steadyslip.core.records import twin
+from steadyslip.explorer.programs import program
+from steadyslip.kernels.nodes import Program
+from steadyslip.linear.modes import HARDLY, MOVES, WORDS, stores
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import NORMAL
+from steadyslip.model.equations import Model
+from steadyslip.model.linearisation import characteristic_rows
+
+
+def mode_part(machine: Machine, model: Model) -> tuple[list[Program], dict[str, Any]]:
+    """Programs and facts of the modes of a machine.
+
+    Returns
+    -------
+    programs : list of Program
+        ``matrix``, the coefficients that the characteristic matrix has; ``measures``, the speed of the drive and of
+        every coordinate, then of everything that holds energy its weight and what it takes from each coordinate.
+    facts : dict
+        ``coordinates`` (names), ``matrix`` (size, then row, column and power of s of each coefficient), ``stores``
+        (name, whether kinetic, places of the coordinates), ``shape`` (words and limits).
+    """
+    entries = [
+        (i, j, powers[0], value)
+        for i, row in enumerate(characteristic_rows(model).values())
+        for j, entry in enumerate(row)
+        for powers, value in entry.items()
+    ]
+    names = [one.name for one in model.coordinates]
+    held = stores(twin(machine, dict(model.parameters)).mechanism())
+    weights = [sp.sympify(value) for one in held for value in (one.weight, *one.row.values())]
+    speeds = [model.parameters["drive.velocity"], *(one.speed for one in model.coordinates)]
+    programs = [
+        program(model, "matrix", [value for *_, value in entries]),
+        program(model, "measures", [*speeds, *weights]),
+    ]
+    facts = {
+        "coordinates": names,
+        "matrix": [len(characteristic_rows(model)), [[i, j, power] for i, j, power, _ in entries]],
+        "stores": [[one.name, one.kinetic, [names.index(name) for name in one.row]] for one in held],
+        "shape": {"moves": MOVES, "hardly": HARDLY, "suffix": NORMAL, "words": WORDS},
+    }
+    return programs, facts

@@ -1,0 +1,121 @@
+"""Steady sliding as programs: the steady normal stresses of all contacts, or the equations that they solve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from steadyslip.explorer.programs import program
+from steadyslip.kernels.nodes import Node, Program, Value
+from steadyslip.model.equations import Model
+from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
+
+Rows = list[list[Value | None]]
+"""A matrix; None is zero."""
+FORMULA = 4
+
+
+def searched(model: Model) -> list[bool]:
+    """Of every contact, whether its normal stress has no formula, so that it is searched for."""
+    if joint_equation(model) is not None:
+        return [False] * len(model.contacts)
+    return [not steady_equation(model, place).affine for place in range(len(model.contacts))]
+
+
+def steady_programs(model: Model) -> list[Program]:
+    """``steady`` and, of contacts that are searched, ``residual`` with their number.
+
+    Of each contact that has a formula ``steady`` stores σss (NaN where there is none), its coupling, what is left of
+    its load and that load: `FORMULA` places for each contact. Of contacts that press on each other it stores σss of all, then the coefficients,
+    lowest power first, of the polynomial whose roots are the gains with which they do.
+    """
+    joint = joint_equation(model)
+    if joint is not None:
+        return [_together(model, joint)]
+    sought = searched(model)
+    formulas = [one for place, look in enumerate(sought) for one in ([0] * FORMULA if look else _formula(model, place))]
+    residuals = [
+        program(model, f"residual{place}", [contact.steady_stress - contact.sigma_ss])
+        for place, contact in enumerate(model.contacts)
+        if sought[place]
+    ]
+    return [program(model, "steady", formulas), *residuals]
+
+
+def _formula(model: Model, place: int) -> list[sp.Expr]:
+    equation = steady_equation(model, place)
+    sigma, slope = sp.sympify(equation.sigma), sp.sympify(equation.slope)
+    exists = sp.And(slope < 1, sp.StrictGreaterThan(sigma, 0, evaluate=False))
+    left = sigma if equation.given else sigma * (1 - slope)
+    own = model.contacts[place].steady_load
+    return [sp.Piecewise((sigma, exists), (sp.nan, True)), slope, left, left if own is None else own]
+
+
+def _together(model: Model, joint: JointEquation) -> Program:
+    """σ = A σ + b by Cramer's rule, and the characteristic polynomial of A."""
+    n = joint.size
+    wanted = [*(e for row in joint.matrix for e in row), *joint.rest]
+
+    def solved(found: list[Node]) -> Sequence[Value]:
+        places = [(i, j) for i in range(n) for j in range(n)]
+        a: Rows = [[None] * n for _ in range(n)]
+        for (i, j), value in zip(places, found, strict=False):
+            a[i][j] = value if joint.matrix[i][j] != 0 else None
+        left: Rows = [[_difference(1.0 if i == j else None, a[i][j]) for j in range(n)] for i in range(n)]
+        whole = _determinant(left)
+        sigmas = []
+        for k in range(n):
+            replaced = [[found[n * n + i] if j == k else left[i][j] for j in range(n)] for i in range(n)]
+            above = _determinant(replaced)
+            sigmas.append(float("nan") if whole is None else 0.0 if above is None else above / whole)
+        return [*sigmas, *_characteristic(a)]
+
+    return program(model, "steady", wanted, then=solved)
+
+
+def _sum(one: Value | None, other: Value | None) -> Value | None:
+    return other if one is None else one if other is None else one + other
+
+
+def _difference(one: Value | None, other: Value | None) -> Value | None:
+    return one if other is None else -other if one is None else one - other
+
+
+def _product(one: Value | None, other: Value | None) -> Value | None:
+    return None if one is None or other is None else one * other
+
+
+def _determinant(rows: Rows) -> Value | None:
+    """By its first row."""
+    if not rows:
+        return 1.0
+    total: Value | None = None
+    for j, entry in enumerate(rows[0]):
+        term = None if entry is None else _product(entry, _determinant([row[:j] + row[j + 1 :] for row in rows[1:]]))
+        total = _difference(total, term) if j % 2 else _sum(total, term)
+    return total
+
+
+def _characteristic(a: Rows) -> list[Value]:
+    """Coefficients of det(λ − A), lowest power first, by the method of Faddeev and LeVerrier."""
+    n = len(a)
+    coefficients: list[Any] = [1.0]
+    m: Rows = [[None] * n for _ in range(n)]
+    for k in range(1, n + 1):
+        m = [[_entry(a, m, i, j) for j in range(n)] for i in range(n)]
+        for i in range(n):
+            m[i][i] = _sum(m[i][i], coefficients[0] or None)
+        trace: Value | None = None
+        for i in range(n):
+            trace = _sum(trace, _entry(a, m, i, i))
+        coefficients.insert(0, 0.0 if trace is None else -trace / float(k))
+    return coefficients
+
+
+def _entry(a: Rows, b: Rows, i: int, j: int) -> Value | None:
+    total: Value | None = None
+    for k in range(len(a)):
+        total = _sum(total, _product(a[i][k], b[k][j]))
+    return total

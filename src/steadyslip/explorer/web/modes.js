@@ -1,0 +1,114 @@
+// How a machine moves in a mode: the null vector of its characteristic matrix, what holds the energy, and its words.
+// Matrix, speeds and energies are generated (steadyslip/explorer/modes.py), words are those of steadyslip/linear/modes.py.
+
+/** @typedef {{re: number, im: number}} Complex */
+
+const times = (a, b) => ({ re: a.re * b.re - a.im * b.im, im: a.re * b.im + a.im * b.re });
+const over = (a, b) => {
+  const size = b.re * b.re + b.im * b.im;
+  return { re: (a.re * b.re + a.im * b.im) / size, im: (a.im * b.re - a.re * b.im) / size };
+};
+const sizeOf = (a) => Math.hypot(a.re, a.im);
+
+/**
+ * The vector that a singular matrix takes to zero, by elimination with complete pivoting of what is balanced first.
+ * @param {Complex[][]} given @param {number[][]} sizes of the terms of each entry: rounding of a row that is zero must not count
+ */
+function nullVector(given, sizes) {
+  const n = given.length, order = Array.from({ length: n }, (_, i) => i), columns = new Float64Array(n).fill(1);
+  const heights = () => sizes.map((row) => Math.max(...row.map((size, j) => size * columns[j])));
+  for (let pass = 0; pass < 3; pass++) {
+    const tall = heights();
+    for (let j = 0; j < n; j++) columns[j] /= Math.max(...sizes.map((row, i) => (row[j] * columns[j]) / tall[i]), 1e-300);
+  }
+  const tall = heights(), rows = given.map((row, i) => row.map((e, j) => ({ re: (e.re * columns[j]) / tall[i], im: (e.im * columns[j]) / tall[i] })));
+  for (let k = 0; k < n - 1; k++) {
+    let row = k, column = k;
+    for (let i = k; i < n; i++) for (let j = k; j < n; j++) if (sizeOf(rows[i][j]) > sizeOf(rows[row][column])) [row, column] = [i, j];
+    [rows[k], rows[row]] = [rows[row], rows[k]];
+    for (const one of rows) [one[k], one[column]] = [one[column], one[k]];
+    [order[k], order[column]] = [order[column], order[k]];
+    for (let i = k + 1; i < n; i++) {
+      const factor = over(rows[i][k], rows[k][k]);
+      for (let j = k; j < n; j++) {
+        const less = times(factor, rows[k][j]);
+        rows[i][j] = { re: rows[i][j].re - less.re, im: rows[i][j].im - less.im };
+      }
+    }
+  }
+  const found = Array.from({ length: n }, () => ({ re: 0, im: 0 }));
+  found[n - 1] = { re: 1, im: 0 };
+  for (let k = n - 2; k >= 0; k--) {
+    let sum = { re: 0, im: 0 };
+    for (let j = k + 1; j < n; j++) {
+      const term = times(rows[k][j], found[j]);
+      sum = { re: sum.re - term.re, im: sum.im - term.im };
+    }
+    found[k] = over(sum, rows[k][k]);
+  }
+  const vector = Array.from(found);
+  order.forEach((place, k) => (vector[place] = { re: found[k].re * columns[place], im: found[k].im * columns[place] }));
+  return vector;
+}
+
+/** Amplitudes of all coordinates as shares of the largest, and shares of the energy, of the mode of an eigenvalue. @param {any} linear @param {Complex} given */
+export function modeOf(linear, given) {
+  const { coordinates, matrix: [size, entries], stores } = linear.facts, s = { re: given.re, im: Math.abs(given.im) };
+  const found = linear.ask("matrix", entries.length), matrix = Array.from({ length: size }, () => Array.from({ length: size }, () => ({ re: 0, im: 0 })));
+  const sizes = matrix.map((row) => row.map(() => 0));
+  entries.forEach(([i, j, power], n) => {
+    let term = { re: found[n], im: 0 };
+    for (let k = 0; k < power; k++) term = times(term, s);
+    matrix[i][j] = { re: matrix[i][j].re + term.re, im: matrix[i][j].im + term.im };
+    sizes[i][j] += sizeOf(term);
+  });
+  const shape = nullVector(matrix, sizes), many = stores.reduce((sum, [, , places]) => sum + 1 + places.length, 0);
+  const [drive, ...measures] = linear.ask("measures", 1 + coordinates.length + many), weights = measures.slice(coordinates.length);
+  const ways = coordinates.map((_, n) => ({ re: shape[n].re * (measures[n] ? drive / measures[n] : 1), im: shape[n].im * (measures[n] ? drive / measures[n] : 1) }));
+  const largest = ways.reduce((a, b) => (sizeOf(b) > sizeOf(a) ? b : a)), energy = /** @type {Record<string, number>} */ ({});
+  let at = 0, total = 0;
+  for (const [name, kinetic, places] of stores) {
+    const stretch = places.reduce((sum, place, n) => ({ re: sum.re + weights[at + 1 + n] * shape[place].re, im: sum.im + weights[at + 1 + n] * shape[place].im }), { re: 0, im: 0 });
+    const own = weights[at] * sizeOf(kinetic ? times(s, stretch) : stretch) ** 2;
+    energy[name] = (energy[name] ?? 0) + own;
+    total += own;
+    at += 1 + places.length;
+  }
+  if (!shape.every((one) => Number.isFinite(one.re) && Number.isFinite(one.im))) return null;
+  for (const name of Object.keys(energy)) energy[name] /= total;
+  return {
+    eigenvalue: s, amplitudes: Object.fromEntries(coordinates.map((name, n) => [name, sizeOf(largest) ? over(ways[n], largest) : ways[n]])),
+    energy: total > 0 && Number.isFinite(total) ? energy : {},
+  };
+}
+
+/** A template with its places filled. @param {string} template @param {Record<string, string>} values */
+export const fill = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => values[name]);
+
+/** A share in per cent, with as many digits as tell it from 0 and 100. @param {number} share */
+export function percent(share) {
+  const text = Number((100 * share).toPrecision(3));
+  return `${share > 0 && share < 1 && (text === 0 || text === 100) ? Number((100 * share).toPrecision(8)) : text} %`;
+}
+
+/** The shape of a mode as a sentence. @param {any} mode @param {any} shape words and limits */
+export function words(mode, { moves, hardly, suffix, words: said }) {
+  const sizes = Object.entries(mode.amplitudes).map(([name, one]) => /** @type {[string, number]} */ ([name, sizeOf(one)]));
+  const named = (test) => sizes.filter(([, size]) => test(size)).map(([name]) => name), called = (name) => name.replace(suffix, said.normal);
+  const leads = named((size) => size >= moves), rest = sizes.filter(([, size]) => size >= hardly && size < moves), still = named((size) => size < hardly);
+  const movers = leads.flatMap((name) => (leads.includes(name + suffix) ? [name + said.both] : name.endsWith(suffix) && leads.includes(name.slice(0, -suffix.length)) ? [] : [name]));
+  const listed = (names) => {
+    const all = names.map((name) => fill(said.the, { name: called(name) }));
+    return all.length === 1 ? all[0] : all.slice(0, -1).join(", ") + said.and + all[all.length - 1];
+  };
+  const does = (what, names) => said[what].split("|")[names.length > 1 ? 1 : 0];
+  const parts = [`${listed(movers)} ${does(mode.eigenvalue.im ? "judder" : "drift", movers)}`];
+  if (leads.length === 2 && leads[0].replace(suffix, "") !== leads[1].replace(suffix, "")) {
+    const [a, b] = leads.map((name) => mode.amplitudes[name]);
+    if (a.re * b.re + a.im * b.im < 0) parts[0] += said.opposed;
+  }
+  if (rest.length) parts.push(rest.map(([name, size]) => fill(said.share, { name: called(name), share: percent(size) })).join(", "));
+  if (still.length) parts.push(`${listed(still)} ${does("still", still)}`);
+  const [most, share] = Object.entries(mode.energy).reduce((a, b) => (b[1] > a[1] ? b : a), ["", 0]);
+  return parts.join(", ") + (most ? fill(said.energy, { share: percent(Math.round(1000 * share) / 1000), name: most.slice(most.indexOf(".") + 1) }) : "");
+}

@@ -17,8 +17,8 @@ from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.explorer.assembly import _dense, _narrow, parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part
-from steadyslip.explorer.programs import program
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
+from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros

@@ -34,8 +34,8 @@ from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
 
 MODULES = (
-    "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map", "locus",
-    "facts", "mover", "sketch", "course", "leaving", "page",
+    "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map",
+    "locus", "facts", "mover", "sketch", "course", "leaving", "page",
 )  # fmt: skip
 """Modules of the page, each after those that it imports."""
 LIBRARY = ("motion",)
@@ -111,7 +111,11 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
     library = [_web(f"{name}.js") for name in LIBRARY]
     script = _narrow(javascript.as_script(javascript.runtime(), *modules))
     worker = _narrow(javascript.as_script(javascript.runtime(), *library)) + _dense(driven)
-    known = _data(rig, title, branch, facts) | {"motion": moving, "still": still, "sketch": sketch(rig) if isinstance(rig, Slider) else ""}
+    known = _data(rig, title, branch, facts) | {
+        "motion": moving,
+        "still": still,
+        "sketch": sketch(rig) if isinstance(rig, Slider) else "",
+    }
     code = (
         f"{script}\nconst programs = {_dense(text)};\n"
         f"const library = () => {{\n{worker}\nconst machine = {_dense(machine)};\n"

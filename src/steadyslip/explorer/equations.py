@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.records import conditions, twin
 from steadyslip.explorer.modes import mode_part
 from steadyslip.explorer.programs import program
@@ -65,7 +66,8 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
     coefficients = characteristic_coefficients(model)
     names, observables = _observed(model)
     meanings = _meanings(rig)
-    closed, further = has_closed_form(model), {}
+    closed = has_closed_form(model)
+    further: dict[str, Any] = {}
     programs = [
         *steady_programs(model),
         program(model, "allowed", [_allowed(rig, model)]),

@@ -28,8 +28,8 @@ def steady_programs(model: Model) -> list[Program]:
     """``steady`` and, of contacts that are searched, ``residual`` with their number.
 
     Of each contact that has a formula ``steady`` stores σss (NaN where there is none), its coupling, what is left of
-    its load and that load: `FORMULA` places for each contact. Of contacts that press on each other it stores σss of all, then the coefficients,
-    lowest power first, of the polynomial whose roots are the gains with which they do.
+    its load and that load: `FORMULA` places for each contact. Of contacts that press on each other it stores σss of
+    all, then the coefficients, lowest power first, of the polynomial whose roots are the gains with which they do.
     """
     joint = joint_equation(model)
     if joint is not None:

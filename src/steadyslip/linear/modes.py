@@ -171,7 +171,7 @@ def _null_vector(matrix: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Store:
+class EnergyStore:
     """Something that holds energy: `weight` |amplitude of the row|², times |s|² where it is `kinetic`."""
 
     name: str
@@ -180,11 +180,11 @@ class Store:
     row: Mapping[str, Any]
 
 
-def stores(mechanism: Mechanism) -> list[Store]:
+def stores(mechanism: Mechanism) -> list[EnergyStore]:
     """What holds energy in a mechanism, of numbers or of symbols; one name may have several."""
     names = {one.name for one in mechanism.coordinates}
     found = [
-        Store(f"bodies.{one.name.removesuffix(NORMAL)}", True, one.inertia, {one.name: 1})
+        EnergyStore(f"bodies.{one.name.removesuffix(NORMAL)}", True, one.inertia, {one.name: 1})
         for one in mechanism.coordinates
         if one.inertia
     ]
@@ -192,10 +192,12 @@ def stores(mechanism: Mechanism) -> list[Store]:
         row = {n: c for n, c in element.senses.items() if n in names}
         beside = not element.delay and row == dict(element.acts)
         if element.stiffness and (element.name or beside):  # a controller that sees where it acts is a spring, too
-            found.append(Store(element.name or "drive.controller", False, element.stiffness, row))
+            found.append(EnergyStore(element.name or "drive.controller", False, element.stiffness, row))
     for touch in mechanism.touches:
         if touch.separation and touch.contact.is_compliant():
-            found.append(Store(f"contacts.{touch.name}", False, touch.area * _stiffness_of(touch), touch.separation))
+            found.append(
+                EnergyStore(f"contacts.{touch.name}", False, touch.area * _stiffness_of(touch), touch.separation)
+            )
     return found
 
 

@@ -145,7 +145,8 @@ def _linear_sets(point: OperatingPoint, name: str) -> Array:
 
 def _split(c: Array) -> tuple[Array, Array, Array]:
     """p and q of p + f q from values at three factors f, first axis; and where these do not lie on a line."""
-    p, q, straight = linear_split(*(columns(one) for one in c))
+    low, own, high = (columns(one) for one in c)
+    p, q, straight = linear_split(low, own, high)
     return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
 
 
@@ -183,4 +184,3 @@ def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
         return None
     c, _ = quasi(point)
     return delay_set(c[0], c[1]) if np.all(np.isfinite(c)) else None
-

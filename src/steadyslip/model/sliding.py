@@ -24,7 +24,6 @@ from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.steady import JointEquation, joint_equation, steady_equation
 
-
 ABSENT = {
     "lock-up": "lock-up{at}. The pull raises friction by more than itself: 1 − μss dσ/dτ = {margin}, must be > 0",
     "lift-off": "lift-off{at}. The motion takes away more normal {force} than the contact has: {load} less {taken} "

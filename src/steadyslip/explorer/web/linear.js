@@ -132,7 +132,7 @@ export class Linear {
     return {
       ...answer, eigenvalues, intervals, ends, p, q, critical, share, gain, stiffness: own,
       illPosed,
-      side: critical === null ? null : intervals.some((one) => one.low === critical) ? "above" : "below",
+      side: critical === null ? null : intervals?.some((one) => one.low === critical) ? "above" : "below",
       frequency: critical === null ? null : edgewise,
       onEdge: !illPosed && this.edgeDecides(eigenvalues, statics <= facts.edge),
       observed: Object.fromEntries(facts.observed.map(([name], i) => [name, observed[i]])),
@@ -155,7 +155,10 @@ export class Linear {
     return { contact: i, slope, load: left, had: load };
   }
 
-  /** p + θ q, the own θ, and where that is stable: θ is a slider's stiffness, or of a machine what its bar shows. */
+  /**
+   * p + θ q, the own θ, and where that is stable: θ is a slider's stiffness, or of a machine what its bar shows.
+   * @returns {{p: number[], q: number[], own: number, share: number, gain: number, intervals: Interval[] | null, ends: number[]}}
+   */
   varied(c, branch) {
     const { facts: { degree, parameters } } = this;
     if (this.programs.split) {

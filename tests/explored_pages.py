@@ -1,6 +1,7 @@
 """Pages of the explorer that are open in a browser, with everything they complained about or asked for."""
 
 import re
+import weakref
 
 import steadyslip as ss
 from rigs_of_theory import SIGMA, rate_state, rig
@@ -15,25 +16,42 @@ FOLLOW = """link => new Promise((done) => {
   location.hash = link;
 })"""
 
+IDLE = weakref.WeakKeyDictionary()  # ordinary tabs of a browser: a fresh one takes longer than most visits
+
 
 class Visit:
     """A page that is open, with everything it complained about or asked for."""
 
     def __init__(self, browser, path, link="", **options):
-        self.context = browser.new_context(**options)
-        self.page = self.context.new_page()
+        self._idle = None if options else IDLE.setdefault(browser, [])
+        self.page = self._idle.pop() if self._idle else browser.new_context(**options).new_page()
         self.complaints, self.requests = [], []
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
+        self._hears = {
+            "console": lambda message: self.complaints.append(message.text),
+            "pageerror": lambda error: self.complaints.append(str(error)),
+            "request": lambda request: self.requests.append(request.url),
+        }
+        for what, hear in self._hears.items():
+            self.page.on(what, hear)
         self.page.goto(path.as_uri() + link)
         self.page.wait_for_function("[...document.querySelectorAll('.steadyslip')].every(e => e.dataset.ready)")
+
+    def leave(self, whole=True):
+        if self._idle is None or not whole:
+            self.page.context.close()
+            return
+        for what, hear in self._hears.items():
+            self.page.remove_listener(what, hear)
+        self.page.set_viewport_size({"width": 1280, "height": 720})
+        self.page.emulate_media(media="null", color_scheme="null")
+        self.page.goto("about:blank")
+        self._idle.append(self.page)
 
     def __enter__(self):
         return self
 
     def __exit__(self, *error):
-        self.context.close()
+        self.leave(whole=error[0] is None)
         assert not self.complaints, self.complaints
 
     def sentence(self):

@@ -1,4 +1,4 @@
-"""One browser for a module, and pages that many tests look at."""
+"""One browser for all, and pages that many tests look at."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from browser import chromium, driver
 from explored_pages import INCLINED, MOVED
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     path = chromium()
     with driver() as playwright:
@@ -16,14 +16,14 @@ def browser():
         opened.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("pages") / "rig.html"
     ss.explore(INCLINED, title="A rig").save(path)
     return path
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def moved(tmp_path_factory):
     """The explorer and the report of a rig that slips, by kind."""
     folder = tmp_path_factory.mktemp("moved")

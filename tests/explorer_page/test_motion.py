@@ -89,7 +89,7 @@ def test_motion_goes_on_where_no_worker_may_run(browser, file, tmp_path):
     visit = Visit(browser, tmp_path / "rig.html")
     visit.told("It runs away at ")
     assert all("Content Security Policy" in one for one in visit.complaints)
-    visit.context.close()
+    visit.leave()
 
 
 def test_the_rig_moves_and_stops_when_asked(browser, moved):

@@ -68,7 +68,7 @@ def test_a_search_ends_when_its_work_is_done(record, monkeypatch):
 
 def test_a_model_that_follows_from_no_start_is_refused(record, monkeypatch):
     monkeypatch.setattr(Forward, "run", lambda self, table, parameters, units, begin=None: np.full(
-        (len(parameters), 1 + self.directions, table.count), np.nan))  # fmt: skip
+        (len(parameters), 1 + self.directions, len(table.times)), np.nan))  # fmt: skip
     with pytest.raises(ss.NotAvailable, match="from any start"):
         ss.fit(ss.lab_rig(), record)
 

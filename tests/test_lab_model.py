@@ -237,9 +237,11 @@ def test_tables_pass_through_every_sample():
     record = ss.record_from_arrays(**lab.columns(lab.rig(alpha=0.4), lab.PULSED, 800, uniform=False))
     pressed = record.normal - record.normal[0]
     inputs = MeasuredInputs(record, sharp_changes(record), pressed)
-    rows = inputs.table(np.array([[120.2, 160.5]])).segments[0]
+    table = inputs.table(np.array([[120.2, 160.5]]))
+    rows = table.segments[0]
     moved = np.cumsum((rows[:, 3] + 0.5 * rows[:, 6] * (rows[:, 1] - rows[:, 0])) * (rows[:, 1] - rows[:, 0]))
-    at_samples = inputs.samples[0][1:] >= 0
+    at_samples = np.isin(rows[:, 1], table.times)
+    assert np.sum(at_samples) == len(record) - 1
     np.testing.assert_allclose(moved[at_samples], record.displacement[1:] - record.displacement[0], rtol=1e-9)
     np.testing.assert_allclose(rows[1:, 0], rows[:-1, 1], rtol=1e-12)
     ends = rows[:, 5] + rows[:, 8] * (rows[:, 1] - rows[:, 0])

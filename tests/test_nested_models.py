@@ -9,7 +9,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.nested import simpler
 from steadyslip.experiments.fitting.plan import make_plan
-from steadyslip.experiments.fitting.starts import starting_points
+from steadyslip.experiments.fitting.starts import features_of, starting_points
 
 ALLOWED = 1 + 1e-7  # what a converged search may leave
 
@@ -75,7 +75,7 @@ def test_a_simpler_model_says_the_same_where_it_lies_in_the_richer_one(rig, opti
     space, richer = plan.space(), plan.comparison()
     for model in simpler(plan):
         own = model.plan.comparison()
-        z = np.clip(starting_points(own.parts, own.space, 2), own.space.low, own.space.high)[-1]
+        z = np.clip(starting_points(own.parts, features_of(own.parts), own.space, 2), own.space.low, own.space.high)[-1]
         inside = model.within(space, z, space.low, space.high)
         np.testing.assert_allclose(richer.misfit(inside), own.misfit(z[None])[0], rtol=1e-4)
 

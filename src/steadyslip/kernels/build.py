@@ -57,7 +57,7 @@ ENTRIES: dict[str, tuple[ModuleType, str]] = {
     ),
     "through_table": (
         table,
-        "void(int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], int64[:,::1], "
+        "void(int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[::1], "
         "float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
     ),
 }

@@ -88,8 +88,11 @@ class ExperimentProgram:
         return self.reduction.model.function([*constants, *self._start], *self.unsettled.values())
 
     @cached_property
-    def _slopes(self) -> Any:
-        """Derivatives of constants and starting values in every parameter, σss following, and in what is unsettled."""
+    def _slopes(self) -> tuple[Any, Any]:
+        """Derivatives of constants and starting values in every parameter, σss following, and in what is unsettled.
+
+        Places among them all of those that are not zero, and the function that computes these.
+        """
         model = self.reduction.model
         expressions = [*self.kernel.constants.symbols, *self._start]
         sigma = model.contact.sigma_ss
@@ -100,7 +103,8 @@ class ExperimentProgram:
             for expression in expressions:
                 found.append(derivative(expression, symbol) + derivative(expression, sigma) * stress)
         found += [derivative(expression, symbol) for symbol in self.unsettled.values() for expression in expressions]
-        return model.function(found, *self.unsettled.values())
+        places = [i for i, expression in enumerate(found) if expression != 0]
+        return np.array(places, dtype=int), model.function([found[i] for i in places], *self.unsettled.values())
 
     def arrays(self, point: OperatingPoint, chain: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constants with their rates of change, and starting states with theirs.
@@ -117,8 +121,10 @@ class ExperimentProgram:
         jobs, _, count = chain.shape
         with np.errstate(all="ignore"):
             values = _stacked(point.evaluate(self._values, *away.T), jobs)
-            slopes = _stacked(point.evaluate(self._slopes, *away.T), jobs).reshape(jobs, count, -1)
-        rates = np.matmul(chain, slopes)
+            places, function = self._slopes
+            slopes = np.zeros((jobs, count * values.shape[1]))
+            slopes[:, places] = _stacked(point.evaluate(function, *away.T), jobs)
+        rates = np.matmul(chain, slopes.reshape(jobs, count, -1))
         table, size = self.kernel.constants, len(self.kernel.constants.symbols)
         constants = table.with_rates(values[:, :size], rates[:, :, :size], {})
         start = np.concatenate([values[:, None, size:], rates[:, :, size:]], axis=1)

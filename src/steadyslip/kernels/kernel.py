@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from steadyslip.kernels.driver.places import earlier_at, further_at, guess_at, marks_at, outputs_at, unknown_at
+from steadyslip.kernels.driver.places import further_at, guess_at, marks_at, outputs_at, unknown_at
 from steadyslip.kernels.events import faster
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Out, Row
@@ -143,10 +143,7 @@ class Kernel(Formulation):
     def _extend_program(self) -> Program:
         """The dense output of the last step as polynomials."""
         record = Evaluator(self, Program("extend"))
-        for i in range(self.size):
-            for j, coefficient in enumerate(record.polynomial(i)):
-                record.program.store(self.layout.curve + i * self.terms + j, coefficient)
-        record.program.store(Row.EXTENDED, 1.0)
+        record.keep_polynomials()
         return record.program
 
     def _dense_program(self) -> Program:
@@ -158,9 +155,8 @@ class Kernel(Formulation):
                 program.store(i, y, "y")
             if self.speed is not None:
                 program.store(self.size + Out.W_SLOPE, horner(slope_of(record.course(self.layout.w)), theta), "y")
-            for k in range(self.unknowns):
-                old, z = program.load(earlier_at(self.layout, k)), program.load(guess_at(self.layout, k))
-                program.store(unknown_at(self.layout, k), old + theta * (z - old), "y")
+            for k, z in enumerate(record.guesses_between(theta)):
+                program.store(unknown_at(self.layout, k), z, "y")
             if not self.unknowns:
                 program.store(unknown_at(self.layout, 0), program.load(Row.Z), "y")
         return program

@@ -268,6 +268,7 @@ class Routines(NamedTuple):
     extend : the dense output of the last step, made ready for `dense`
     watch_lanes : of every lane: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed
+    extend_lanes, look_lanes : of every lane: `extend`; what was observed at `Row.NEXT`, within the last step
     """
 
     step: Routine
@@ -282,6 +283,8 @@ class Routines(NamedTuple):
     watch_lanes: Routine
     rates_lanes: Routine
     see_lanes: Routine
+    extend_lanes: Routine
+    look_lanes: Routine
 
 
 def call(routine: Routine, record: Array, number: float, array: Array) -> None:

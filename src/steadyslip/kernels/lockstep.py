@@ -3,7 +3,7 @@
 Measured histories have a breakpoint at every sample. Lanes that each looked after their own breakpoints would spend
 most of their time there; lanes that share the samples of one record need not: they enter every row of the table
 together, each takes as many steps of its own size as it needs, and all wait for the last. What is observed and its
-derivatives in several directions are written down at every sample.
+derivatives in several directions are looked up at every sample, from the dense output of steps that pass many.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sympy as sp
 from steadyslip.kernels.formulation import Choice, Formulation
 from steadyslip.kernels.layout import Layout, Row, make_layout
 from steadyslip.kernels.nodes import Program, as_node, select
-from steadyslip.kernels.record import Evaluator
+from steadyslip.kernels.record import Evaluator, Values
 from steadyslip.kernels.step import Step
 from steadyslip.model.reduction import V_LP, P, Q, Reduction
 
@@ -60,6 +60,9 @@ class LockstepKernel(Formulation):
             size=self.size,
             kept=0,
             constants=len(self.constants.all),
+            stages=self.method.stages,
+            terms=self.terms,
+            extra=self.method.all_stages > self.method.stages,
             own=self.own,
             directions=directions,
             unknowns=self.unknowns,
@@ -70,13 +73,14 @@ class LockstepKernel(Formulation):
     @cached_property
     def programs(self) -> tuple[Program, ...]:
         """What `steadyslip.kernels.driver.table` calls."""
-        return self._step(), self._lanes_program("rates_lanes"), self._lanes_program("see_lanes")
+        return self._step(), self._rates_program(), self._see_program(), self._extend_program(), self._look_program()
 
     def _step(self) -> Program:
         """One step; a lane that has arrived stays as it is."""
         step = Step(self)
         step.advance()
-        step._keep_state()
+        step.keep_stages()
+        step.keep_state()
         load, store, good = step.program.load, step.program.store, step.good
         moves = select(step.rest > 0.0, 1.0, 0.0)
         store(Row.ERROR, select(as_node(good, "bool") & (step.rest > 0.0), step.size, step.earlier))
@@ -87,15 +91,37 @@ class LockstepKernel(Formulation):
         store(Row.FAILURES, select(good, 0.0, load(Row.FAILURES) + 1.0))
         return step.program
 
-    def _lanes_program(self, name: str) -> Program:
-        record = Evaluator(self, Program(name))
+    def _rates_program(self) -> Program:
+        record = Evaluator(self, Program("rates_lanes"))
         point = record.point(record.program.load(Row.TAU))
-        rates = name == "rates_lanes"
-        place = self.layout.rate if rates else self.layout.seen
-        for i, value in enumerate(record.evaluated(self.rates if rates else self.seen, point)):
-            record.program.store(place + i, value)
-        if rates:
-            record.keep_unknowns()
+        for i, value in enumerate(record.evaluated(self.rates, point)):
+            record.program.store(self.layout.rate + i, value)
+        record.keep_unknowns()
+        return record.program
+
+    def _see_program(self) -> Program:
+        """What is observed now."""
+        record = Evaluator(self, Program("see_lanes"))
+        return self._seen(record, record.point(record.program.load(Row.TAU)))
+
+    def _extend_program(self) -> Program:
+        """The dense output of the last step, as polynomials."""
+        record = Evaluator(self, Program("extend_lanes"))
+        record.keep_polynomials()
+        return record.program
+
+    def _look_program(self) -> Program:
+        """What was observed within the last step, so far into the row as is asked for."""
+        record = Evaluator(self, Program("look_lanes"), extended=True)
+        load = record.program.load
+        moment = load(Row.NEXT)
+        theta = (moment - load(Row.TAU_OLD)) / load(Row.DONE)
+        record.z = record.guesses_between(theta)
+        return self._seen(record, record.inputs(moment) | {f"y{i}": y for i, y in enumerate(record.between(theta))})
+
+    def _seen(self, record: Evaluator, point: Values) -> Program:
+        for i, value in enumerate(record.evaluated(self.seen, point)):
+            record.program.store(self.layout.seen + i, value)
         return record.program
 
     def input_rates(self) -> tuple[int, ...]:

@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from steadyslip.kernels.driver.places import guess_at, scale_at
+from steadyslip.kernels.driver.places import earlier_at, guess_at, scale_at
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.formulation import CHANNELS, OUTPUTS, Formulation
 from steadyslip.kernels.layout import Row
@@ -186,6 +186,21 @@ class Evaluator:
     def between(self, theta: Node) -> list[Value]:
         """The state at a fraction of the last step."""
         return [horner(self.polynomial(i), theta) for i in range(self.kernel.size)]
+
+    def keep_polynomials(self) -> None:
+        """Store the dense output of the last step."""
+        for i in range(self.kernel.size):
+            for j, coefficient in enumerate(self.polynomial(i)):
+                self.program.store(self.kernel.layout.curve + i * self.kernel.terms + j, coefficient)
+        self.program.store(Row.EXTENDED, 1.0)
+
+    def guesses_between(self, theta: Node) -> list[Value]:
+        """Near which the unknowns are at a fraction of the last step."""
+        found: list[Value] = []
+        for k in range(self.kernel.unknowns):
+            old = self.program.load(earlier_at(self.kernel.layout, k))
+            found.append(old + theta * (self.program.load(guess_at(self.kernel.layout, k)) - old))
+        return found
 
     # -- events
 

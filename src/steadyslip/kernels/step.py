@@ -127,8 +127,8 @@ class Step(Evaluator):
         """Keep or reject the step; raise the flag where the driver is needed."""
         load, store, good = self.program.load, self.program.store, self.good
         if self.kernel.choice.dense:
-            self._keep_stages()
-        self._keep_state()
+            self.keep_stages()
+        self.keep_state()
         before = [load(row) for row in (Row.V, Row.ACCELERATION, Row.SIGMA)]
         v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs[:3], before, strict=True))
         for row, value in ((Row.V, v), (Row.ACCELERATION, acceleration), (Row.SIGMA, sigma)):
@@ -204,7 +204,8 @@ class Step(Evaluator):
         store(Row.HAPPENED, happened)
         return happened
 
-    def _keep_state(self) -> None:
+    def keep_state(self) -> None:
+        """The new state and its rates, if the step is good."""
         layout, store, good = self.kernel.layout, self.program.store, self.good
         for i in range(self.kernel.size):
             store(layout.state + i, select(good, self.new[i], self.old[i]))
@@ -214,7 +215,8 @@ class Step(Evaluator):
             place = guess_at(layout, k)
             store(place, select(good, z, self.program.load(place)))
 
-    def _keep_stages(self) -> None:
+    def keep_stages(self) -> None:
+        """What dense output needs."""
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
         for i in range(n):
             store(layout.old + i, self.old[i])

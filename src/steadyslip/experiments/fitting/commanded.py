@@ -43,9 +43,19 @@ class CommandedInputs:
         self.base = {"load": 0.0, "stress": 0.0}
         if "stress" in self.courses:
             self.base["stress"] = float(self.courses["stress"].at(time[:1])[0])
-        self.nodes = np.union1d(time, self._cuts())
-        self.sample = np.full(len(self.nodes), -1)
-        self.sample[np.searchsorted(self.nodes, time)] = np.arange(len(time))
+        self.times = time - time[0]
+        self.nodes = self._nodes()
+
+    def _nodes(self) -> Array:
+        """Times that no step of the model passes, besides changes: ends; samples along curves and changing ramps."""
+        if any(course.curve is not None for course in self.courses.values()):
+            return np.union1d(self.time, self._cuts())
+        held = np.zeros(len(self.time), dtype=bool)
+        held[[0, -1]] = True
+        for _, _, change in self.changes:
+            if change.stretches:  # derivatives in its duration are constant on each row
+                held |= (self.time >= change.earliest) & (self.time <= change.latest + change.longest)
+        return np.asarray(self.time[held])
 
     def _cuts(self) -> Array:
         """Further times, where samples are too far apart for a curve to be straight between them."""
@@ -107,14 +117,11 @@ class CommandedInputs:
         curves = {channel: self._along(channel, moving, order) for channel in self._curves}
         nodes = np.take_along_axis(nodes, order, axis=1)
         count = events.shape[1] + before.shape[1]
-        place = np.concatenate([np.full(count, -1), self.sample])
-        samples = place[order]
         rows = np.zeros((jobs, nodes.shape[1] - 1, 9))
         rows[:, :, 0], rows[:, :, 1] = nodes[:, :-1] - low, nodes[:, 1:] - low
         self._fill(rows, nodes, begins, lengths, curves)
-        table = InputTable(rows, np.ascontiguousarray(samples), len(self.time))
         if not directions or not self.free:
-            return table
+            return InputTable(rows, self.times)
         moves = np.zeros((jobs, directions, count))
         for k, (i, what) in enumerate(self.free):
             if what == "lag":
@@ -131,7 +138,7 @@ class CommandedInputs:
         job, row = np.nonzero(event < count)
         rates[job, :, row] = moves[job, :, event[job, row]]
         changing = self._input_rates(nodes, begins, lengths, first, directions)
-        return InputTable(rows, table.samples, table.count, rates, changing)
+        return InputTable(rows, self.times, rates, changing)
 
     @cached_property
     def _curves(self) -> dict[str, Array]:

@@ -33,10 +33,8 @@ class InputTable:
     segments : ndarray (jobs or 1, k, 9)
         Start, end, jump of the load point, values and slopes of load-point velocity, disturbance and added normal
         stress.
-    samples : ndarray of int (jobs or 1, k + 1)
-        Which sample lies at the start of each row, and at the end; -1 for none.
-    count : int
-        Number of samples.
+    times : ndarray (samples,)
+        When friction is observed, on the clock of the rows.
     node_rates : ndarray (jobs or 1, directions or 0, k)
         How the start of each row moves in each direction.
     input_rates : ndarray (jobs or 1, directions or 0, k, 3)
@@ -44,8 +42,7 @@ class InputTable:
     """
 
     segments: Array
-    samples: Array
-    count: int
+    times: Array
     node_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0)))
     input_rates: Array = field(default_factory=lambda: np.zeros((1, 0, 0, 3)))
 
@@ -55,16 +52,14 @@ class InputTable:
         def own(array: Array) -> Array:
             return array if len(array) == 1 else np.ascontiguousarray(array[rows])
 
-        return InputTable(
-            own(self.segments), own(self.samples), self.count, own(self.node_rates), own(self.input_rates)
-        )
+        return InputTable(own(self.segments), self.times, own(self.node_rates), own(self.input_rates))
 
     def along(self, part: slice, size: int) -> InputTable:
         """That of some directions, filled up to as many as a kernel has."""
         rates = [
             _padded(array[:, part], size) if array.shape[1] else array for array in (self.node_rates, self.input_rates)
         ]
-        return InputTable(self.segments, self.samples, self.count, *rates)
+        return InputTable(self.segments, self.times, *rates)
 
 
 def _padded(array: Array, size: int) -> Array:
@@ -184,7 +179,7 @@ class Forward:
         constants, start = self.program.arrays(values, chain, away)
         settings = self._settings(table, values, jobs)
         good = (sigma > 0) & np.all(np.isfinite(constants), axis=1) & np.all(np.isfinite(start), axis=1)
-        seen = np.full((jobs, 1 + chain.shape[1], table.count), np.nan)
+        seen = np.full((jobs, 1 + chain.shape[1], len(table.times)), np.nan)
         steps = self.steps = np.zeros((jobs, 2))
         if not np.all(good):
             constants, start, settings, table = constants[good], start[good], settings[good], table.part(good)
@@ -194,7 +189,7 @@ class Forward:
             part = slice(first, last)
             own = table.part(part)
             self.program.through_table(
-                constants[part], start[part], settings[part], own.segments, own.samples, own.node_rates,
+                constants[part], start[part], settings[part], own.segments, own.times, own.node_rates,
                 own.input_rates, found[part], taken[part],
             )  # fmt: skip
 
@@ -216,7 +211,7 @@ class Forward:
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
         richer = 1 + RICHER * (len(self.names) + self.shifts + len(self.unsettled))
-        settings[:, Setting.MOST_STEPS] = int(self.effort.patience * richer * table.samples.shape[1]) + 1000
+        settings[:, Setting.MOST_STEPS] = int(self.effort.patience * richer * len(table.times)) + 1000
         settings[:, Setting.FIRST_STEP] = np.inf
         for i, name in enumerate(reduction.names):
             settings[:, Setting.ATOL + i] = self.rtol * scales[name]

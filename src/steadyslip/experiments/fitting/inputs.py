@@ -19,7 +19,7 @@ from steadyslip.protocol.inputs import inputs_at
 
 Array = np.ndarray
 LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
-PER_PERIOD = 200  # rows per period of a sine wave, on which it becomes straight: 1e-4 of its amplitude
+PER_PERIOD = 300  # rows per period of a sine wave, on which it becomes straight: 6e-5 of its amplitude
 MOST_JUMPS = 20
 STRAIGHT = 5e-4  # of the range of the normal stress: what straight lines may miss of a smooth curve
 _SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
@@ -147,7 +147,8 @@ class MeasuredInputs:
 
     def __init__(self, record: Record, sharp: Sharp, pressed: Array | None = None) -> None:
         time = record.time
-        self.origin, self.count = float(time[0]), len(time)
+        self.origin = float(time[0])
+        self.times = time - self.origin
         jumping, bending = {first for first, _ in sharp.jumps}, {first for first, _, _ in sharp.kinks}
         curved, bent = _curved(time, pressed, jumping) if pressed is not None else (np.empty(0, dtype=int), np.empty(0))
         moments = [*(float(np.mean(j)) for j in sharp.jumps), *(k[2] for k in sharp.kinks), *bent]
@@ -156,12 +157,12 @@ class MeasuredInputs:
         order = np.argsort(moments, kind="stable")
         places = np.array(cuts, dtype=int)[order]
         nodes = np.insert(time, places + 1, np.array(moments, dtype=float)[order]) - self.origin
-        self.samples = np.insert(np.arange(len(time)), places + 1, -1)[None]
-        old = np.maximum.accumulate(np.where(self.samples[0] >= 0, self.samples[0], 0))[:-1]  # interval of each row
+        samples = np.insert(np.arange(len(time)), places + 1, -1)  # at the nodes; -1 for none
+        old = np.maximum.accumulate(np.where(samples >= 0, samples, 0))[:-1]  # interval of each row
         rows = np.zeros((1, len(nodes) - 1, 9))
         rows[0, :, 0], rows[0, :, 1] = nodes[:-1], nodes[1:]
-        self._measured(rows[0], record, old, pressed, jumping)
-        halves = np.flatnonzero(self.samples[0][:-1] < 0)  # second parts of cut intervals
+        self._measured(rows[0], record, old, pressed, jumping, samples >= 0)
+        halves = np.flatnonzero(samples[:-1] < 0)  # second parts of cut intervals
         self.moving = np.array([row for row in halves if float(time[old[row]]) in jumping], dtype=int)
         for row in halves:
             first = float(time[old[row]])
@@ -169,7 +170,9 @@ class MeasuredInputs:
                 self._cut(rows[0], int(row), record, int(old[row]), first in jumping, pressed)
         self.rows = rows
 
-    def _measured(self, rows: Array, record: Record, old: Array, pressed: Array | None, jumping: set[float]) -> None:
+    def _measured(
+        self, rows: Array, record: Record, old: Array, pressed: Array | None, jumping: set[float], sampled: Array
+    ) -> None:
         spacing = np.diff(record.time)
         if record.displacement is not None:
             rows[:, 3] = (np.diff(record.displacement) / spacing)[old]
@@ -180,9 +183,8 @@ class MeasuredInputs:
         if pressed is not None:
             curve = _through(record.time, pressed, jumping)
             before, after = curve(rows[:, 0] + self.origin), curve(rows[:, 1] + self.origin)
-            ends = np.append(self.samples[0][1:], 0)[: len(rows)] >= 0
-            before = np.where(self.samples[0][:-1] >= 0, pressed[old], before)
-            after = np.where(ends, pressed[old + 1], after)
+            before = np.where(sampled[:-1], pressed[old], before)
+            after = np.where(sampled[1:], pressed[old + 1], after)
             rows[:, 5], rows[:, 8] = before, (after - before) / (rows[:, 1] - rows[:, 0])
 
     def _cut(self, rows: Array, row: int, record: Record, i: int, jumps: bool, pressed: Array | None) -> None:
@@ -215,15 +217,15 @@ class MeasuredInputs:
             How many directions there are; none are wanted if zero.
         """
         if not len(self.moving):
-            return InputTable(self.rows, self.samples, self.count)
+            return InputTable(self.rows, self.times)
         rows = np.repeat(self.rows, len(times), axis=0)
         rows[:, self.moving, 0] = rows[:, self.moving - 1, 1] = times - self.origin
         if not directions:
-            return InputTable(rows, self.samples, self.count)
+            return InputTable(rows, self.times)
         rates = np.zeros((1, directions, rows.shape[1]))
         for k, row in enumerate(self.moving):
             rates[0, first + k, row] = 1.0
-        return InputTable(rows, self.samples, self.count, rates)
+        return InputTable(rows, self.times, rates)
 
 
 class ProtocolInputs:
@@ -246,7 +248,7 @@ class ProtocolInputs:
     def __init__(
         self, protocol: Protocol, velocity: float, time: Array, free: Sequence[str] = (), pressed: Array | None = None
     ) -> None:
-        self.protocol, self.velocity, self.time, self.pressed = protocol, velocity, time, pressed
+        self.protocol, self.velocity, self.time, self.pressed = protocol, velocity, np.array(time), pressed
         self.free = tuple(free)
         self._plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
 
@@ -275,13 +277,12 @@ class ProtocolInputs:
         first, last = float(self.time[0]), float(self.time[-1])
         starts = np.broadcast_to(segments.start, (jobs, segments.start.shape[1]))
         extra = _wave_nodes(segments, first, last)
-        nodes = np.hstack([np.clip(starts, first, last), np.tile(np.append(self.time, extra), (jobs, 1))])
+        fixed = np.concatenate([[first, last] if self.pressed is None else self.time, extra])
+        nodes = np.hstack([np.clip(starts, first, last), np.tile(fixed, (jobs, 1))])
         order = np.argsort(nodes, axis=1, kind="stable")  # a step before the sample at its very time
         ends = np.take_along_axis(nodes, order, axis=1)
         begins = order < starts.shape[1]
         own = np.maximum.accumulate(np.where(begins, order, 0), axis=1)[:, :-1]
-        samples = order - starts.shape[1]
-        samples = np.where((samples >= 0) & (samples < len(self.time)), samples, -1)
         rows = np.zeros((jobs, ends.shape[1] - 1, 9))
         rows[:, :, 0], rows[:, :, 1] = ends[:, :-1], ends[:, 1:]
         inside = begins & (np.take_along_axis(np.hstack([starts, nodes[:, starts.shape[1] :]]), order, 1) >= first)
@@ -294,9 +295,8 @@ class ProtocolInputs:
         spacing = (rows[:, :, 1] - rows[:, :, 0])[:, :, None]
         rows[:, :, 3:6] = before
         rows[:, :, 6:9] = np.where(spacing > 0, (after - before) / np.where(spacing > 0, spacing, 1.0), 0.0)
-        table = InputTable(rows, np.ascontiguousarray(samples), len(self.time))
         if not moved:
-            return table
+            return InputTable(rows, self.time)
         node_rates = np.zeros((jobs, directions, rows.shape[1]))
         input_rates = np.zeros((jobs, directions, rows.shape[1], 3))
         middle = 0.5 * (rows[:, :, 0] + rows[:, :, 1])
@@ -305,7 +305,7 @@ class ProtocolInputs:
             node_rates[:, direction] = np.where(inside[:, :-1], _of(shift, own, jobs), 0.0)
             change = _at(plus, own, middle, jobs) - _at(minus, own, middle, jobs)
             input_rates[:, direction] = change / (2 * _SHIFT)
-        return InputTable(rows, table.samples, table.count, node_rates, input_rates)
+        return InputTable(rows, self.time, node_rates, input_rates)
 
 
 def _of(array: Array, own: Array, jobs: int) -> Array:

@@ -100,7 +100,7 @@ class Plan:
     loss: str = "linear"
     width: float | None = None
     weights: tuple[Array, ...] | None = field(default=None, repr=False)
-    rtol: float = 1e-7
+    rtol: float = 1e-8
     sharp: tuple[Sharp, ...] = field(default=(), repr=False)
     loading: tuple[Loading, ...] = field(default=(), repr=False)
 

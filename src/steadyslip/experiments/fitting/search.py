@@ -14,7 +14,7 @@ from steadyslip.experiments.fitting.effort import Effort, work_of_search
 from steadyslip.experiments.fitting.nested import Simpler, simpler
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.starts import search_bounds, starting_points
+from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
 from steadyslip.experiments.numerics.least_squares import HOPE, SAME, Minima, minimise
@@ -33,6 +33,7 @@ NEAREST = 3  # of the ends on few numbers that go on with all samples
 STARTING, REFINING = 0.5, 0.8  # of the work of a search: what may be done by the ends of its first two stages
 BESIDES = 0.2  # of it: what may be done with each simpler model, besides its own search
 SURPASSED = 1e-8  # of the sum of squares: by so much less on few numbers, an end is worth a look on all samples
+SMALL = 50_000  # derivatives at all samples, of all the promising: so few that nothing is won by fewer
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
 
 Told = Callable[[str, int, float], None]
@@ -149,7 +150,8 @@ class _Search:
         self.whole = plan.comparison(effort)
         self.thin = replace(_thinned(plan), rtol=1e-5)
         self.quick = self.thin.comparison(replace(effort, patience=HASTY))
-        self.low, self.high = search_bounds(self.whole.parts, self.whole.space)
+        self.told_by_records = features_of(self.whole.parts)
+        self.low, self.high = search_bounds(self.whole.parts, self.told_by_records, self.whole.space)
         self.rough = self.best = Minima.none(len(self.whole.space))
         self.few: Comparison | Condensed = self.whole
         self.followed = self.best.coordinates
@@ -179,7 +181,9 @@ class _Search:
     def try_starts(self, upto: int) -> None:
         """Starts up to a number of them, on few samples."""
         already = len(self.rough.ssq)
-        begin = starting_points(self.whole.parts, self.whole.space, upto - already, already)
+        begin = starting_points(
+            self.whole.parts, self.told_by_records, self.whole.space, upto - already, already
+        )
         self.enough = self.stages[0]
         self.rough = self.rough + minimise(
             lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH, tolerance=1e-4,
@@ -195,7 +199,9 @@ class _Search:
             counts = np.append(counts, 0)
         begin, counts, seen, slopes = self._followed(begin, counts)
         self.followed = begin
-        self.few = condensed_along(self.plan, self.whole, seen, slopes)
+        self.few = self.whole
+        if slopes.size > SMALL:
+            self.few = condensed_along(self.plan, self.whole, seen, slopes)
         if self.few is self.whole:
             self.best = Minima.at(begin)
             self.arrived = int(np.sum(self.rough.ssq <= np.min(self.rough.ssq) * (1 + SAME)))

@@ -140,11 +140,17 @@ def _steepest_anywhere(moved: Array, mu: Array) -> float:
     return max(best, float(np.ptp(mu)) / max(float(np.ptp(moved)), 1e-12))
 
 
-def starting_points(parts: Sequence[RecordPart], space: Space, count: int = STARTS, already: int = 0) -> Array:
+def features_of(parts: Sequence[RecordPart]) -> tuple[Features, ...]:
+    """What the records tell."""
+    return tuple(features(part.record, part.rig.drive.velocity) for part in parts)
+
+
+def starting_points(
+    parts: Sequence[RecordPart], found: Sequence[Features], space: Space, count: int = STARTS, already: int = 0
+) -> Array:
     """Coordinates to start from, (count, p): a design over what the records leave open, continued after `already`."""
     from scipy.stats import qmc
 
-    found = [features(part.record, part.rig.drive.velocity) for part in parts]
     grid = qmc.Halton(6, rng=12345).random(already + count)[already:]
     shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
     d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
@@ -170,15 +176,14 @@ def starting_points(parts: Sequence[RecordPart], space: Space, count: int = STAR
     return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
 
 
-def search_bounds(parts: Sequence[RecordPart], space: Space) -> tuple[Array, Array]:
+def search_bounds(parts: Sequence[RecordPart], told: Sequence[Features], space: Space) -> tuple[Array, Array]:
     """Bounds of the coordinates: of the parameters themselves, and of what records can show.
 
     A slip distance far below what passes between samples, or far above the whole record, changes nothing any more.
     """
     low, high = space.low.copy(), space.high.copy()
-    found = [features(part.record, part.rig.drive.velocity) for part in parts]
     for i, unknown in enumerate(space.unknowns):
-        own = found if unknown.record is None else [found[unknown.record]]
+        own = told if unknown.record is None else [told[unknown.record]]
         if unknown.kind == "slip distance":
             ends = min(f.shortest for f in own) / 5, max(f.longest for f in own) * 40
         elif unknown.kind == "direct effect":

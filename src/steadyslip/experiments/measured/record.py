@@ -333,12 +333,11 @@ def _wanted(record: Record, count: int) -> Array:
         after = time >= moment - 2 * usual
         share = 0.3 if i == 0 and len(moments) > 1 else 1.0
         weight += share * np.where(after, 1.0 / (np.maximum(time - moment, 0.0) + 5 * usual), 0.0) / 8.0
-    spacing = np.gradient(time)
-    low, high = 0.0, 1e6 * count
-    for _ in range(60):
-        scale = 0.5 * (low + high)
-        if np.sum(np.minimum(weight * spacing * scale, 1.0)) < count:
-            low = scale
-        else:
-            high = scale
-    return np.asarray(np.minimum(weight * spacing * high, 1.0))
+    share = weight * np.gradient(time)
+    if count >= n:
+        return np.ones(n)
+    rising = np.sort(share)  # the largest are one each, the rest in proportion
+    rest = np.cumsum(rising)
+    left = count - np.arange(n - 1, -1, -1)  # for those up to each, if all above it are one
+    k = int(np.flatnonzero((left > 0) & (left * rising <= rest))[-1])
+    return np.asarray(np.minimum(share * (left[k] / rest[k]), 1.0))

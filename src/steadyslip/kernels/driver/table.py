@@ -1,6 +1,8 @@
 """The loop of fits: all lanes go through one table of inputs together, with sensitivities (`kernels/lockstep.py`).
 
-A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs.
+A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs. What is observed is
+wanted at the same times in every job. Lanes take steps of their own size and look back to the times in each of them;
+where there are fewer jobs than lanes, several lanes do the same job and share its times among them.
 """
 
 from __future__ import annotations
@@ -16,15 +18,25 @@ from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, Stat
 INSTANT = 1e-14  # share of the time so far: shorter steps lead nowhere
 
 
-def enter_row(S: Array, layout: Layout, group: int, k: int, segments: Array, input_rates: Array, places: Array) -> None:
-    """Start row k of the table: new inputs, jump of the load point."""
+def lanes_of_job(layout: Layout, count: int, lane: int) -> int:
+    """How many of the lanes do the job that a lane does, of so many jobs."""
+    return (layout.lanes - 1 - lane % count) // count + 1
+
+
+def enter_row(
+    S: Array, layout: Layout, group: int, count: int, k: int, segments: Array, times: Array, input_rates: Array,
+    places: Array,
+) -> None:  # fmt: skip
+    """Start row k of the table: new inputs, jump of the load point, how far into it the next sample is."""
     W = layout.lanes
     for lane in range(W):
-        row = segments[min(group + lane, segments.shape[0] - 1), k]
+        job = group + lane % count
+        row = segments[min(job, segments.shape[0] - 1), k]
         begin_segment(S, layout, W, lane, row)
         S[(layout.state + layout.x) * W + lane] -= row[2]
+        await_look(S, W, lane, times, k == segments.shape[1] - 1)
         if input_rates.shape[1] > 0:
-            own = min(group + lane, input_rates.shape[0] - 1)
+            own = min(job, input_rates.shape[0] - 1)
             for d in range(layout.directions):
                 for i in range(INPUTS):
                     place = places[INPUTS * d + i]
@@ -32,12 +44,25 @@ def enter_row(S: Array, layout: Layout, group: int, k: int, segments: Array, inp
                         S[(layout.constant + place) * W + lane] = input_rates[own, d, k, i]
 
 
-def move_nodes(S: Array, layout: Layout, group: int, k: int, node_rates: Array) -> bool:
+def await_look(S: Array, lanes: int, lane: int, times: Array, is_last: bool) -> None:
+    """How far into the row the next sample of a lane is; never, if it is not in this row.
+
+    A sample at the end of a row belongs to the next one.
+    """
+    S[Row.NEXT * lanes + lane] = math.inf
+    k = int(S[Row.TAKEN * lanes + lane])
+    if k < times.shape[0]:
+        stop = S[Row.STOP * lanes + lane]
+        if times[k] < stop or (is_last and times[k] <= stop):
+            S[Row.NEXT * lanes + lane] = times[k] - S[Row.START * lanes + lane]
+
+
+def move_nodes(S: Array, layout: Layout, group: int, count: int, k: int, node_rates: Array) -> bool:
     """Sensitivities jump where the start of a row moves with a direction: by the difference of the rates there."""
     moved = False
     W, own = layout.lanes, layout.own
     for lane in range(W):
-        job = min(group + lane, node_rates.shape[0] - 1)
+        job = min(group + lane % count, node_rates.shape[0] - 1)
         for d in range(layout.directions):
             rate = node_rates[job, d, k]
             if rate != 0.0:
@@ -48,7 +73,10 @@ def move_nodes(S: Array, layout: Layout, group: int, k: int, node_rates: Array) 
     return moved
 
 
-def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
+def cross(
+    S: Array, layout: Layout, routines: Routines, group: int, count: int, times: Array, is_last: bool, seen: Array,
+    y: Array,
+) -> None:  # fmt: skip
     """Take every living lane to the end of the row; a motion that runs away in no time at all ends there."""
     W = layout.lanes
     while True:
@@ -64,56 +92,71 @@ def cross(S: Array, layout: Layout, routines: Routines, y: Array) -> None:
         if waiting == 0:
             return
         call(routines.step, S, 0.0, y)
+        passed = lanes_due(S, W)
+        if passed > 0:
+            call(routines.extend_lanes, S, 0.0, y)
+        while passed > 0:
+            call(routines.look_lanes, S, 0.0, y)
+            passed = write_down(S, layout, group, count, times, is_last, seen)
 
 
-def keep_seen(
-    S: Array, layout: Layout, routines: Routines, group: int, k: int, samples: Array, seen: Array, y: Array
-) -> None:  # fmt: skip
-    """Write down what is observed in every lane that has a sample here."""
-    W = layout.lanes
-    any_here = False
+def lanes_due(S: Array, lanes: int) -> int:
+    """How many living lanes have passed their next sample."""
+    found = 0
+    for lane in range(lanes):
+        if S[Row.NEXT * lanes + lane] <= S[Row.TAU * lanes + lane] and S[Row.ACTIVE * lanes + lane] > 0.0:
+            found += 1
+    return found
+
+
+def write_down(S: Array, layout: Layout, group: int, count: int, times: Array, is_last: bool, seen: Array) -> int:
+    """What is observed in every living lane that has passed its next sample; how many have passed the next but one."""
+    W, passed = layout.lanes, 0
     for lane in range(W):
-        any_here = any_here or samples[min(group + lane, samples.shape[0] - 1), k] >= 0
-    if not any_here:
-        return
-    call(routines.see_lanes, S, 0.0, y)
-    for lane in range(W):
-        sample = samples[min(group + lane, samples.shape[0] - 1), k]
-        if group + lane < seen.shape[0] and sample >= 0:
+        if S[Row.NEXT * W + lane] <= S[Row.TAU * W + lane] and S[Row.ACTIVE * W + lane] > 0.0:
+            sample = int(S[Row.TAKEN * W + lane])
             for i in range(1 + layout.directions):
-                value = S[(layout.seen + i) * W + lane]
-                seen[group + lane, i, sample] = value if S[Row.ACTIVE * W + lane] > 0.0 else math.nan
+                seen[group + lane % count, i, sample] = S[(layout.seen + i) * W + lane]
+            S[Row.TAKEN * W + lane] = sample + lanes_of_job(layout, count, lane)
+            await_look(S, W, lane, times, is_last)
+            if S[Row.NEXT * W + lane] <= S[Row.TAU * W + lane]:
+                passed += 1
+    return passed
 
 
 def through_table(
     layout: Layout, routines: Routines, places: Array, constants: Array, initial: Array, settings: Array,
-    segments: Array, samples: Array, node_rates: Array, input_rates: Array, seen: Array, steps: Array,
+    segments: Array, times: Array, node_rates: Array, input_rates: Array, seen: Array, steps: Array,
 ) -> None:  # fmt: skip
     """Take all jobs through the table.
 
-    One row per job, or one shared row: `constants`, `initial` (states), `settings`, `segments` (jobs, k, 9), `samples`
-    (jobs, k + 1), the place in `seen` (jobs, 1 + directions, samples) of what is observed at the start of each row and
-    at the end, -1 for none. `node_rates` (jobs, directions, k) and `input_rates` (jobs, directions, k, 3) have no
-    directions where none moves the table; `places` says where among the constants the rates of the inputs belong.
+    One row per job, or one shared row: `constants`, `initial` (states), `settings`, `segments` (jobs, k, 9). `times`
+    (samples,) are those at which everything observed is written to `seen` (jobs, 1 + directions, samples), which a
+    motion that does not get there leaves as it is. `node_rates` (jobs, directions, k) and `input_rates` (jobs,
+    directions, k, 3) have no directions where none moves the table; `places` says where among the constants the rates
+    of the inputs belong.
     """
     W = layout.lanes
     S, y = np.zeros(layout.rows * W), np.empty(2)
     rows = segments.shape[1]
     jobs = seen.shape[0]
     for group in range(0, jobs, W):
-        for lane in range(W):  # lanes without a job repeat the last
-            load_job(S, layout, W, lane, min(group + lane, jobs - 1), layout.state, constants, initial, settings)
+        count = min(W, jobs - group)
+        for lane in range(W):
+            load_job(S, layout, W, lane, group + lane % count, layout.state, constants, initial, settings)
+            S[Row.TAKEN * W + lane] = lane // count
         for k in range(rows):
+            is_last = k == rows - 1
             for i in range(layout.own * W):
                 S[layout.before * W + i] = S[layout.rate * W + i]
-            enter_row(S, layout, group, k, segments, input_rates, places)
+            enter_row(S, layout, group, count, k, segments, times, input_rates, places)
             call(routines.rates_lanes, S, 0.0, y)
-            if k > 0 and node_rates.shape[1] > 0 and move_nodes(S, layout, group, k, node_rates):
+            if k > 0 and node_rates.shape[1] > 0 and move_nodes(S, layout, group, count, k, node_rates):
                 call(routines.rates_lanes, S, 0.0, y)
-            keep_seen(S, layout, routines, group, k, samples, seen, y)
-            cross(S, layout, routines, y)
-        keep_seen(S, layout, routines, group, rows, samples, seen, y)
-        for lane in range(W):
-            if group + lane < jobs:
-                steps[group + lane, 0] = S[Row.ACCEPTED * W + lane]
-                steps[group + lane, 1] = S[Row.REJECTED * W + lane]
+            if lanes_due(S, W) > 0:
+                call(routines.see_lanes, S, 0.0, y)
+                write_down(S, layout, group, count, times, is_last, seen)
+            cross(S, layout, routines, group, count, times, is_last, seen, y)
+        for lane in range(count):
+            steps[group + lane, 0] = S[Row.ACCEPTED * W + lane]
+            steps[group + lane, 1] = S[Row.REJECTED * W + lane]

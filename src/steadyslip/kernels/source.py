@@ -29,6 +29,7 @@ class Constants:
         self.rates: dict[tuple[sp.Symbol, int], sp.Symbol] = {}
         self._seen: dict[sp.Expr, sp.Expr] = {}
         self._moves: dict[sp.Basic, bool] = {}
+        self._rated: tuple[int, int, np.ndarray] = (-1, -1, np.empty((3, 0), dtype=int))
 
     def moves(self, expression: sp.Basic) -> bool:
         """Whether an expression has a variable in it."""
@@ -87,15 +88,27 @@ class Constants:
         inputs : mapping of symbol to ndarray (rigs, directions)
             Rates of change of inputs, zero unless given.
         """
-        order = {symbol: i for i, symbol in enumerate(self.symbols.values())}
+        size, (columns, directions, places) = len(self.symbols), self._rates_of_constants()
         table = np.zeros((len(found), len(self.all)))
-        table[:, : len(order)] = found
-        for column, (constant, direction) in enumerate(self.rates, start=len(order)):
-            if constant in order:
-                table[:, column] = rates[:, direction, order[constant]]
-            elif constant in inputs:
-                table[:, column] = inputs[constant][:, direction]
+        table[:, :size] = found
+        table[:, columns] = rates[:, directions, places]
+        if inputs:
+            for column, (constant, direction) in enumerate(self.rates, start=size):
+                if constant in inputs:
+                    table[:, column] = inputs[constant][:, direction]
         return table
+
+    def _rates_of_constants(self) -> np.ndarray:
+        """Of each rate of change of a constant: its place, the direction, and the place of the constant."""
+        size, count, found = self._rated
+        if (size, count) != (len(self.symbols), len(self.rates)):
+            order = {symbol: i for i, symbol in enumerate(self.symbols.values())}
+            size, count = len(self.symbols), len(self.rates)
+            rows = [(place, direction, order[constant])
+                    for place, (constant, direction) in enumerate(self.rates, start=size) if constant in order]  # fmt: skip
+            found = np.array(rows, dtype=int).reshape(-1, 3).T
+            self._rated = size, count, found
+        return found
 
     def function(self, arguments: Sequence[sp.Symbol]) -> Callable[..., list[Any]]:
         """A NumPy function from parameter values to the constants, not to their rates of change."""

@@ -13,6 +13,7 @@ UNDETERMINED = 0.5  # standard deviation along a direction, in e-folds or natura
 MENTIONED = 0.15  # weight in a direction from which on a parameter is named
 FELT = 0.1  # the same, of its change along one standard deviation
 NOTHING = 1e-13  # share of the largest information that is rounding
+UNFELT = 1e-10  # share of the largest derivatives that is the rounding of a motion of many steps
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def combinations(information: Array, spread: Array, space: Space) -> tuple[Array
     found : tuple of Combination
     """
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    blind = size <= NOTHING * max(float(size.max(initial=0.0)), 1e-300)
+    blind = size <= UNFELT * max(float(size.max(initial=0.0)), 1e-300)
     scale = np.where(blind, 1.0, size)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     known = values > NOTHING * max(float(values.max(initial=0.0)), 1e-300)

@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.starts import features_of, search_bounds, starting_points
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.experiments.measured.record import transient_rows
-from steadyslip.experiments.numerics.least_squares import HOPE, SAME, Minima, minimise
+from steadyslip.experiments.numerics.least_squares import CLOSE, HOPE, SAME, Minima, minimise
 from steadyslip.experiments.numerics.noise import DETECTED, lag_one
 
 Array = np.ndarray
@@ -26,6 +26,7 @@ HASTY = 8  # steps of the model per sample, on average, before a trial on few of
 ROUGH = 40  # iterations on few samples
 MOST = 300  # iterations on all samples, or on what stands for them;
 LAST = 12  # on all samples after that
+FIRST = 8  # starts, which fill the lanes of one vector
 ENOUGH = 3  # starts that lead to the best minimum, and a third of the first few: else more starts are tried
 FINALISTS = 8  # of them that go on with all samples: one vector of lanes
 FEW = 8  # starts of a simpler model, to see whether it comes near
@@ -78,8 +79,8 @@ def _tried(plan: Plan, starts: int, effort: Effort, progress: Told | None, known
 def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, known: Known | None = None) -> Found:
     """The best minimum, and how it was found.
 
-    A third of the starts is tried first. The others follow unless these agree and leave nothing but white noise, and
-    then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
+    A few of the starts are tried first, then a third. The others follow unless these agree and leave nothing but white
+    noise, and then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
     from where these end. When the work that its own search may be is done, it goes on with the best that it has; what
     a simpler model may be is what it may be alone, so that it ends at the same place.
 
@@ -89,7 +90,8 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
         If the model cannot follow the records from any start.
     """
     search = _Search(plan, starts, effort, progress)
-    for upto in dict.fromkeys((-(-starts // 3), starts, 2 * starts, 3 * starts, 4 * starts)):
+    third = -(-starts // 3)
+    for upto in dict.fromkeys((min(FIRST, third), third, starts, 2 * starts, 3 * starts, 4 * starts)):
         search.try_starts(upto)
         last = search.enough.was_met
         if not search.any_followed:
@@ -208,7 +210,7 @@ class _Search:
             return
         self.best = minimise(
             lambda z, _: self.few.residuals(z), begin, self.low, self.high, most=MOST, race=ENOUGH,
-            told=self.told("refining", self.whole), enough=self.enough,
+            told=self.told("refining", self.whole), enough=self.enough, damping=CLOSE,
         )  # fmt: skip
         self.arrived = int(np.sum(counts[self.best.ssq <= np.min(self.best.ssq) * (1 + SAME)]))
 
@@ -289,7 +291,7 @@ class _Search:
             told = self.told("refining", self.whole)
             return minimise(
                 lambda z, _: self.whole.residuals(z), start, self.low, self.high, most=most, race=1, told=told,
-                enough=self.enough,
+                enough=self.enough, damping=CLOSE,
             ).sorted()  # fmt: skip
 
         if self.few is self.whole:

@@ -25,6 +25,7 @@ NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
 PACE = 10  # iterations over which the progress of a problem is judged
 CRAWL = 3e-7  # of its sum of squares in as many: along a valley that data do not tell from its bottom; it ends there
+DAMPED, CLOSE = 1e-2, 1e-4  # damping to begin with, far from a minimum and close to one
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
 
@@ -91,7 +92,7 @@ class Minima:
 def minimise(
     residuals: Residuals, start: Array, low: Array, high: Array, most: int = 100, held: Array | None = None,
     tolerance: float = CONVERGED, race: int = 0, known: float = np.inf, told: Callable[[Minima], None] | None = None,
-    enough: Callable[[], bool] | None = None,
+    enough: Callable[[], bool] | None = None, damping: float = DAMPED,
 ) -> Minima:  # fmt: skip
     """Minimise the sum of squares of every problem.
 
@@ -116,6 +117,8 @@ def minimise(
         Called after every iteration with what is known by then.
     enough : callable, optional
         Asked before every iteration whether to end where the problems are.
+    damping : float
+        To begin with, as a share of the curvature in each coordinate: the less, the closer a minimum is.
     """
     count, size = start.shape
     if not count:
@@ -129,7 +132,7 @@ def minimise(
     normal, gradient = _normal(r, jacobian)
     ssq = np.where(_usable(normal, gradient), _squares(r), np.inf)
     found.ssq[:] = ssq
-    damping, raised, scale = np.full(count, 1e-2), np.full(count, 2.0), np.zeros((count, size))
+    damped, raised, scale = np.full(count, damping), np.full(count, 2.0), np.zeros((count, size))
     stuck = np.zeros(count, dtype=bool)
     last, plain = np.zeros((count, size)), np.zeros(count, dtype=bool)  # the step before, if it was not stretched
     earlier = ssq.copy()
@@ -162,7 +165,7 @@ def minimise(
             active, normal, gradient, z, free = active[rest], normal[rest], gradient[rest], z[rest], free[rest]
             if not len(active):
                 break
-        step = _step(normal, gradient, free, damping[active], scale[active])
+        step = _step(normal, gradient, free, damped[active], scale[active])
         stretch = _stretch(step, last[active], scale[active]) * plain[active]
         step *= np.maximum(stretch, 1.0)[:, None]
         step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
@@ -177,7 +180,7 @@ def minimise(
         tried = ~good & (stretch > 1)  # in vain, which says nothing of the step itself
         stuck[active] = ~good & ~tried & (hoped <= STILL * found.ssq[active])
         factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), np.where(tried, 1.0, raised[active]))
-        damping[active] = np.clip(damping[active] * factor, 1e-12, None)
+        damped[active] = np.clip(damped[active] * factor, 1e-12, None)
         raised[active] = np.where(good | tried, 2.0, np.minimum(2 * raised[active], MOST_RAISED))
         last[active], plain[active] = trial - z, good & (stretch <= 1)
         better = active[good]

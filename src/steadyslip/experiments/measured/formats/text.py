@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
 from steadyslip.experiments.measured.formats.moments import day, moment
+from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, either, marks_of, number
 from steadyslip.experiments.measured.formats.table import MISSING, Table, check_size, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
 from steadyslip.files.inputs import read_bytes
@@ -22,7 +24,8 @@ MOST_TEXT = 2**30  # bytes of a file
 MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines that are looked at one by one; characters of one
 UTF16 = (b"\xff\xfe", b"\xfe\xff")  # how texts begin that are written so, such as Excel's "Unicode text"
 LARGE, LOOKED_AT = 2**20, 2**17  # bytes beyond which NumPy is tried first; from which it learns the columns
-_FORTRAN = re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+$")
+_QUOTED = re.compile(r'"[^"]*"')
+_SPLIT_THOUSANDS = re.compile(r"(^|,)[-+]?\d{1,3},\d{3}(\.\d*)?(,|$)")
 _BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 
 
@@ -58,9 +61,8 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
             "Parquet"
         )
     layout = _layout(path, text)
-    notes += layout.notes
-    values, lines, faults = _numbers(layout.body, layout.delimiter, layout.comma, layout.names)
-    table = Table(layout.names, values, lines, layout.units, notes)
+    values, lines, faults, more = _numbers(path, layout)
+    table = Table(layout.names, values, lines, layout.units, [*notes, *more])
     if len(lines):
         _count_all_moments(table, layout)
     if faults and not skip_bad_lines:
@@ -69,7 +71,7 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
         raise ParameterError([*faults[:SHOWN], *more, advice], title=str(path))
     if faults:
         shown = ", ".join(str(f.line) for f in faults[:SHOWN])
-        notes.append(f"{len(faults)} damaged lines left out: {shown}{', ...' if len(faults) > SHOWN else ''}")
+        table.notes.append(f"{len(faults)} damaged lines left out: {shown}{', ...' if len(faults) > SHOWN else ''}")
     return table
 
 
@@ -100,11 +102,9 @@ class _Layout:
     names: list[str]
     units: list[str | None]
     delimiter: str | None
-    comma: bool
     moments: tuple[int, ...]
     days: tuple[int, ...]
     body: list[tuple[int, str]]
-    notes: list[str]
 
 
 def _layout(path: Path, text: str) -> _Layout:
@@ -113,17 +113,33 @@ def _layout(path: Path, text: str) -> _Layout:
     rows = [(i, line) for i, line in numbered if line.lstrip()[:1] not in ("#", "%")]
     if not rows:
         raise NotAvailable(f"{str(path)!r} has no lines of numbers in it")
-    delimiter, comma = _format(rows)
-    header, body = _header(rows, delimiter, comma)
+    delimiter = _delimiter(rows)
+    header, body = _header(rows, delimiter)
     if not body:
         raise NotAvailable(f"{str(path)!r} has no lines of numbers in it; it begins with {rows[0][1][:60]!r}")
     count = _usual_count(body, delimiter)
     names, units = _names(header, comments, body[0][0], delimiter, count)
+    _check_split(path, header, body, delimiter, count)
     cells = _cells(body[0][1], delimiter)[: len(names)]
     moments = tuple(k for k, cell in enumerate(cells) if _is_moment(cell.strip('"')))
     days = tuple(k for k in moments if day(cells[k].strip('"')) is not None)
-    notes = ["numbers are written with a decimal comma"] if comma else []
-    return _Layout(names, units, delimiter, comma, moments, days, body, notes)
+    return _Layout(names, units, delimiter, moments, days, body)
+
+
+def _check_split(
+    path: Path, header: list[tuple[int, str]], body: list[tuple[int, str]], delimiter: str | None, count: int
+) -> None:
+    """Refuse numbers such as 1,234.5 that are torn where commas separate columns."""
+    named = max((len(_cells(line, delimiter)) for _, line in header), default=count)
+    if delimiter != "," or not 1 < named < count:
+        return
+    torn = next(((i, line) for i, line in body[:200] if _SPLIT_THOUSANDS.search(line)), None)
+    if torn is not None:
+        message = (
+            f"{count} numbers below {named} names: {_cut(torn[1])}; do commas divide thousands as well as columns? Set such "
+            "numbers in quotes, or separate columns by semicolons or tabs"
+        )  # fmt: skip
+        raise ParameterError([Problem("file", message, torn[0])], title=str(path))
 
 
 def _is_moment(cell: str) -> bool:
@@ -140,11 +156,16 @@ def _plain(path: Path, raw: bytes) -> Table | None:
     except NotAvailable:  # no numbers so far
         return None
     first = layout.body[0][0]
-    if layout.comma or layout.moments:
+    if layout.moments or layout.delimiter == "|":
         return None
     start = 0
     for _ in range(first - 1):
         start = raw.index(b"\n", start) + 1
+    if layout.delimiter != "," and b"," in raw[start:]:
+        if b"." in raw[start:]:
+            return None
+        raw = raw[:start] + raw[start:].replace(b",", b".")
+        notes.append("numbers are written with a decimal comma")
     check_size(path, (raw.count(b"\n", start) + 1) * len(layout.names))
     try:
         values = np.loadtxt(
@@ -156,57 +177,62 @@ def _plain(path: Path, raw: bytes) -> Table | None:
         return None
     values[~np.isfinite(values)] = np.nan
     lines = np.arange(first, first + len(values))
-    return Table(layout.names, np.ascontiguousarray(values.T), lines, layout.units, [*notes, *layout.notes])
+    return Table(layout.names, np.ascontiguousarray(values.T), lines, layout.units, notes)
 
 
-def _format(rows: list[tuple[int, str]]) -> tuple[str | None, bool]:
-    """Delimiter (None: blanks) and whether numbers have a decimal comma."""
-    sample = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
-    for mark in ("\t", ";"):
+def _delimiter(rows: list[tuple[int, str]]) -> str | None:
+    """What separates columns; None if blanks do."""
+    sample = [_QUOTED.sub("0", line) for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
+    for mark in ("\t", ";", "|"):
         if all(mark in line for line in sample):
-            return mark, any(re.search(r"\d,\d", line) for line in sample)
-    if all("," in line for line in sample):
-        cells = [line.split(",") for line in sample]
-        if all(_number(c, False) is not None or c.strip().lower() in MISSING for row in cells for c in row):
-            return ",", False
-        if all(
-            re.fullmatch(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?(\s+[-+]?\d+(,\d+)?([eE][-+]?\d+)?)+\s*", x) for x in sample
-        ):
-            return None, True
-        return ",", False
-    return None, False
+            return mark
+    if not all("," in line for line in sample):
+        return None
+    if all(_value(cell, POINT) is not None and " " not in cell.strip() for line in sample for cell in line.split(",")):
+        return ","
+    rows_of_blanks = [line.split() for line in sample]
+    for decimal in (COMMA, POINT):
+        if all(len(cells) > 1 and all(_tells(cell, decimal) for cell in cells) for cells in rows_of_blanks):
+            return None
+    return ","
+
+
+def _tells(cell: str, mark: str) -> bool:
+    """Whether a cell is a number with this decimal mark, and no comma ends it."""
+    return number(cell, mark) is not None and not cell.endswith(COMMA)
 
 
 def _cells(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return line.split()
-    cells = [cell.strip() for cell in line.rstrip("\r\n").split(delimiter)]
+    line = line.rstrip("\r\n")
+    if delimiter == "|":
+        line = line.strip().strip("|")
+    found = next(csv.reader([line.strip()], delimiter=delimiter)) if '"' in line else line.split(delimiter)
+    cells = [cell.strip() for cell in found]
     if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
         while len(cells) > 1 and cells[-1] == "":
             cells.pop()  # trailing delimiters
     return cells
 
 
-def _number(cell: str, comma: bool) -> float | None:
-    """The number in a cell; NaN for an empty one, None for anything else."""
+def _value(cell: str, mark: str) -> float | None:
+    """The number or the moment in a cell; NaN for an empty one, None for anything else."""
+    found = number(cell, mark)
+    return _moment(cell) if found is None else found
+
+
+def _moment(cell: str) -> float | None:
     plain = cell.strip().strip('"')
-    if plain.lower() in MISSING:
-        return float("nan")
-    try:
-        return float(plain.replace(",", ".") if comma else plain)
-    except ValueError:
-        if _FORTRAN.match(plain):
-            return float(re.sub("[dD]", "e", plain))
-        return moment(plain) if (date := day(plain)) is None else date
+    return moment(plain) if (date := day(plain)) is None else date
 
 
 def _header(
-    rows: list[tuple[int, str]], delimiter: str | None, comma: bool
+    rows: list[tuple[int, str]], delimiter: str | None
 ) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
     """Lines before the first that holds numbers only, and the rest."""
     for place, (_, line) in enumerate(rows):
-        cells = _cells(line, delimiter)
-        numbers = [_number(cell, comma) for cell in cells]
+        numbers = [either(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)]
         if all(n is not None for n in numbers) and any(n == n for n in numbers):
             return rows[:place], rows[place:]
     return rows, []
@@ -227,7 +253,11 @@ def _names(
 
 
 def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
-    """Cells of a header, which may be separated otherwise than the numbers."""
+    """Cells of a header, which may be separated otherwise than the numbers; none of a line that is drawn."""
+    if delimiter == "|":
+        line = line.strip().strip("|")
+    if not re.search(r"[^-=+|:\s]", line):
+        return []
     marks = [re.escape(delimiter)] if delimiter else []
     for pattern in [*marks, r"\t", r"\s{2,}", ",", ";", r"\s+(?![\[\(])", r"\s+"]:
         cells = [cell.strip().strip('"').strip() for cell in re.split(pattern, line.strip())]
@@ -238,33 +268,54 @@ def _header_cells(line: str, delimiter: str | None, count: int) -> list[str]:
     return []
 
 
-def _numbers(
-    body: list[tuple[int, str]], delimiter: str | None, comma: bool, names: list[str]
-) -> tuple[Array, Array, list[Problem]]:
-    """All numbers, their lines, and the lines that are damaged."""
-    count = len(names)
+def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], list[str]]:
+    """All numbers, their lines, the lines that are damaged, and notes."""
+    count = len(layout.names)
     lines, table, faults = [], [], []
-    for number, line in body:
-        cells = _cells(line, delimiter)
-        if len(cells) != count:
-            faults.append(Problem("file", f"{_counted(len(cells))} where {count} are expected: {_cut(line)}", number))
+    for line_number, line in layout.body:
+        cells = _cells(line, layout.delimiter)
+        if len(cells) == count:
+            lines.append(line_number)
+            table.append(cells)
             continue
+        message = f"{_counted(len(cells))} where {count} are expected: {_cut(line)}"
+        if layout.delimiter is None and "," in line:
+            message += "; do blanks divide thousands as well as columns? Separate columns by semicolons or tabs"
+        faults.append(Problem("file", message, line_number))
+    marks, notes = [POINT] * count, list[str]()
+    if (layout.delimiter != "," or any('"' in line for _, line in layout.body)) and any(
+        COMMA in cell for cells in table for cell in cells
+    ):
+        plain = [[] if k in layout.moments else [cells[k] for cells in table] for k in range(count)]
+        marks, notes, fault = marks_of(layout.names, plain)
+        if fault is not None:
+            raise ParameterError([Problem("file", fault)], title=str(path))
+    values, kept = [], []
+    for line_number, cells in zip(lines, table, strict=True):
+        row, fault = _row(cells, marks, layout.names)
+        if fault is None:
+            values.append(row)
+            kept.append(line_number)
+        else:
+            faults.append(Problem("file", fault, line_number))
+    faults.sort(key=lambda problem: problem.line or 0)
+    return np.array(values, dtype=float).reshape(-1, count).T.copy(), np.array(kept, dtype=int), faults, notes
+
+
+def _row(cells: list[str], marks: list[str], names: list[str]) -> tuple[list[float], str | None]:
+    """The numbers of a line, and what is wrong with it."""
+    if COMMA not in marks:
         try:
-            row = [float(cell) for cell in cells]
+            return [float(cell) for cell in cells], None
         except ValueError:
-            row = []
-            for name, cell in zip(names, cells, strict=True):
-                value = _number(cell, comma)
-                if value is None:
-                    fault = f"{cell!r} in column {name!r} is not a plain number" + _hint(cell)
-                    faults.append(Problem("file", fault, number))
-                    break
-                row.append(value)
-            if len(row) < count:
-                continue
-        lines.append(number)
-        table.append(row)
-    return np.array(table, dtype=float).reshape(-1, count).T.copy(), np.array(lines, dtype=int), faults
+            pass
+    row = []
+    for name, cell, mark in zip(names, cells, marks, strict=True):
+        value = _value(cell, mark)
+        if value is None:
+            return [], f"{cell!r} in column {name!r} is not a plain number" + _hint(cell)
+        row.append(value)
+    return row, None
 
 
 def _counted(count: int) -> str:

@@ -1,0 +1,114 @@
+"""How numbers are written: with a decimal point or comma, and with marks between their thousands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from steadyslip.experiments.measured.formats.table import MISSING
+
+POINT, COMMA = ".", ","
+_GROUPED = {
+    mark: re.compile(
+        rf"[-+]?\d{{1,3}}([{other}'’ \u00a0\u2009\u202f])\d{{3}}(\1\d{{3}})*({re.escape(mark)}\d*)?([eE][-+]?\d+)?"
+    )
+    for mark, other in ((POINT, COMMA), (COMMA, POINT))
+}
+_UNCLEAR = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
+_FORTRAN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[dD][-+]?\d+")
+
+
+def number(cell: str, mark: str) -> float | None:
+    """The number in a cell with this decimal mark; NaN for an empty one, None for anything else.
+
+    >>> number("1,234.5", "."), number("1.234,5", ","), number("1 234", "."), number("1.2.3", "."), number("1d3", ".")
+    (1234.5, 1234.5, 1234.0, None, 1000.0)
+    """
+    plain = cell.strip().strip('"').strip()
+    if plain.lower() in MISSING:
+        return float("nan")
+    other = COMMA if mark == POINT else POINT
+    if other in plain or (found := _float(plain.replace(mark, POINT))) is None:
+        if not (grouped := _GROUPED[mark].fullmatch(plain)):
+            return None
+        found = _float(plain.replace(grouped[1], "").replace(mark, POINT))
+    return found
+
+
+def _float(text: str) -> float | None:
+    if "_" in text:  # Python's own thousands separator
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return float(re.sub("[dD]", "e", text)) if _FORTRAN.fullmatch(text) else None
+
+
+def either(cell: str) -> float | None:
+    """The number in a cell with whichever decimal mark makes it one; None if neither does."""
+    found = number(cell, POINT)
+    return number(cell, COMMA) if found is None else found
+
+
+def sure_mark(cell: str) -> str | None:
+    """The decimal mark of a cell that tells it; None of one that does not, such as 12, or 1,234.
+
+    >>> [sure_mark(text) for text in ("0.61", "12,5", "1.234,5", "1,234,567", "1,234", "12")]
+    ['.', ',', ',', '.', None, None]
+    """
+    points, commas = cell.count(POINT), cell.count(COMMA)
+    if not points + commas or either(cell) is None:
+        return None
+    if points and commas:
+        return POINT if cell.rfind(POINT) > cell.rfind(COMMA) else COMMA
+    if points + commas > 1:
+        return COMMA if points else POINT
+    if _UNCLEAR.fullmatch(cell.strip().strip('"')):
+        return None
+    return POINT if points else COMMA
+
+
+def marks_of(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tuple[list[str], list[str], str | None]:
+    """The decimal mark of each column, as its own numbers tell it, or else those of the others.
+
+    Returns
+    -------
+    marks : list of str
+    notes : list of str
+    fault : str or None
+        What cannot be told.
+    """
+    found: list[dict[str, str]] = []  # a number for each mark
+    unclear: list[tuple[int, str]] = []
+    grouped: list[tuple[int, str]] = []
+    for k, cells in enumerate(columns):
+        marked = [cell for cell in cells if POINT in cell or COMMA in cell]
+        found.append({mark: cell for cell in marked if (mark := sure_mark(cell)) is not None})
+        vague = next((cell for cell in marked if _UNCLEAR.fullmatch(cell.strip().strip('"'))), None)
+        if vague is not None and not found[-1]:
+            unclear.append((k, vague))
+        split = next((c for c in marked if _GROUPED[POINT].fullmatch(c) or _GROUPED[COMMA].fullmatch(c)), None)
+        if split is not None:
+            grouped.append((k, split))
+    everywhere = set().union(*found)
+    usual = COMMA if COMMA in everywhere else POINT
+    if not everywhere and unclear:  # nothing but such as 1,234: with three decimals
+        everywhere = {POINT if POINT in cell else COMMA for _, cell in unclear}
+        usual = next(iter(everywhere))
+    if unclear and len(everywhere) > 1:
+        k, cell = unclear[0]
+        return [], [], (
+            f"{cell!r} in column {names[k]!r}: does the mark divide thousands, or is it decimal? Other numbers of the file "
+            "have a decimal point, others a decimal comma; write all numbers alike"
+        )  # fmt: skip
+    for k, both in enumerate(found):
+        if len(both) > 1:
+            pair = f"{both[POINT]!r} has a decimal point and {both[COMMA]!r} a decimal comma"
+            return [], [], f"column {names[k]!r}: {pair}; write all numbers alike"
+    marks = [next(iter(both), usual) for both in found]
+    notes = ["numbers are written with a decimal comma"] if COMMA in marks and COMMA in everywhere else []
+    wide = [(k, cell) for k, cell in grouped if number(cell, marks[k]) != _float(cell.replace(marks[k], POINT))]
+    if wide:
+        k, cell = wide[0]
+        notes.append(f"thousands are set off in column {names[k]!r}: {cell!r} is read as {number(cell, marks[k]):.15g}")
+    return marks, notes, None

@@ -13,7 +13,7 @@ import steadyslip as ss
 from rigs_of_theory import rig
 from steadyslip import cli, reproduce as reproducing
 from steadyslip.experiments.answers import laws, predict as predicting, uncertainty
-from steadyslip.experiments.fitting import forward
+from steadyslip.experiments.fitting import forward, search
 from steadyslip.maps.sensitivity import LEAST
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
@@ -45,6 +45,7 @@ def once_more(function, times):
 
 
 def test_half_of_the_runs_of_a_fit_are_no_fit(monkeypatch):
+    monkeypatch.setattr(search, "FIRST", 16)  # more than one thread runs at once
     monkeypatch.setattr(forward, "run_many", lambda *arguments, **options: False)  # as it answers Ctrl-C
     with pytest.raises(KeyboardInterrupt):
         ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, 0))

@@ -208,7 +208,7 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
     line = line.rstrip("\r\n")
     if delimiter == "|":
         line = line.strip().strip("|")
-    found = next(csv.reader([line.strip()], delimiter=delimiter)) if '"' in line else line.split(delimiter)
+    found = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True)) if '"' in line else line.split(delimiter)
     cells = [cell.strip() for cell in found]
     if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
         while len(cells) > 1 and cells[-1] == "":

@@ -552,5 +552,7 @@ def test_numbers_that_could_be_either_are_refused(tmp_path, change, told):
         ss.read_record(tmp_path / "r.txt")
     rows = [f"{t},0;{1.5 + 0.001 * t:.3f};0,6" for t in range(10, 40)]
     (tmp_path / "vague.txt").write_text("\n".join(["Time (s);Displacement (um);Friction", *rows, "40.5;1.540;0,6"]))
-    with pytest.raises(ss.ParameterError, match="'1.510' in column .Displacement .*divide thousands, or is it decimal"):
+    with pytest.raises(
+        ss.ParameterError, match=r"'1\.510' in column .Displacement .*divide thousands, or is it decimal"
+    ):
         ss.read_record(tmp_path / "vague.txt")

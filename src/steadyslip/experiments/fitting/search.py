@@ -80,8 +80,8 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
     """The best minimum, and how it was found.
 
     A few of the starts are tried first, then a third. The others follow unless these agree and leave nothing but white
-    noise, and then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it also starts
-    from where these end. When the work that its own search may be is done, it goes on with the best that it has; what
+    noise, and then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it
+    also starts from where these end. When the work that its own search may be is done, it goes on with the best that it has; what
     a simpler model may be is what it may be alone, so that it ends at the same place.
 
     Raises
@@ -183,9 +183,7 @@ class _Search:
     def try_starts(self, upto: int) -> None:
         """Starts up to a number of them, on few samples."""
         already = len(self.rough.ssq)
-        begin = starting_points(
-            self.whole.parts, self.told_by_records, self.whole.space, upto - already, already
-        )
+        begin = starting_points(self.whole.parts, self.told_by_records, self.whole.space, upto - already, already)
         self.enough = self.stages[0]
         self.rough = self.rough + minimise(
             lambda z, _: self.quick.residuals(z), begin, self.low, self.high, most=ROUGH, tolerance=1e-4,

@@ -98,8 +98,8 @@ def marks_of(names: Sequence[str], columns: Iterable[Iterable[str]]) -> tuple[li
     if unclear and len(everywhere) > 1:
         k, cell = unclear[0]
         return [], [], (
-            f"{cell!r} in column {names[k]!r}: does the mark divide thousands, or is it decimal? Other numbers of the file "
-            "have a decimal point, others a decimal comma; write all numbers alike"
+            f"{cell!r} in column {names[k]!r}: does the mark divide thousands, or is it decimal? Other numbers of the "
+            "file have a decimal point, others a decimal comma; write all numbers alike"
         )  # fmt: skip
     for k, both in enumerate(found):
         if len(both) > 1:

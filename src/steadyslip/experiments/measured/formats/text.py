@@ -14,7 +14,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
 from steadyslip.experiments.measured.formats.moments import day, moment
 from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, either, marks_of, number
-from steadyslip.experiments.measured.formats.table import MISSING, Table, check_size, count_moments, names_and_units
+from steadyslip.experiments.measured.formats.table import Table, check_size, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
 from steadyslip.files.inputs import read_bytes
 
@@ -66,9 +66,9 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
     if len(lines):
         _count_all_moments(table, layout)
     if faults and not skip_bad_lines:
-        more = [Problem("file", f"... and {len(faults) - SHOWN} more such lines")] if len(faults) > SHOWN else []
+        rest = [Problem("file", f"... and {len(faults) - SHOWN} more such lines")] if len(faults) > SHOWN else []
         advice = Problem("file", "mend these lines, or leave them out with skip_bad_lines (--skip-bad-lines)")
-        raise ParameterError([*faults[:SHOWN], *more, advice], title=str(path))
+        raise ParameterError([*faults[:SHOWN], *rest, advice], title=str(path))
     if faults:
         shown = ", ".join(str(f.line) for f in faults[:SHOWN])
         table.notes.append(f"{len(faults)} damaged lines left out: {shown}{', ...' if len(faults) > SHOWN else ''}")
@@ -208,7 +208,11 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
     line = line.rstrip("\r\n")
     if delimiter == "|":
         line = line.strip().strip("|")
-    found = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True)) if '"' in line else line.split(delimiter)
+    found = (
+        next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True))
+        if '"' in line
+        else line.split(delimiter)
+    )
     cells = [cell.strip() for cell in found]
     if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
         while len(cells) > 1 and cells[-1] == "":
@@ -227,9 +231,7 @@ def _moment(cell: str) -> float | None:
     return moment(plain) if (date := day(plain)) is None else date
 
 
-def _header(
-    rows: list[tuple[int, str]], delimiter: str | None
-) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
+def _header(rows: list[tuple[int, str]], delimiter: str | None) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
     """Lines before the first that holds numbers only, and the rest."""
     for place, (_, line) in enumerate(rows):
         numbers = [either(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)]

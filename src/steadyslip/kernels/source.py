@@ -104,8 +104,8 @@ class Constants:
         if (size, count) != (len(self.symbols), len(self.rates)):
             order = {symbol: i for i, symbol in enumerate(self.symbols.values())}
             size, count = len(self.symbols), len(self.rates)
-            rows = [(place, direction, order[constant])
-                    for place, (constant, direction) in enumerate(self.rates, start=size) if constant in order]  # fmt: skip
+            known = enumerate(self.rates, start=size)
+            rows = [(place, direction, order[one]) for place, (one, direction) in known if one in order]
             found = np.array(rows, dtype=int).reshape(-1, 3).T
             self._rated = size, count, found
         return found

@@ -205,7 +205,7 @@ class Forward:
     def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
         """Rows of settings, absolute tolerances of state and sensitivities last."""
         reduction = self.program.reduction
-        scales, unknown = natural_scales(values, reduction)
+        scales, (unknown, *_) = natural_scales(values, reduction)
         size = len(reduction.names)
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
         settings[:, Setting.RTOL] = self.rtol

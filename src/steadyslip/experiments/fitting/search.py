@@ -81,8 +81,8 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
 
     A few of the starts are tried first, then a third. The others follow unless these agree and leave nothing but white
     noise, and then more, as long as hardly any lead to the best minimum. Where the model contains simpler ones, it
-    also starts from where these end. When the work that its own search may be is done, it goes on with the best that it has; what
-    a simpler model may be is what it may be alone, so that it ends at the same place.
+    also starts from where these end. When the work that its own search may be is done, it goes on with the best that
+    it has; what a simpler model may be is what it may be alone, so that it ends at the same place.
 
     Raises
     ------

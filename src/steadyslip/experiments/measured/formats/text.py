@@ -136,8 +136,8 @@ def _check_split(
     torn = next(((i, line) for i, line in body[:200] if _SPLIT_THOUSANDS.search(line)), None)
     if torn is not None:
         message = (
-            f"{count} numbers below {named} names: {_cut(torn[1])}; do commas divide thousands as well as columns? Set such "
-            "numbers in quotes, or separate columns by semicolons or tabs"
+            f"{count} numbers below {named} names: {_cut(torn[1])}; do commas divide thousands as well as columns? Set "
+            "such numbers in quotes, or separate columns by semicolons or tabs"
         )  # fmt: skip
         raise ParameterError([Problem("file", message, torn[0])], title=str(path))
 
@@ -208,11 +208,9 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
     line = line.rstrip("\r\n")
     if delimiter == "|":
         line = line.strip().strip("|")
-    found = (
-        next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True))
-        if '"' in line
-        else line.split(delimiter)
-    )
+    found = line.split(delimiter)
+    if '"' in line:
+        found = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True))
     cells = [cell.strip() for cell in found]
     if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
         while len(cells) > 1 and cells[-1] == "":

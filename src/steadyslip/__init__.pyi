@@ -165,6 +165,7 @@ from .maps import (
     Map as Map,
     MapResult as MapResult,
     Measure as Measure,
+    OnsetKind as OnsetKind,
     Refined as Refined,
     SafetyFactor as SafetyFactor,
     Samples as Samples,

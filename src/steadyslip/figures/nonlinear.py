@@ -115,7 +115,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     factors, names = [], []
     for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
-        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.area)
+        factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.area_of(name))
         factors.append(factor)
         names.append(labelled(name.rpartition(".")[2].replace("_", " "), shown_unit))
     x, y = curve.first / factors[0], curve.second / factors[1]

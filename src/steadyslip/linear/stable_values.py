@@ -102,7 +102,7 @@ def stable_intervals(point: OperatingPoint, name: str) -> Array:
     def kernel(part: OperatingPoint) -> Array:
         found = np.full((*part.shape, most, 2), np.nan)
         if not part.model.delays:
-            inner = _linear_sets(part, name)
+            inner = linear_sets(part, name).intervals
             found[..., : inner.shape[-2], :] = inner
             return found
         flat = found.reshape(-1, most, 2)
@@ -127,8 +127,14 @@ def nearest_value(intervals: Array, own: Any) -> Array:
     return np.take_along_axis(ends, np.argmin(distance, axis=-1)[..., None], axis=-1)[..., 0]
 
 
-def _linear_sets(point: OperatingPoint, name: str) -> Array:
-    """Intervals for arrays of rigs without delay."""
+def linear_sets(point: OperatingPoint, name: str) -> StableSet:
+    """The stable sets of one parameter for arrays of rigs without delay, whatever value of it these have.
+
+    Raises
+    ------
+    NotAvailable
+        If it does not enter linearly.
+    """
     place = list(point.model.parameters).index(name)
     own = np.broadcast_to(np.asarray(point.arguments[place], dtype=float), point.shape)
     size = np.where(own > 0, own, 1.0)
@@ -140,7 +146,9 @@ def _linear_sets(point: OperatingPoint, name: str) -> Array:
     p, q, bent = _split(c)
     if np.any(known & (bent | ~np.any(q, axis=-1))):
         raise _not_linear(name)
-    return np.where(known[..., None, None], stable_set(p, q).intervals * size[..., None, None], np.nan)
+    found, unit = stable_set(p, q), size[..., None]
+    intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
+    return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
 
 
 def _split(c: Array) -> tuple[Array, Array, Array]:

@@ -7,7 +7,7 @@ Store -> MapResult -> files (export), figures, refine
 from __future__ import annotations
 
 from steadyslip.maps.plan.axes import Grid, Samples
-from steadyslip.maps.plan.edges import Edge, LogMargin, SafetyFactor, StableValues
+from steadyslip.maps.plan.edges import Edge, LogMargin, OnsetKind, SafetyFactor, StableValues
 from steadyslip.maps.plan.map import Map
 from steadyslip.maps.plan.measures import Events, KickThreshold, Measure, measure
 from steadyslip.maps.plan.spec import map_from_text, read_map
@@ -25,6 +25,7 @@ __all__ = [
     "Map",
     "MapResult",
     "Measure",
+    "OnsetKind",
     "Refined",
     "SafetyFactor",
     "Samples",

@@ -1,8 +1,8 @@
 """Second and third derivatives of a Model at steady sliding, exact and symbolic.
 
-The Model is taken as it stands: variables, unknown and the stresses T, τ, σ are all unknowns of one system
-M Y' = F(Y), whose last rows (balance and definitions) have no derivative. Every equation then stays short and so
-do its derivatives; nothing has to be solved for first.
+The Model is taken as it stands: variables, unknowns of contacts and coordinates, velocities of slip and the stresses
+T, τ, σ are all unknowns of one system M Y' = F(Y), whose last rows (balances and definitions) have no derivative. Every
+equation then stays short and so do its derivatives; nothing has to be solved for first, bodies without mass included.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
@@ -33,7 +34,7 @@ class System:
     Attributes
     ----------
     unknowns : tuple of sympy.Symbol
-        Variables, then the algebraic unknown, T, τ and σ.
+        Variables, then the algebraic unknowns of contacts and coordinates, velocities of slip, T, τ and σ.
     dynamic : int
         How many of them have a time derivative (the first ones).
     entries : tuple of (Index, ...)
@@ -53,10 +54,22 @@ class System:
 
 @question
 def system(model: Model) -> System:
-    """Differentiate a model three times at steady sliding."""
+    """Differentiate a model three times at steady sliding.
+
+    Raises
+    ------
+    NotAvailable
+        If there are delays.
+    """
+    if model.delays:
+        raise NotAvailable("the kind of an onset is not offered with a delay")
     variables = [item.symbol for item in model.variables]
-    unknowns = [*variables, *(contact.unknown for contact in model.contacts), *model.definitions]
-    equations = [*model.rates, *(contact.balance for contact in model.contacts)]
+    balances = {contact.unknown: contact.balance for contact in model.contacts}
+    for one in model.coordinates:
+        if one.balance is not None:
+            balances[one.acceleration if one.inertial else one.velocity] = one.balance
+    unknowns = [*variables, *balances, *model.definitions]
+    equations = [*model.rates, *balances.values()]
     equations += [definition - symbol for symbol, definition in model.definitions.items()]
     inputs = {model.inputs[name]: model.steady[model.inputs[name]] for name in model.inputs if name != "time"}
     entries: tuple[list[Index], ...] = ([], [], [])
@@ -122,7 +135,8 @@ def _arrangements(i: int, j: int, k: int) -> tuple[Index, ...]:
 def taylor(point: OperatingPoint) -> Taylor:
     """Derivatives of every rig of an operating point (flat arrays) in its steady sliding."""
     found = system(point.model)
-    numbers = found.function(*map(np.asarray, point.arguments), point.stresses)
+    stresses = [np.atleast_1d(np.asarray(sigma, dtype=float)) for sigma in point.sigmas]
+    numbers = found.function(*map(np.asarray, point.arguments), *stresses)
     size = max([1, *(np.size(x) for x in numbers)])
     columns = [np.broadcast_to(np.asarray(x, dtype=float), (size,)) for x in numbers]
     n = len(found.unknowns)

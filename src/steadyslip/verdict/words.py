@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
+from steadyslip.machine.slider import Slider
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 from steadyslip.verdict.holding import gain_words, holding
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
-    from steadyslip.machine.slider import Slider
     from steadyslip.nonlinear.kicks.threshold import Threshold
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings, Verdict
@@ -162,7 +162,9 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
 def _onset(onset: Onset) -> str:
     """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
-    if onset.along == onset.rig.gain_name():
+    if not isinstance(onset.rig, Slider):
+        text = text.replace("edge in stiffness", f"edge in {onset.along}")
+    elif onset.along == onset.rig.gain_name():
         text = text.replace("edge in stiffness", f"edge in the {gain_words(onset.along)}")
     own = onset.rig.parameters()[onset.along].value
     if onset.kind != "subcritical" or own is None:

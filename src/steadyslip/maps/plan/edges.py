@@ -18,8 +18,9 @@ from steadyslip.linear.stable_values import most_values, nearest_value, stable_i
 from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan.measures import Measure, Output, Vary, block_of
+from steadyslip.maps.plan.measures import ONSET, Measure, Output, Vary, block_of
 from steadyslip.model.point import operating_point
+from steadyslip.nonlinear.onset.hopf import onset_map, parameter_along
 from steadyslip.protocol import Protocol
 
 
@@ -172,3 +173,36 @@ class LogMargin(SafetyFactor, name="margin"):
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         with np.errstate(all="ignore"):
             return {"margin": np.log(self.factor(rig, vary))}
+
+
+class OnsetKind(Along, name="onset"):
+    """Kind of onset at the nearest oscillatory edge in stiffness, or in another parameter; see `steadyslip.hopf`."""
+
+    def name_of(self, rig: Slider | Machine) -> str:
+        return parameter_along(rig, self.along or "slider.stiffness")
+
+    def is_own(self, rig: Slider | Machine) -> bool:
+        return self.along is None and not isinstance(rig, Machine)
+
+    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        full = self.name_of(rig)
+        edge = "stiffness" if self.is_own(rig) else full
+        return (
+            Output("onset", "1", "kind of onset", ONSET),
+            Output("onset_edge", "Pa/m" if self.is_own(rig) else self.unit(rig)[1], f"{edge} at the oscillatory edge"),
+            Output("onset_coefficient", "1/s", "cubic coefficient of the onset"),
+        )
+
+    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
+        found = onset_map(rig, vary, self.name_of(rig))
+        edge = found["edge"] * (1.0 if self.is_own(rig) else self.unit(rig)[0])
+        return {"onset": found["kind"], "onset_edge": edge, "onset_coefficient": found["coefficient"]}
+
+    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
+        if operating_point(rig).model.delays:
+            yield Problem("", "is not offered with a delay")
+            return
+        yield from super().problems(rig, protocol)
+
+    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
+        return 1e-4

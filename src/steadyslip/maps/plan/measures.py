@@ -32,7 +32,6 @@ from steadyslip.motion.many import event_names, event_unit
 from steadyslip.motion.status import WORDS
 from steadyslip.nonlinear.kicks.brackets import BEYOND, threshold_brackets
 from steadyslip.nonlinear.kicks.kicks import KICKS
-from steadyslip.nonlinear.onset.hopf import onset_map
 from steadyslip.protocol import Protocol
 
 Vary = Mapping[str, Any]
@@ -165,30 +164,6 @@ class StabilityStatus(Measure, name="status"):
         values = operating_point(rig, vary)
         found = [np.broadcast_to(status(part), part.shape).reshape(-1) for part in values.pieces(32768)]
         return {"status": np.concatenate(found).reshape(values.shape)}
-
-
-class OnsetKind(Measure, name="onset"):
-    """Kind of onset at the oscillatory edge in stiffness nearest to the rig's own; see `steadyslip.hopf`."""
-
-    def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        return (
-            Output("onset", "1", "kind of onset", ONSET),
-            Output("onset_edge", "Pa/m", "stiffness at the oscillatory edge"),
-            Output("onset_coefficient", "1/s", "cubic coefficient of the onset"),
-        )
-
-    def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        found = onset_map(block_of(rig), vary)
-        return {
-            "onset": found["kind"], "onset_edge": found["edge"], "onset_coefficient": found["coefficient"]
-        }  # fmt: skip
-
-    def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
-        if isinstance(rig, Machine):
-            yield Problem("", "is not offered for machines yet")
-
-    def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
-        return 1e-4
 
 
 small = Domain(0, 0.1, False, True, "a number > 0 and <= 0.1")

@@ -1,6 +1,7 @@
 """The kind of onset: what small oscillations near an edge of stability do.
 
-At an oscillatory edge the amplitude ρ of ln(v/v0) obeys, to lowest order,
+At an oscillatory edge the amplitude ρ of ln(v/v0), of a machine at the contact where it is largest, obeys to lowest
+order
 
     ρ' = Re(dλ/dp) (p − p_edge) ρ + c1 ρ³
 
@@ -12,7 +13,7 @@ c1 is local: it says nothing about large kicks.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,9 @@ from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.polynomials import quietly, stable_set
 from steadyslip.linear.search import Boundary
+from steadyslip.linear.stable_values import linear_sets
 from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, require_range
@@ -41,7 +44,7 @@ class Onset(Displayed):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     along : str
         The parameter that is varied.
     value : float
@@ -50,7 +53,7 @@ class Onset(Displayed):
     kind : str
         ``supercritical``, ``subcritical`` or ``degenerate``.
     coefficient : float
-        c1, growth rate of amplitude per squared amplitude of ln v, 1/s.
+        c1, growth rate of amplitude per squared amplitude of ln v, 1/s; of a machine that at `contact`.
     share : float
         |c1| as a share of the terms that it is the sum of; below 1e-9 it is zero to within rounding: degenerate.
     angular_frequency : float
@@ -58,12 +61,16 @@ class Onset(Displayed):
     growth_slope : float
         Re(dλ/dp), 1/s per unit of the parameter.
     stress_ratio : float
-        Amplitude of the spring stress (Pa) for unit amplitude of ln v.
+        Amplitude of the spring stress (Pa) for unit amplitude of ln v; of a machine of the pull at `contact` (N).
     stable : str
         ``above`` or ``below``: the side of the edge on which sliding is stable.
+    contact : str
+        Of a machine: where slip oscillates most, as a share of its velocity; else empty.
+    shares : dict of str to float
+        Of a machine, by contact: amplitude of ln v over that at `contact`.
     """
 
-    rig: Slider
+    rig: Slider | Machine
     along: str
     value: float
     unit: str
@@ -74,6 +81,8 @@ class Onset(Displayed):
     growth_slope: float
     stress_ratio: float
     stable: str
+    contact: str = ""
+    shares: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def normalised(self) -> float:
@@ -101,7 +110,7 @@ class Onset(Displayed):
         return own is not None and bool(self.velocity_amplitude(own) < 1.0)
 
     def stress_amplitude(self, value: Any) -> Any:
-        """Amplitude of the spring stress of the small cycle, Pa; as `velocity_amplitude`."""
+        """Amplitude of the spring stress (Pa), or the pull at a machine's contact (N); as `velocity_amplitude`."""
         return self.stress_ratio * self.velocity_amplitude(value)
 
     @property
@@ -110,9 +119,10 @@ class Onset(Displayed):
         return MEANINGS[self.kind]
 
     def __str__(self) -> str:
-        lines = [f"{self.kind} onset at {self.along} = {shown(self.value, self.unit, 6, self.rig.area)}"]
-        lines.append(f"  {self.meaning}")
-        size = f"{self.normalised:.4g} of the frequency per squared amplitude of ln v"
+        edge = shown(self.value, self.unit, 6, self.rig.area_of(self.along))
+        lines = [f"{self.kind} onset at {self.along} = {edge}", f"  {self.meaning}"]
+        where = f" at {self.contact}" if self.contact else ""
+        size = f"{self.normalised:.4g} of the frequency per squared amplitude of ln v{where}"
         lines.append(f"  cubic coefficient {size}, period {shown(2 * np.pi / self.angular_frequency, 's')}")
         return "\n".join(lines)
 
@@ -128,14 +138,15 @@ MEANINGS = {
 
 
 @checked(branch=BRANCH, along=NAME)
-def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
+def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) -> Onset:
     """Kind of onset at the oscillatory edge of stability nearest to the rig.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     along : str, optional
-        Dotted name, or unique last part, of the parameter whose edge is meant.
+        Dotted name, or unique last part, of the parameter whose edge is meant; of a machine with several stiffnesses
+        it has to be said.
     branch : int, optional
         Which steady sliding, by rising normal stress, where a rig has several.
 
@@ -146,7 +157,7 @@ def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
     Raises
     ------
     NotAvailable
-        If stability has no oscillatory edge in that parameter; says which edges there are.
+        If stability has no oscillatory edge in that parameter; says which edges there are. With a delay.
     UnknownNameError, ParameterError
         If the parameter is unknown.
 
@@ -166,15 +177,17 @@ def hopf(rig: Slider, along: str = "stiffness", *, branch: int = 0) -> Onset:
     return onset_at(rig, min(oscillatory, key=lambda edge: abs(edge.value - own)), branch)
 
 
-def parameter_along(rig: Slider, along: str) -> str:
+def parameter_along(rig: Slider | Machine, along: str) -> str:
     """Full name of a parameter; for the stiffness, the one that the rig has: a spring's, a press's, or a gain kp."""
     name = rig.resolve(along)
+    if isinstance(rig, Machine):
+        return name
     if name != "slider.stiffness" or rig.stiffness is not None:
         return name
     return rig.stiffness_name()
 
 
-def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
+def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
     """Kind of onset at an oscillatory edge found before.
 
     Raises
@@ -186,11 +199,13 @@ def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
     point = _flat(rig, name, [edge.value], branch)
     found = coefficients(point, np.array([edge.angular_frequency]))
     if not np.isfinite(found["c1"][0]):
-        where = f"{name} = {shown(edge.value, edge.unit, area=rig.area)}"
+        where = f"{name} = {shown(edge.value, edge.unit, area=rig.area_of(name))}"
         raise NotAvailable(
             f"the kind of onset at {where} cannot be told: the numbers of this rig are so far apart that it is lost in "
             "rounding, or beyond floating point"
         )
+    names = [contact.name for contact in point.model.contacts]
+    most = int(found["contact"][0])
     return Onset(
         rig=rig,
         along=name,
@@ -203,15 +218,17 @@ def onset_at(rig: Slider, edge: Boundary, branch: int = 0) -> Onset:
         growth_slope=_growth_slope(rig, name, edge, branch),
         stress_ratio=float(found["stress_ratio"][0]),
         stable=edge.stable,
+        contact=names[most],
+        shares=dict(zip(names, map(float, found["shares"][0]), strict=True)) if names[most] else {},
     )
 
 
-def _flat(rig: Slider, name: str, at: Any, branch: int) -> OperatingPoint:
+def _flat(rig: Slider | Machine, name: str, at: Any, branch: int) -> OperatingPoint:
     present = (name,) if rig.parameters()[name].role.structural else ()
     return operating_point(rig, {name: np.asarray(at, dtype=float)}, present, branch, scan=True)
 
 
-def _growth_slope(rig: Slider, name: str, edge: Boundary, branch: int) -> float:
+def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int) -> float:
     """Re(dλ/dp) from the characteristic polynomial: central differences of its coefficients, Richardson's rule."""
     size = abs(edge.value) or 1e-3
     steps = np.array([1e-3, -1e-3, 5e-4, -5e-4]) * size
@@ -234,54 +251,56 @@ def kinds(found: dict[str, Array]) -> Array:
 NO_EDGE, SUPERCRITICAL, SUBCRITICAL, DEGENERATE = range(4)
 
 
-def onset_map(rig: Slider, vary: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Kinds of onset of many rigs, each at the oscillatory edge in stiffness nearest to its own.
+def onset_map(
+    rig: Slider | Machine, vary: Mapping[str, Any] | None = None, along: str = "slider.stiffness"
+) -> dict[str, Any]:
+    """Kinds of onset of many rigs, each at the oscillatory edge nearest to its own value of a parameter.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     vary : mapping of str to array_like or xarray.DataArray, optional
         Parameters by dotted name, SI units; they broadcast.
+    along : str, optional
+        A parameter that enters the equations linearly; of a slider its stiffness unless given.
 
     Returns
     -------
     dict of str to ndarray or xarray.DataArray
         ``kind`` (0 where there is no such edge, 1 supercritical, 2 subcritical, 3 degenerate),
-        ``edge`` (Pa/m, of the gain kp for a rig without spring) and ``coefficient`` (c1, 1/s), both NaN there.
+        ``edge`` (SI; of the gain kp for a rig without spring) and ``coefficient`` (c1, 1/s), both NaN there.
 
     Raises
     ------
     ParameterError
         If a name or value is not allowed.
+    NotAvailable
+        If the parameter does not enter linearly, or with a delay.
     """
     point = operating_point(rig, vary)
-    along = parameter_along(rig, "slider.stiffness")
-    names = list(point.model.parameters)
-    place = names.index(along if along in names else "slider.stiffness")  # k too where the axial one is given
-    found = in_chunks(point, lambda part: _onsets(part, place))
+    name = parameter_along(rig, along)
+    unit = rig.parameters()[name].role.unit
+    name = name if name in point.model.parameters else "slider.stiffness"  # k too where the axial one is given
+    found = in_chunks(point, lambda part: _onsets(part, name))
     kind, edge, coefficient = np.moveaxis(np.asarray(found), -1, 0)
     return {
         "kind": point.wrap(kind.astype(np.int8), "onset", "1"),
-        "edge": point.wrap(edge, "onset_edge", "Pa/m"),
+        "edge": point.wrap(edge, "onset_edge", unit),
         "coefficient": point.wrap(coefficient, "onset_coefficient", "1/s"),
     }
 
 
-def _onsets(point: OperatingPoint, place: int) -> Array:
-    """Kind, edge and c1 of each rig, (..., 3), along the stiffness or gain that is argument number `place`."""
+def _onsets(point: OperatingPoint, name: str) -> Array:
+    """Kind, edge and c1 of each rig, (..., 3), along a parameter."""
+    place = list(point.model.parameters).index(name)
     arguments = list(point.arguments)
     own = np.broadcast_to(arguments[place], point.shape).reshape(-1)
-    bare, slope = point, np.ones((1, 1))
-    if list(point.model.parameters)[place] != "slider.stiffness":  # a gain acts as a spring would
-        arguments[place] = 1.0
-        unit = point.with_arguments(arguments).gain
-        arguments[place] = 0.0
-        bare = point.with_arguments(arguments)
-        slope = np.broadcast_to(unit - bare.gain, point.shape).reshape(-1, 1)
-    found = stable_set(*(np.broadcast_to(c, (*point.shape, c.shape[-1])) for c in stiffness_polynomials(bare)))
+    if name == "slider.stiffness":
+        found = stable_set(*(np.broadcast_to(c, (*point.shape, c.shape[-1])) for c in stiffness_polynomials(point)))
+    else:
+        found = linear_sets(point, name)
     count = point.size
     edges, frequencies, changes = (a.reshape(count, -1) for a in (found.edges, found.frequencies, found.changes))
-    edges = edges / slope
     usable = changes.astype(bool) & (frequencies > 0) & np.isfinite(frequencies)
     distance = np.where(usable, np.abs(edges - own[:, None]), np.inf)
     nearest = np.argmin(distance, axis=1)
@@ -316,17 +335,22 @@ def coefficients(point: OperatingPoint, omega: Array) -> dict[str, Array]:
     Returns
     -------
     dict
-        ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa), each (m,); NaN
-        where they are lost in rounding or leave the range of floating point.
+        ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa, of machines N), each
+        (m,); NaN where they are lost in rounding or leave the range of floating point. ``contact``: number of the one
+        where slip oscillates most, as a share of its velocity, to whose ln v amplitudes refer; ``shares``
+        (m, contacts): amplitude of ln v at each over that.
     """
     expansion = taylor(point)
     size = max(len(omega), len(expansion.gradient))
     omega = np.broadcast_to(omega, (size,))
-    drive = np.broadcast_to(np.asarray(point.drive, dtype=float), (size,))
-    return _projected(expansion, omega, drive)
+    contacts = point.model.contacts
+    wanted = [point.model.steady[contact.velocity] for contact in contacts] + [contact.area for contact in contacts]
+    numbers = [np.broadcast_to(one, (size,)) for one in point.evaluate(point.model.function(wanted))]
+    return _projected(expansion, omega, *np.split(np.stack(numbers, axis=1), 2, axis=1))
 
 
-def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array]:
+def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> dict[str, Array]:
+    """The same from Taylor terms, steady slip rates and areas of the contacts (m, contacts)."""
     n = len(expansion.mass)
     gradient = np.broadcast_to(expansion.gradient, (len(omega), n, n))
     mass = np.diag(expansion.mass)
@@ -350,10 +374,12 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
     left, _, right = np.linalg.svd(np.where(beyond[:, None, None], np.eye(n), critical))
     q = columns * right[:, -1].conj()
     p = rows * left[:, :, -1]
-    place = expansion.system.place
-    contact = expansion.system.model.contact
-    v, spring = place(contact.velocity), place(contact.spring)
-    q = q * (0.5 * drive / q[:, v])[:, None]
+    place, model = expansion.system.place, expansion.system.model
+    v, spring = ([place(getattr(one, what)) for one in model.contacts] for what in ("velocity", "spring"))
+    relative = q[:, v] / speeds
+    most = np.argmax(np.abs(relative), axis=1)
+    rows_of = np.arange(len(q))
+    q = q * (0.5 / relative[rows_of, most])[:, None]
     p = p / np.sum(p.conj() * (q @ mass), axis=1)[:, None].conj()
     steady = -solve(gradient.astype(complex), expansion.quadratic(q, q.conj()))
     double = solve(2j * omega[:, None, None] * mass - gradient, expansion.quadratic(q, q))
@@ -368,7 +394,9 @@ def _projected(expansion: Taylor, omega: Array, drive: Array) -> dict[str, Array
     c1 = np.where(beyond, np.nan, np.real(sum(terms)))
     with np.errstate(all="ignore"):
         share = np.abs(c1) / sum(np.abs(term) for term in terms)
-    return {"c1": c1, "share": share, "stress_ratio": 2 * np.abs(q[:, spring])}
+        shares = np.abs(relative) / np.abs(relative[rows_of, most])[:, None]
+    pull = 2 * np.abs(q[:, spring]) * (1.0 if model.is_slider else areas)
+    return {"c1": c1, "share": share, "stress_ratio": pull[rows_of, most], "contact": most, "shares": shares}
 
 
 def _equilibrated(size: Array) -> tuple[Array, Array]:

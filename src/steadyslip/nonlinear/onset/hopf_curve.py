@@ -22,6 +22,7 @@ from steadyslip.core.results import ReadOnly
 from steadyslip.linear.boundary import boundary, present_zeros
 from steadyslip.linear.polynomials import roots
 from steadyslip.linear.search import Search
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, in_range
@@ -59,7 +60,7 @@ class HopfCurve(ReadOnly):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     names, units : tuple of str
         Of the two parameters.
     first, second : ndarray (n,)
@@ -78,7 +79,7 @@ class HopfCurve(ReadOnly):
         Why the curve stops at its beginning and at its end.
     """
 
-    rig: Slider = field(repr=False)
+    rig: Slider | Machine = field(repr=False)
     names: tuple[str, str]
     units: tuple[str, str]
     first: Array = field(repr=False)
@@ -95,13 +96,16 @@ class HopfCurve(ReadOnly):
         return draw(self, ax=ax)
 
     def __str__(self) -> str:
-        (a, b), area = self.names, self.rig.area
+        a, b = self.names
         lines = [f"oscillatory edge in {a} and {b}: {len(self.first)} points"]
         for name, unit, column in zip(self.names, self.units, (self.first, self.second), strict=True):
-            lines.append(f"  {name}  {shown_range(float(column.min()), float(column.max()), unit, area)}")
+            lines.append(
+                f"  {name}  {shown_range(float(column.min()), float(column.max()), unit, self.rig.area_of(name))}"
+            )
         for point in self.special:
             where = ", ".join(
-                f"{n} = {shown(point.values[n], u, 7, area)}" for n, u in zip(self.names, self.units, strict=True)
+                f"{n} = {shown(point.values[n], u, 7, self.rig.area_of(n))}"
+                for n, u in zip(self.names, self.units, strict=True)
             )
             lines.append(f"  {point.kind} at {where}")
         lines.append(f"  ends: {self.ends[0]}; {self.ends[1]}")
@@ -110,7 +114,7 @@ class HopfCurve(ReadOnly):
 
 @checked(spacing=finite(1e-4, 10, closed=True))
 def hopf_curve(
-    rig: Slider,
+    rig: Slider | Machine,
     first: str,
     second: str = "stiffness",
     *,
@@ -122,7 +126,7 @@ def hopf_curve(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
         The curve starts at this rig's own `first`, at the edge in `second` nearest to its own value.
     first, second : str
         Dotted names or unique last parts.
@@ -172,9 +176,13 @@ def hopf_curve(
 class _Plane:
     """Two parameters and a frequency as coordinates of order one."""
 
-    def __init__(self, rig: Slider, names: tuple[str, str], between: Mapping[str, Sequence[Any]], branch: int) -> None:
+    def __init__(
+        self, rig: Slider | Machine, names: tuple[str, str], between: Mapping[str, Sequence[Any]], branch: int
+    ) -> None:
         self.rig, self.names, self.branch = rig, names, branch
         self.present = tuple({*present_zeros(rig)} & {*names})
+        if operating_point(rig).model.delays:
+            raise NotAvailable("an edge with a delay cannot be followed in two parameters; stable_values has it in one")
         self.reference = 1.0
         self.roles = [rig.parameters()[name].role for name in names]
         given = {parameter_along(rig, name): pair for name, pair in between.items()}
@@ -292,7 +300,9 @@ def _on_the_limit(curve: Track, inside: Point, outside: Point, plane: _Plane) ->
     return []
 
 
-def _described(rig: Slider, plane: _Plane, curve: Track, points: list[Point], ends: tuple[str, str]) -> HopfCurve:
+def _described(
+    rig: Slider | Machine, plane: _Plane, curve: Track, points: list[Point], ends: tuple[str, str]
+) -> HopfCurve:
     u = np.array([point.u for point in points])
     values = plane.values(u)
     first, second, omega = plane.parameters(u)

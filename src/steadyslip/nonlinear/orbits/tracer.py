@@ -312,7 +312,9 @@ class Tracer:
         low, high = self.limits
         cycle = now.cycle
         if not low < cycle.value < high:
-            end = shown(low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area)
+            end = shown(
+                low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area_of(self.onset.along)
+            )
             return f"end of the range, {end}", True
         if self._slows(now):
             return ENDS["steady"], False

@@ -126,7 +126,7 @@ class NoSteadySliding(SteadyslipError, ValueError):
 
 
 MACHINES_CAN = (
-    "machines have analyze, simulate, maps, sensitivity, eigenvalues, modes, boundary, margins, stable_values"
+    "machines have analyze, simulate, hopf, cycles, maps, eigenvalues, modes, boundary, margins, stable_values"
 )
 
 

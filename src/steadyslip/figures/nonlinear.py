@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.figures.map_axes import spaced_by_ratio
+from steadyslip.figures.map_axes import short, spaced_by_ratio
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -25,6 +25,7 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
+from steadyslip.machine.slider import Slider
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
@@ -52,10 +53,12 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
     """
     ax = axes_or_new(ax)
-    factor, unit = display_unit(branch.unit, branch.onset.value, branch.rig.area)
-    drive = branch.rig.drive.velocity
+    factor, unit = display_unit(branch.unit, branch.onset.value, branch.rig.area_of(branch.along))
+    drive = branch.cycles[0].speed if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
-    onset_speed = branch.onset.value if branch.along == "drive.velocity" else drive
+    onset_speed = drive
+    if branch.along == "drive.velocity" and isinstance(branch.rig, Slider):
+        onset_speed = branch.onset.value
     _velocities(branch, ax, factor, speed, 1.8, True)
     if branch.doubled is not None:
         _velocities(branch.doubled, ax, factor, speed, 0.9, False)
@@ -72,8 +75,9 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     ax.set_yscale("log")
     if len(branch) and np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
         ax.set_xscale("log")
-    ax.set_xlabel(labelled(branch.along.rpartition(".")[2].replace("_", " "), unit))
-    ax.set_ylabel(labelled("highest and lowest velocity", speed_unit))
+    where = f" at {branch.cycles[0].contact}" if len(branch) and branch.cycles[0].contact else ""
+    ax.set_xlabel(labelled(short(branch.along), unit))
+    ax.set_ylabel(labelled(f"highest and lowest velocity{where}", speed_unit))
     ax.grid(color=GREY, linewidth=0.3)
     ax.legend(fontsize="small")
     return ax
@@ -117,7 +121,7 @@ def hopf_curve(curve: HopfCurve, ax: Axes | None = None) -> Axes:
     for name, unit, column in zip(curve.names, curve.units, (curve.first, curve.second), strict=True):
         factor, shown_unit = display_unit(unit, float(np.median(np.abs(column))), curve.rig.area_of(name))
         factors.append(factor)
-        names.append(labelled(name.rpartition(".")[2].replace("_", " "), shown_unit))
+        names.append(labelled(short(name), shown_unit))
     x, y = curve.first / factors[0], curve.second / factors[1]
     for kind, colour in _COLOURS.items():
         here = curve.kind == kind

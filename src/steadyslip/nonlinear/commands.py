@@ -14,7 +14,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
-from steadyslip.files.specifications import read_slider
+from steadyslip.files.specifications import read_rig, read_slider
 from steadyslip.files.standalone import write_page
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.kicks.basin import Basin, basin
@@ -31,7 +31,7 @@ def cycles_of_file(
     path: str | os.PathLike[str], changes: Iterable[str], along: str, between: Sequence[str] | None, doublings: int
 ) -> CycleBranch:
     """`steadyslip.cycles` for the rig of a file; shows progress on a terminal."""
-    rig = read_slider(path, changes)
+    rig = read_rig(path, changes)
     with progress_text("following cycles; Ctrl-C keeps what there is") as said:
 
         def progress(count: int, cycle: Cycle) -> None:

@@ -220,11 +220,14 @@ def _slips(result: History) -> Iterator[str]:
 
 @parts_of.register
 def _branch(result: CycleBranch) -> Parts:
-    along, unit, area = result.along, result.unit, result.rig.area
+    along, unit, area = result.along, result.unit, result.rig.area_of(result.along)
+    stress = "Pa" if isinstance(result.rig, Slider) else "N"
+    drop = "stress drop" if isinstance(result.rig, Slider) else "force drop"
     first, _, rest = str(result).partition("\n")
     rows = [
         (shown(one.value, unit, area=area), shown(one.period, "s"), shown(one.peak_velocity, "m/s"),
-         shown(one.stress_drop, "Pa", area=area), "attracts" if one.stable else "unstable")
+         shown(one.stress_drop, stress, area=area if stress == "Pa" else None),
+         "attracts" if one.stable else "unstable")
         for one in result.cycles
     ]  # fmt: skip
     listed = _told_apart(rows)
@@ -236,7 +239,7 @@ def _branch(result: CycleBranch) -> Parts:
         heading("The cycles"), *_words(rest),
         figure(drawn(lambda: figures.cycle_branch(result), "branch of cycles", 6.5), f"Cycles along {along}."),
         table(special, ("special", along, "period")),
-        table(listed, (along, "period", "peak velocity", "stress drop", ""), left=False),
+        table(listed, (along, "period", "peak velocity", drop, ""), left=False),
         *([paragraph(f"{len(listed)} of the {len(rows)}.", "small")] if len(listed) < len(rows) else []),
     ]  # fmt: skip
     question = f"Which stick-slip cycles does this rig have as {along} varies?"
@@ -245,7 +248,7 @@ def _branch(result: CycleBranch) -> Parts:
         sentence(first),
         question,
         body,
-        result.rig,
+        _with_page(result.rig),
         of_rig.as_file(result.rig),
     )
 

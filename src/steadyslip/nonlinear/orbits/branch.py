@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from os import PathLike
 from typing import Any
@@ -15,9 +15,10 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import outside, shown, stress_name, total, totals
 from steadyslip.files.output import write_columns
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.cycle import UNITS, Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, SpecialCycle, quantities
 from steadyslip.nonlinear.orbits.values import attracting, cycles_at
 
 Array = np.ndarray
@@ -29,7 +30,7 @@ class CycleBranch(Displayed):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     along, unit : str
         The parameter and its SI unit.
     onset : Onset
@@ -51,7 +52,7 @@ class CycleBranch(Displayed):
         Error allowed per step, as asked for.
     """
 
-    rig: Slider = field(repr=False)
+    rig: Slider | Machine = field(repr=False)
     along: str
     unit: str
     onset: Onset = field(repr=False)
@@ -71,10 +72,33 @@ class CycleBranch(Displayed):
         return iter(self.cycles)
 
     def __getitem__(self, name: str) -> Array:
-        """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ..."""
-        if name not in (known := ("value", *UNITS, "stable", "trivial", "multipliers")):
+        """One quantity along the branch: ``value``, ``period``, ``peak_velocity``, ``stress_drop``, ...
+
+        Of a machine ``force_drop`` and so on, at the contact of its cycles; at others ``guide.peak_velocity``.
+        """
+        own, columns = quantities(self.rig), self._of_contacts()
+        if name in columns:
+            contact, what = columns[name]
+            return np.array([getattr(cycle.contacts[contact], what) for cycle in self.cycles])
+        if name not in (known := ("value", *own, "stable", "trivial", "multipliers", *columns)):
             raise KeyError(unknown_name("quantity", name, known))
-        return np.array([getattr(cycle, name) for cycle in self.cycles])
+        return np.array([getattr(cycle, own[name][0] if name in own else name) for cycle in self.cycles])
+
+    def _of_contacts(self) -> dict[str, tuple[str, str]]:
+        """Quantities at the contacts of a machine: contact and attribute, by name."""
+        contacts = self.rig.contacts if isinstance(self.rig, Machine) else ()
+        return {f"{one}.{item.name}": (one, item.name) for one in contacts for item in fields(CycleRange)}
+
+    def _units(self) -> dict[str, str]:
+        """Units of the quantities that are numbers."""
+        units = {"value": self.unit} | {name: unit for name, (_, unit) in quantities(self.rig).items()}
+        return units | {name: RANGE_UNITS[what] for name, (_, what) in self._of_contacts().items()}
+
+    def _area(self, name: str) -> float | None:
+        """Area for which people get a quantity as a total."""
+        if name == "value" or isinstance(self.rig, Slider):
+            return self.rig.area_of(self.along)
+        return None
 
     def at(self, value: float) -> tuple[Cycle, ...]:
         """The cycles that exist at one value of the parameter, corrected to full precision.
@@ -114,7 +138,7 @@ class CycleBranch(Displayed):
         """An xarray.Dataset over ``point``."""
         import xarray as xr
 
-        names = {"value": self.unit} | UNITS
+        names = self._units()
         data = {name: ("point", self[name].astype(float), {"units": unit}) for name, unit in names.items()}
         data["stable"] = ("point", self["stable"], {})
         attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind, "gaps": list(self.gaps)}
@@ -128,8 +152,7 @@ class CycleBranch(Displayed):
         NotAvailable
             If the file cannot be written.
         """
-        names = {"value": self.unit} | UNITS
-        written = {name: outside(unit, self.rig.area) for name, unit in names.items()}
+        written = {name: outside(unit, self._area(name)) for name, unit in self._units().items()}
         titles = {name: f"{self.along if name == 'value' else name} ({unit})" for name, (_, unit) in written.items()}
         columns = {titles[name]: self[name].astype(float) * factor for name, (factor, _) in written.items()}
         write_columns(path, columns | {"stable": self["stable"].astype(float)}, "%.12g")
@@ -137,14 +160,18 @@ class CycleBranch(Displayed):
     def to_dict(self) -> dict[str, Any]:
         """Plain data in SI units, as ``steadyslip cycles --json`` prints it."""
 
-        area, units = self.rig.area, {"value": self.unit} | UNITS
+        area, names = self._area("value"), quantities(self.rig)
+        units = {"value": self.unit} | {name: unit for name, (_, unit) in names.items()}
 
         def plain(cycle: Cycle) -> dict[str, Any]:
-            found = {name: getattr(cycle, name) for name in units}
+            found: dict[str, Any] = {"value": cycle.value}
+            found |= {name: getattr(cycle, own) for name, (own, _) in names.items()}
             if forces := totals(found, units, area):
                 found["forces"] = forces
             found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
             found |= {"stable": cycle.stable, "start": cycle.start}
+            if cycle.contacts:
+                found |= {"contact": cycle.contact, "contacts": {n: _plain(one) for n, one in cycle.contacts.items()}}
             return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
 
         return {
@@ -166,21 +193,27 @@ class CycleBranch(Displayed):
         return draw(self, kind, ax=ax)
 
     @property
+    def _drop(self) -> str:
+        return stress_name("stress drop", self.rig.area) if isinstance(self.rig, Slider) else "force drop"
+
+    @property
     def interrupted(self) -> bool:
         """Whether Ctrl-C ended the branch early."""
         return self.end.startswith("interrupted")
 
     def __str__(self) -> str:
-        area = self.rig.area
+        area = self._area("value")
         edge = shown(self.onset.value, self.unit, 6, area)
+        drops, drop_unit = ("stress_drop", "Pa") if isinstance(self.rig, Slider) else ("force_drop", "N")
         lines = [f"cycles along {self.along} from a {self.onset.kind} onset at {edge}: {len(self.cycles)} cycles"]
         if self.cycles:
             v = self["peak_velocity"], self["lowest_velocity"]
-            period, drop = self["period"], self["stress_drop"]
+            period, drop = self["period"], self[drops]
+            where = f" at {self.cycles[0].contact}" if self.cycles[0].contact else ""
             lines += [
-                f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}",
+                f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}{where}",
                 f"  period       {shown(float(period.min()), 's')} to {shown(float(period.max()), 's')}",
-                f"  {stress_name('stress drop', area):<13}up to {shown(float(drop.max()), 'Pa', area=area)}",
+                f"  {self._drop:<13}up to {shown(float(drop.max()), drop_unit, area=self._area(drops))}",
                 f"  stable       {_stretches(self)}",
             ]
         for point in self.special:
@@ -198,6 +231,12 @@ class CycleBranch(Displayed):
         return "\n".join(lines)
 
 
+def _plain(one: CycleRange) -> dict[str, float | None]:
+    """For JSON."""
+    found = {item.name: getattr(one, item.name) for item in fields(CycleRange)}
+    return {name: value if np.isfinite(value) else None for name, value in found.items()}
+
+
 def _stretches(branch: CycleBranch) -> str:
     """Where along the branch cycles are stable, in words."""
     stable = branch["stable"]
@@ -208,6 +247,6 @@ def _stretches(branch: CycleBranch) -> str:
     changes = np.flatnonzero(stable[1:] != stable[:-1]) + 1
     pieces = np.split(np.arange(len(stable)), changes)
     found = [piece for piece in pieces if stable[piece[0]]]
-    values, area = branch["value"], branch.rig.area
+    values, area = branch["value"], branch.rig.area_of(branch.along)
     ends = [(float(values[p].min()), float(values[p].max())) for p in found]
     return "; ".join(f"{shown(a, branch.unit, area=area)} to {shown(b, branch.unit, area=area)}" for a, b in ends)

@@ -2,18 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from steadyslip.core.pages import Displayed
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.orbits.shooting import Orbit
 
 UNITS = {"period": "s", "peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "stress_drop": "Pa",
          "lowest_normal_stress": "Pa", "highest_normal_stress": "Pa", "slip": "m", "growth": "1"}  # fmt: skip
 
 
+RANGE_UNITS = {"peak_velocity": "m/s", "lowest_velocity": "m/s", "amplitude": "1", "force_drop": "N",
+               "lowest_normal_force": "N", "highest_normal_force": "N"}  # fmt: skip
+
+
+def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
+    """What is known of a cycle, by the name that it has for a rig: the attribute and its unit; forces of a machine."""
+    if isinstance(rig, Slider):
+        return {name: (name, unit) for name, unit in UNITS.items()}
+    return {name.replace("stress", "force"): (name, unit.replace("Pa", "N")) for name, unit in UNITS.items()}
+
+
+@dataclass(frozen=True)
+class CycleRange(Displayed):
+    """What slip at a contact of a machine passes through in a cycle.
+
+    Attributes
+    ----------
+    peak_velocity, lowest_velocity : float
+        m/s.
+    amplitude : float
+        Half of ln(peak velocity/lowest velocity); infinite where slip stops or turns round.
+    force_drop : float
+        Highest less lowest pull, N.
+    lowest_normal_force, highest_normal_force : float
+        N.
+    """
+
+    peak_velocity: float
+    lowest_velocity: float
+    amplitude: float
+    force_drop: float
+    lowest_normal_force: float
+    highest_normal_force: float
+
+
 @dataclass(frozen=True, eq=False)
 class Cycle(Displayed):
-    """One periodic motion.
+    """One periodic motion; of a machine its numbers are those at `contact`, in forces.
 
     Attributes
     ----------
@@ -37,7 +75,13 @@ class Cycle(Displayed):
         Whether the cycle attracts: all multipliers inside the unit circle.
     start : dict of str to float
         State where the block, speeding up, is as fast as the load point: x, v and memory, SI units, for
-        ``simulate(rig, initial=...)``.
+        ``simulate(rig, initial=...)``. Of a machine: where `contact` slips as fast as in steady sliding.
+    speed : float
+        Slip rate in steady sliding, m/s.
+    contact : str
+        Of a machine: the contact that the cycle is counted at; else empty.
+    contacts : dict of str to CycleRange
+        Of a machine: all of them.
     """
 
     value: float
@@ -52,6 +96,9 @@ class Cycle(Displayed):
     trivial: float
     stable: bool
     start: dict[str, float]
+    speed: float
+    contact: str = ""
+    contacts: Mapping[str, CycleRange] = field(default_factory=dict)
     _orbit: Orbit | None = field(default=None, repr=False)
 
     @property
@@ -62,7 +109,7 @@ class Cycle(Displayed):
     @property
     def slip(self) -> float:
         """Slip per period, m: the load point's advance."""
-        return self.start["v"] * self.period
+        return self.speed * self.period
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import BRANCH, LOW_AND_HIGH, NAME, checked, finite, whole
 from steadyslip.core.quantities import shown
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
@@ -35,7 +36,7 @@ LARGER = (1e-4, 1e-3, 1e-2)  # amplitudes to begin with where smaller cycles can
     along=NAME,
 )
 def cycles(
-    rig: Slider,
+    rig: Slider | Machine,
     along: str = "stiffness",
     *,
     between: Sequence[Any] | None = None,
@@ -50,9 +51,10 @@ def cycles(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     along : str, optional
-        Dotted name, or unique last part, of the parameter that is varied.
+        Dotted name, or unique last part, of the parameter that is varied; of a machine with several stiffnesses it
+        has to be said.
     between : (low, high), optional
         Range in which to follow, SI units or text; by default a factor of a thousand to each side of the edge
         for positive parameters, the whole domain for others.
@@ -94,7 +96,7 @@ def cycles(
     multiplier −1.
     """
     onset = hopf(rig, along, branch=branch)
-    flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol)
+    flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol, onset.contact)
     tracer = Tracer(flow, onset, _limits(rig, onset, between), most_points, progress)
     sheets = [_from_the_edge(tracer, amplitude)]
     search_on(tracer, sheets)
@@ -159,7 +161,7 @@ def _twice(tracer: Tracer, flip: Cycle, rtol: float | None, doublings: int) -> C
     return _branch(tracer, [tracer.followed(shooting, first, size, twice=True)], rtol, doublings)
 
 
-def _limits(rig: Slider, onset: Onset, between: Sequence[Any] | None) -> tuple[float, float]:
+def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) -> tuple[float, float]:
     role = rig.parameters()[onset.along].role
     if between is None:
         if role.domain.low == 0 and onset.value > 0:
@@ -167,10 +169,10 @@ def _limits(rig: Slider, onset: Onset, between: Sequence[Any] | None) -> tuple[f
         return role.domain.low, role.domain.high
     if len(between) != 2:
         raise ParameterError([Problem("between", f"got {between!r}; allowed: two values, low and high")])
-    low, high = (float(checked_array(onset.along, role, x)) for x in between)
+    low, high = (float(checked_array(onset.along, role, rig.read(onset.along, x))) for x in between)
     if not low < high:
         raise ParameterError([Problem("between", f"got {between!r}; allowed: low < high")])
     if not low <= onset.value <= high:
-        edge = shown(onset.value, onset.unit, 6, rig.area)
+        edge = shown(onset.value, onset.unit, 6, rig.area_of(onset.along))
         raise ParameterError([Problem("between", f"got {between!r}; it must contain the edge, {edge}")])
     return low, high

@@ -6,25 +6,30 @@ are; `Flow` leaves one parameter of a rig free, which is driven at its own veloc
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
-from steadyslip.kernels.layout import Sampled
-from steadyslip.kernels.runner import SETTINGS, Runner, runner
+from steadyslip.kernels.layout import Recorded, Sampled, Setting
+from steadyslip.kernels.runner import LOG_KINDS, SETTINGS, Runner, runner
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.reduction import V_LP, Reduction
+from steadyslip.model.scales import natural_scales, shortest_time
 from steadyslip.model.start import initial_values, restored_of
 from steadyslip.model.variational import with_sensitivities
 from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.motion.observe import observe
+from steadyslip.motion.single import areas as areas_of
 from steadyslip.motion.status import WORDS, remedy
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.protocol import Segments
@@ -36,6 +41,7 @@ STIFF = "rodas5p"  # of the Rosenbrock methods the one of order 5: tolerances ar
 MOST_STEPS = 100_000  # of one run, some tenths of a second; and where runs have been shorter,
 FAR_MORE, FEW_STEPS = 20, 5_000  # so many times those of the last that succeeded, but no fewer than these
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
+KINDS_EACH = len(LOG_KINDS) - 2  # numbers of kinds of events at a contact
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
 
 
@@ -52,6 +58,18 @@ def _with_sensitivities(reduction: Reduction, method: str) -> Runner:
     return Runner(with_sensitivities(reduction), Choice(method, dense=False))
 
 
+@question
+def _slip_shares(reduction: Reduction, contact: int) -> Callable[..., list[Any]]:
+    """How slip at a contact follows from the state, and its rate in steady sliding over that of the load point."""
+    sliding = reduction.slidings[contact]
+    return reduction.model.function([*(derivative(sliding.slip, s) for s in reduction.state), sliding.ratio])
+
+
+@question
+def _shifts(reduction: Reduction) -> Callable[..., list[Any]]:
+    return reduction.model.function(reduction.shifts)
+
+
 @dataclass(frozen=True, eq=False)
 class FlowSetting:
     """A rig at one value of the free parameter, as kernels take it.
@@ -63,7 +81,11 @@ class FlowSetting:
     point : OperatingPoint
         Arrays of one number.
     inputs : ndarray (3,)
-        Load-point velocity (m/s), disturbance and added normal stress (Pa).
+        Load-point velocity (m/s), disturbance and added normal stress (Pa); of machines also in rad/s, N and N m.
+    slip : ndarray (n,)
+        How slip at the contact that is watched follows from the state, m.
+    speed : float
+        At which that contact slips as fast as the load point goes, m/s.
     plain, varied : tuple of ndarray
         Constants and settings (one row each) of the plain kernel and of the one with sensitivities.
     """
@@ -72,13 +94,10 @@ class FlowSetting:
     unit: float
     point: OperatingPoint
     inputs: Array
+    slip: Array
+    speed: float
     plain: tuple[Array, Array]
     varied: tuple[Array, Array]
-
-    @property
-    def drive(self) -> float:
-        """Velocity of the load point, m/s."""
-        return float(self.inputs[0])
 
 
 class Runs:
@@ -92,6 +111,8 @@ class Runs:
         The run whose rig and inputs are meant.
     rtol : float, optional
         Error allowed per step; 1e-10 for explicit methods, 1e-9 for Rosenbrock methods unless given.
+    contact : int, optional
+        The one at which cycles begin as it speeds up.
 
     Attributes
     ----------
@@ -112,12 +133,12 @@ class Runs:
         If the rig's motion is ill-posed, or pressed by a force prescribed in time.
     """
 
-    def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None) -> None:
+    def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None, contact: int = 0) -> None:
         if not jobs.posed[which if len(jobs.posed) > 1 else 0]:
             raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
         if jobs.point.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
-        self.reduction, self.size = jobs.reduction, len(jobs.reduction.state)
+        self.reduction, self.size, self.contact = jobs.reduction, len(jobs.reduction.state), contact
         method = automatic_method(self.reduction)
         stiff = method != "tsit5"
         method = STIFF if stiff else method
@@ -125,15 +146,31 @@ class Runs:
         self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
-        self.machine = runner(self.reduction.model, Choice(method), jobs.eliminate)
+        self.machine = runner(self.reduction.model, Choice(method), jobs.eliminate, jobs.push, jobs.press)
         self.sensitive = _with_sensitivities(self.reduction, method)
         self.steps, self._usual = 0, MOST_STEPS
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
         own = jobs.point.part(slice(which, which + 1))
         inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
         self.own = self._set(own, inputs)
-        self.scales = self.own.plain[1][0, -self.size :] / self.options.rtol
-        self.time = float(self.scales[0] / self.own.drive)
+        self.scales = self.own.plain[1][0, self.tolerances] / self.options.rtol
+        self.time = self._natural_time()
+
+    @property
+    def tolerances(self) -> slice:
+        """Where settings have the absolute tolerances of the state."""
+        return slice(Setting.ATOL, Setting.ATOL + self.size)
+
+    @property
+    def way(self) -> float:
+        """Natural size of slip at the contact that is watched, m."""
+        shares = np.abs(self.own.slip) > 0
+        return float(np.min(self.scales[shares] / np.abs(self.own.slip[shares])))
+
+    def _natural_time(self) -> float:
+        if self.reduction.model.is_single:
+            return self.way / self.own.speed
+        return float(np.ravel(shortest_time(natural_scales(self.own.point, self.reduction)[0]))[0])
 
     # -- one rig
 
@@ -148,12 +185,16 @@ class Runs:
         """A setting; `rates` says how fast constants and inputs change with the parameter, per unit."""
         constants = self.machine.constants(point)
         settings = self._settings_at(point, value)
-        scales = settings[0, -self.size :]
+        scales, behind = settings[0, self.tolerances], self.tolerances.stop
         ratio = (scales[None, :] / scales[:, None] * self.options.rtol).ravel()  # S column by column
-        varied = np.concatenate([settings[0], ratio, scales])[None]
+        varied = np.concatenate([settings[0, :behind], ratio, scales, settings[0, behind:]])[None]
         found = self.sensitive.constants(point)
         varying = self.sensitive.kernel.constants.with_rates(found, *(rates or (np.zeros((1, 1, found.shape[1])), {})))
-        return FlowSetting(value, unit, point, inputs, (constants, settings), (varying, varied))
+        slip = [float(np.ravel(share)[0]) for share in point.evaluate(_slip_shares(self.reduction, self.contact))]
+        speed = float(inputs[0]) * slip.pop()
+        return FlowSetting(
+            value, unit, point, inputs, np.array(slip), speed, (constants, settings), (varying, varied)
+        )  # fmt: skip
 
     def _settings_at(self, point: OperatingPoint, value: float) -> Array:
         """What kernels are told beside constants: sizes mostly, which hold in the neighbourhood of a parameter."""
@@ -194,8 +235,7 @@ class Runs:
     def _finer(self, settings: Array, amplitude: float) -> Array:
         """Settings for small motions: absolute errors allowed shrink with their size."""
         finer = settings.copy()
-        atol = slice(len(SETTINGS), len(SETTINGS) + self.size)
-        finer[:, atol] *= max(min(1.0, amplitude), self.finest)
+        finer[:, self.tolerances] *= max(min(1.0, amplitude), self.finest)
         finer[:, SETTINGS.index("watch")] = finer[:, SETTINGS.index("record")] = 0.0
         return finer
 
@@ -220,10 +260,12 @@ class Runs:
     def field(self, setting: FlowSetting, states: Array) -> tuple[Array, Array, Array]:
         """Rates (m, n), their Jacobian (m, n, n) and their slopes in the parameter (m, n) at given states."""
         count, n = len(states), self.size
-        full = np.hstack([np.full((count, 1), np.nan), states, self._unit(count)])
+        further = max(len(self.reduction.unknowns) - 1, 0)
+        open_ = np.full((count, 1), np.nan)
+        full = np.hstack([open_, states, self._unit(count), np.repeat(open_, further, axis=1)])
         inputs = np.zeros((count, 7))
         inputs[:, :3] = setting.inputs
-        values = np.empty((count, full.shape[1] - Sampled.STATE))
+        values = np.empty((count, full.shape[1] - Sampled.STATE - further))
         own = np.zeros(count, dtype=np.int64)
         self.sensitive.code.field(*setting.varied, full, inputs, own, values)
         matrix = values[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
@@ -269,28 +311,59 @@ class Runs:
         zero = np.zeros(len(times), dtype=int)
         return observe(jobs, self.machine, 0, zero, zero, times, points)
 
+    def speeds(self, setting: FlowSetting, outcome: Outcome) -> Array:
+        """Slip rates at the contact that is watched (m/s): at the solver's steps and at events."""
+        return self.at_contacts(setting, outcome)[self.contact][0]
+
+    def at_contacts(self, setting: FlowSetting, outcome: Outcome) -> list[tuple[Array, Array, Array]]:
+        """Slip rate (m/s), normal stress and T (Pa, of machines N) of each contact, at solver's steps and events."""
+        record, log = outcome.recorded, outcome.log
+        seen = self.observed(setting, record[:, Recorded.TIME], record[:, Recorded.POINT :])
+        contacts = self.reduction.model.contacts
+        if not contacts[0].name:
+            v, sigma, pull = seen["v"], seen["normal_stress"], seen["spring_stress"]
+            return [(np.append(log[:, 2], v), np.append(log[:, 3], sigma), np.append(log[:, 5], pull))]
+        found = []
+        areas = setting.point.evaluate(areas_of(self.reduction.model))
+        for i, (contact, area) in enumerate(zip(contacts, areas, strict=True)):
+            here = log[(log[:, 0] - 1) // KINDS_EACH == i]
+            size, own = float(np.ravel(area)[0]), f"{contact.name}."
+            v = np.append(here[:, 2], seen[f"{own}slip_rate"])
+            sigma, pull = (
+                size * np.append(here[:, k], seen[own + name])
+                for k, name in ((3, "normal_stress"), (5, "spring_stress"))
+            )
+            found.append((v, sigma, pull))
+        return found
+
 
 class Flow(Runs):
     """Runs of a rig with one parameter left free.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     name : str
         Full name of the free parameter.
     branch : int
     rtol : float, optional
         As for `Runs`.
+    contact : str, optional
+        Name of the contact of a machine that is watched; the first unless given.
     """
 
-    def __init__(self, rig: Slider, name: str, branch: int = 0, rtol: float | None = None) -> None:
+    def __init__(
+        self, rig: Slider | Machine, name: str, branch: int = 0, rtol: float | None = None, contact: str = ""
+    ) -> None:
         self.rig, self.name, self.branch = rig, name, branch
         address = rig.parameters()[name]
         self.present = (name,) if address.role.structural else ()
         self.domain = address.role.domain
         self._settings: dict[float, FlowSetting] = {}
         own = float(address.value)  # type: ignore[arg-type]
-        super().__init__(prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch), rtol=rtol)
+        jobs = prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch)
+        names = [one.name for one in jobs.point.model.contacts]
+        super().__init__(jobs, rtol=rtol, contact=names.index(contact) if contact else 0)
 
     def setting(self, value: float) -> FlowSetting:
         """The rig with the free parameter at a value.
@@ -310,7 +383,7 @@ class Flow(Runs):
         if not self.domain.contains(value):
             raise Failure(f"{self.name} leaves its domain")
         point = self._varied(np.array([value]))
-        if not point.stresses[0] > 0:
+        if not np.all(point.exists):
             raise Failure("lock-up or lift-off: steady sliding ceases to exist")
         unit = abs(value) or 1.0
         drive = np.ravel(point.drive)[0]
@@ -328,7 +401,7 @@ class Flow(Runs):
 
     def _varied(self, around: Array) -> OperatingPoint:
         """Values of the rig with the free parameter changed; the short way where nothing else depends on it."""
-        if self.rig.axial_stiffness is None:
+        if isinstance(self.rig, Machine) or self.rig.axial_stiffness is None:
             named = self.base.point.named() | {self.name: around}
             return self.base.point.with_arguments(named.values(), np.shape(around))
         return operating_point(self.rig, {self.name: around}, self.present, self.branch, scan=True)
@@ -338,8 +411,23 @@ class Flow(Runs):
         setting = self.setting(value)
         continuous, _ = initial_values(self.reduction, setting.point, {})
         where = {symbol: continuous[0, i] for i, symbol in enumerate(self.reduction.continuous)}
-        guess = setting.plain[1][0, SETTINGS.index("guess")]
-        return np.array([where.get(symbol, guess) for symbol in self.reduction.state])
+        row = setting.plain[1][0]
+        guesses = [row[Setting.GUESS], *row[self.tolerances.stop :]]
+        where |= {w: guess for w, guess in zip(self.reduction.searched, guesses, strict=False) if w not in where}
+        return np.array([where[symbol] for symbol in self.reduction.state])
+
+    def ahead(self, value: float, ways: float) -> Array:
+        """The state when the load point has jumped back from steady sliding by some natural sizes of slip."""
+        shifts = self.setting(value).point.evaluate(_shifts(self.reduction))
+        found = self.steady(value)
+        for i, shift in enumerate(shifts):
+            found[i] -= ways * self.way / self._share * float(np.ravel(shift)[0])
+        return found
+
+    @property
+    def _share(self) -> float:
+        """Slip rate at the contact that is watched over the velocity of the load point."""
+        return self.own.speed / float(self.own.inputs[0])
 
 
 def _rows(inputs: Array, times: Array) -> Array:

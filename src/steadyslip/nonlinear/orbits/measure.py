@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.layout import Recorded, Sampled
-from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.flow import FlowFailure
+from steadyslip.nonlinear.orbits.cycle import Cycle, CycleRange
+from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs
 from steadyslip.nonlinear.orbits.shooting import Shooting
 
 Array = np.ndarray
@@ -22,6 +22,20 @@ def amplitude(velocity: Array) -> float:
     if not low > 0:
         return np.inf
     return 0.5 * (high - low) / float(velocity.mean()) if high / low - 1 < 1e-3 else 0.5 * float(np.log(high / low))
+
+
+def _range(velocity: Array, normal: Array, pull: Array) -> CycleRange:
+    """What is passed through at a contact."""
+    return CycleRange(
+        float(velocity.max()), float(velocity.min()), amplitude(velocity), float(pull.max() - pull.min()),
+        float(normal.min()), float(normal.max()),
+    )  # fmt: skip
+
+
+def _start(flow: Runs, seen: dict[str, Array]) -> dict[str, float]:
+    """What a motion has to start with to be on the cycle."""
+    variables = [item.name for item in flow.reduction.model.variables]
+    return {name: float(seen[name][0]) for name in (*variables, *(["v"] if "v" in seen else []))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,37 +70,41 @@ def measured(shooting: Shooting, u: Array) -> Measured:
     trivial, others = shooting.multipliers(u)
     starts = orbit.period * (np.cumsum(shooting.fractions) - shooting.fractions)
     parts = orbit.period / PRIMES[::-1]
-    velocity, spring, normal, back = [], [], [], []
+    passed: list[list[tuple[Array, Array, Array]]] = []
+    back = []
     for state, begin, share in zip(orbit.states, starts, shooting.fractions, strict=True):
         span = share * orbit.period
         times = parts[(parts >= begin) & (parts < begin + span)] - begin
         outcome = flow.watched(setting, state, span, shooting.amplitude, times)
-        record = outcome.recorded
-        seen = flow.observed(setting, record[:, Recorded.TIME], record[:, Recorded.POINT :])
-        velocity.append(np.concatenate([outcome.log[:, 2], seen["v"]]))
-        normal.append(np.concatenate([outcome.log[:, 3], seen["normal_stress"]]))
-        spring.append(np.concatenate([outcome.log[:, 5], seen["spring_stress"]]))
-        back.append(outcome.samples[0, :, Sampled.STATE :])
-        if len(velocity) == 1:
-            start = {name: float(seen[name][0]) for name in [v.name for v in flow.reduction.model.variables] + ["v"]}
-    v, t, sigma = (np.concatenate(part) for part in (velocity, spring, normal))
-    if not np.all(np.isfinite([v, t, sigma])):  # forces do not balance at every state: the motion is none
-        raise FlowFailure("stuck")
+        passed.append(flow.at_contacts(setting, outcome))
+        back.append(outcome.samples[0, :, Sampled.STATE : Sampled.STATE + flow.size])
+        if len(passed) == 1:
+            first = outcome.recorded[:1]
+            start = _start(flow, flow.observed(setting, first[:, Recorded.TIME], first[:, Recorded.POINT :]))
+    each = [tuple(map(np.concatenate, zip(*parts, strict=True))) for parts in zip(*passed, strict=True)]
+    if not all(np.all(np.isfinite(column)) for columns in each for column in columns):
+        raise FlowFailure("stuck")  # forces do not balance at every state: the motion is none
+    ranges = [_range(*columns) for columns in each]
+    own = ranges[flow.contact]
+    names = [contact.name for contact in flow.reduction.model.contacts]
     away = (np.vstack(back)[::-1] - orbit.states[0]) / np.hypot(flow.scales, orbit.states[0])
     same = np.flatnonzero(np.abs(away).max(axis=1) < SAME * shooting.amplitude)
     cycle = Cycle(
         value=orbit.value,
         period=orbit.period,
-        peak_velocity=float(v.max()),
-        lowest_velocity=float(v.min()),
-        amplitude=amplitude(v),
-        stress_drop=float(t.max() - t.min()),
-        lowest_normal_stress=float(sigma.min()),
-        highest_normal_stress=float(sigma.max()),
+        peak_velocity=own.peak_velocity,
+        lowest_velocity=own.lowest_velocity,
+        amplitude=own.amplitude,
+        stress_drop=own.force_drop,
+        lowest_normal_stress=own.lowest_normal_force,
+        highest_normal_stress=own.highest_normal_force,
         multipliers=tuple(complex(m) for m in others),
         trivial=trivial,
         stable=bool(np.max(np.abs(others), initial=0.0) < 1),
         start=start,
+        speed=setting.speed,
+        contact=names[flow.contact],
+        contacts=dict(zip(names, ranges, strict=True)) if names[0] else {},
         _orbit=orbit,
     )
     return Measured(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0])

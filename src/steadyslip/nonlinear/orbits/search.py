@@ -61,11 +61,9 @@ def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle], attracts: bool 
     """
     flow = tracer.flow
     try:
-        steady = flow.steady(value)
+        pushed = flow.ahead(value, 2.0)
     except Failure:
         return None
-    pushed = steady.copy()
-    pushed[0] -= 2.0 * flow.scales[0]
     for state in (*(cycle._orbit.states[0] for cycle in near if cycle._orbit is not None), pushed):
         found = cycle_near(flow, state, value, PATIENCE, attracts)
         if found is None or found._orbit is None:
@@ -106,9 +104,7 @@ def _met(sheets: list[Sheet], known: Known) -> bool:
 
 def _between_neighbours(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
     def looks(one: Cycle) -> Array:
-        return np.array(
-            [np.log(one.period), np.log(one.peak_velocity), np.arcsinh(one.lowest_velocity / one.start["v"])]
-        )
+        return np.array([np.log(one.period), np.log(one.peak_velocity), np.arcsinh(one.lowest_velocity / one.speed)])
 
     if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
         return False

@@ -51,7 +51,7 @@ def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:
     for begin, share, state in zip(starts, shooting.fractions, orbit.states, strict=True):
         record = flow.watched(setting, state, share * orbit.period, shooting.amplitude).recorded
         times.append(begin * orbit.period + record[:-1, Recorded.TIME])
-        states.append(record[:-1, Recorded.STATE :])
+        states.append(record[:-1, Recorded.STATE : Recorded.STATE + flow.size])
     time, every = np.concatenate(times), np.vstack(states)
     place = np.arcsinh(every / flow.scales)
     arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))

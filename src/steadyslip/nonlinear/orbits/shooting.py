@@ -89,7 +89,8 @@ class Shooting:
         rates = np.einsum(
             "kij,kj->ki", sensitivity, start
         )  # where mass is small, less noisy than the rates at the ends
-        drive, to_unknown = setting.drive, (orbit.value if self.logarithmic else self.size) / setting.unit
+        slip, speed = setting.slip, setting.speed
+        to_unknown = (orbit.value if self.logarithmic else self.size) / setting.unit
         residual = np.empty(count * n + 1)
         jacobian = np.zeros((count * n + 1, count * n + 2))
         stretch = self._stretch(orbit)
@@ -101,9 +102,9 @@ class Shooting:
             jacobian[rows, after * n : (after + 1) * n] -= np.eye(n)
             jacobian[rows, -2] = rates[k] * times[k] / size
             jacobian[rows, -1] = slopes[k] * to_unknown / size
-        residual[-1] = start[0, 0] / drive
-        jacobian[-1, :n] = gradient[0, 0] * stretch[0] / drive
-        jacobian[-1, -1] = across[0, 0] * to_unknown / drive
+        residual[-1] = slip @ start[0] / speed
+        jacobian[-1, :n] = slip @ gradient[0] * stretch[0] / speed
+        jacobian[-1, -1] = slip @ across[0] * to_unknown / speed
         self._last = (u.tobytes(), ends, sensitivity)
         return residual, jacobian
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.quantities import shown
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
@@ -122,8 +124,9 @@ class Tracer:
         roots, vectors = np.linalg.eig(jacobian[0] * ratio)
         i = int(np.argmin(np.abs(roots - 1j * onset.angular_frequency)))
         vector = vectors[:, i] * flow.scales
-        vector *= setting.drive / 2 / (1j * onset.angular_frequency * vector[0])  # unit amplitude of v/v0, in phase
-        start = 2 * vector.imag  # a quarter of a period before the peak
+        # unit amplitude of v/v0 where slip is watched, in phase
+        size = setting.speed / 2 / (1j * onset.angular_frequency * complex(setting.slip @ vector))
+        start = 2 * (size * vector).imag  # a quarter of a period before the peak
         shooting = self.shooting(amplitude=amplitude)
         guess = Orbit((steady + amplitude * start)[None], 2 * np.pi / onset.angular_frequency, onset.value)
         tangent = np.append(start / np.hypot(flow.scales, steady), [0.0, 0.0])
@@ -140,7 +143,7 @@ class Tracer:
         roots, vectors = np.linalg.eig(whole * flow.scales[None, :] / flow.scales[:, None])
         vector = np.real(vectors[:, int(np.argmin(np.abs(roots + 1)))])
         rates, jacobian, _ = flow.field(setting, state[None])
-        gradient, along = jacobian[0, 0] * flow.scales, rates[0] / flow.scales
+        gradient, along = setting.slip @ jacobian[0] * flow.scales, rates[0] / flow.scales
         vector = vector - along * (gradient @ vector) / (gradient @ along)  # stay where v equals the drive
         vector /= np.linalg.norm(vector)
         shooting, size = self.shooting(), 1e-3
@@ -321,8 +324,8 @@ class Tracer:
         if twice and before.half @ now.half < -0.5 * np.linalg.norm(before.half) * np.linalg.norm(now.half):
             return ENDS["doubling"], False
         setting = self.flow.setting(cycle.value)
-        fast = cycle.peak_velocity > LARGE * setting.drive
-        bounded = bool(self.flow.reduction.model.inertial or self.flow.rig.radiation_damping)
+        fast = cycle.peak_velocity > LARGE * setting.speed
+        bounded = self.flow.reduction.model.inertial or is_damped(self.flow.rig)
         if abs(cycle.trivial - 1) > IMPRECISE and cycle.amplitude > SMALL:
             return ENDS["unbounded" if fast and not bounded else "precision"], True
         if cycle.growth > TOO_UNSTABLE:
@@ -341,11 +344,13 @@ class Tracer:
         With mass rounding in the state is most of the acceleration; what is carried round once is true.
         """
         orbit = now.shooting.orbit(now.point.u)
-        rates, jacobian, _ = self.flow.field(self.flow.setting(orbit.value), orbit.states)
+        setting = self.flow.setting(orbit.value)
+        rates, jacobian, _ = self.flow.field(setting, orbit.states)
         carried = rates[0]
         for sensitivity in now.shooting.sensitivities(now.point.u):
             carried = sensitivity @ (carried / self.flow.scales) * self.flow.scales
-        return bool(jacobian[0, 0] @ rates[0] <= 0 and jacobian[0, 0] @ carried <= 0)
+        faster = setting.slip @ jacobian[0]
+        return bool(faster @ rates[0] <= 0 and faster @ carried <= 0)
 
     def _at_limit(self, inside: Known, outside: Known) -> Known:
         """The cycle on the limit of the range."""
@@ -378,6 +383,13 @@ class Tracer:
         if point.tangent @ (curve.weights * close.tangent) < 0:
             point = replace(point, tangent=-point.tangent)
         return self.known(shooting, point)
+
+
+def is_damped(rig: Slider | Machine) -> bool:
+    """Whether something holds a light block back the more, the faster it is."""
+    if isinstance(rig, Slider):
+        return bool(rig.radiation_damping)
+    return any(bool(np.any(one.damping)) for one in rig.mechanism().elements)
 
 
 def _winds(special: list[SpecialCycle]) -> bool:

@@ -22,7 +22,7 @@ MOST_STEPS_BETWEEN = 40
 def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
     """What follows the cycles that begin at an onset, anywhere."""
     rig = onset.rig.with_values({onset.along: onset.value})
-    return Tracer(Flow(rig, onset.along, steady, rtol), onset, (-np.inf, np.inf), MOST_STEPS_BETWEEN)
+    return Tracer(Flow(rig, onset.along, steady, rtol, onset.contact), onset, (-np.inf, np.inf), MOST_STEPS_BETWEEN)
 
 
 def cycles_at(

@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.flow import FlowFailure, FlowSetting, Runs
+from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs
 from steadyslip.nonlinear.orbits.measure import amplitude, measured
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
@@ -92,15 +92,15 @@ def _stretches(runs: Runs, setting: FlowSetting, state: Array, unknown: float, p
         while len(times) < RETURNS and spent < MOST_STEPS * patience:
             outcome = runs.watched(setting, state, span, unknown=unknown)
             record, log = outcome.recorded, outcome.log
-            visited = record[:, Recorded.STATE :]
-            at = log[(log[:, 0] == BEGINS) & (log[:, 1] > 0), 1]
+            visited = record[:, Recorded.STATE : Recorded.STATE + runs.size]
+            at = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0), 1]
             times += list(now + at)
             states += list(_between(runs, setting, record, at))
             low.append(np.arcsinh(visited.min(axis=0) / runs.scales))
             high.append(np.arcsinh(visited.max(axis=0) / runs.scales))
             if np.max(high[-1] - low[-1]) < SMALLEST:
                 return
-            speeds.append(np.append(log[:, 2], runs.observed(setting, record[:, 0], record[:, Recorded.POINT :])["v"]))
+            speeds.append(runs.speeds(setting, outcome))
             state, unknown = outcome.state[0], float(outcome.unknown[0])
             now, spent = now + span, spent + len(record)
             span *= 2.0 if len(times) < RETURNS // 2 else 1.0
@@ -112,7 +112,7 @@ def _stretches(runs: Runs, setting: FlowSetting, state: Array, unknown: float, p
 
 def _between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
     """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
-    time, states = record[:, Recorded.TIME], record[:, Recorded.STATE :]
+    time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
     i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     h = (time[i + 1] - time[i])[:, None]
     s = (at - time[i])[:, None] / h

@@ -101,7 +101,9 @@ def install(home, extra=""):
 
 
 def call(*command, folder=None):
-    return subprocess.call(command, cwd=folder)
+    # what Python makes of a checkout is kept in it: without that every process would make it anew
+    surroundings = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return subprocess.call(command, cwd=folder, env=surroundings)
 
 
 def require(*command):

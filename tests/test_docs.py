@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 import steadyslip as ss
 from command import run, without_laws_of_tests
@@ -161,6 +162,18 @@ def steps(page: Path) -> Iterator[tuple[str, str, str]]:
                 yield "run", command, shown
 
 
+@pytest.fixture
+def unpainted_files(monkeypatch):
+    """Pictures are made and named, not painted: that they can be is seen where commands are tested."""
+    paint = Figure.savefig
+
+    def savefig(self, to, **options):
+        Path(to).touch() if isinstance(to, str | Path) else paint(self, to, **options)
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
+
+
+@pytest.mark.usefixtures("unpainted_files")
 @pytest.mark.parametrize("page", SHOWN_PAGES, ids=names)
 def test_commands_print_what_the_page_shows(page, tmp_path):
     shutil.copytree(ROOT / "examples", tmp_path / "examples")

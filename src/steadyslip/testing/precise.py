@@ -97,7 +97,7 @@ def precise_function(
     def function(*numbers: Any) -> list[mpmath.mpf]:
         with mpmath.workdps(DIGITS):
             try:
-                values = [mpmath.mpmathify(value) for value in compiled(*(mpmath.mpf(n) for n in numbers))]
+                values = [mpmath.mpmathify(value) for value in compiled(*map(_precise, numbers))]
             except (NameError, TypeError) as error:
                 raise unusable(error) from error
             except ZeroDivisionError as error:
@@ -107,6 +107,11 @@ def precise_function(
             return [mpmath.nan if isinstance(value, mpmath.mpc) else value for value in values]  # log of -1
 
     return function
+
+
+def _precise(number: Any) -> mpmath.mpf:
+    """A number to compute with; making one of itself takes longer than most equations."""
+    return number if type(number) is mpmath.mpf else mpmath.mpf(number)
 
 
 def disagreement(

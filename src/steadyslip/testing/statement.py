@@ -74,7 +74,8 @@ class Statement(Keeper):
     def function(self, *expressions: sp.Expr) -> Callable[..., list[mpmath.mpf]]:
         """The expressions as a function of v, σ, memory variables, τ."""
         compiled = precise_function(self.law, [*self.inputs, *self.numbers], expressions)
-        return lambda *numbers: compiled(*numbers, *self.numbers.values())
+        own = [mpmath.mpf(number) for number in self.numbers.values()]
+        return lambda *numbers: compiled(*numbers, *own)
 
     @question
     def floats(self, *expressions: sp.Expr) -> Callable[..., list[Any]]:
@@ -82,6 +83,7 @@ class Statement(Keeper):
         compiled = array_function([*self.inputs, *self.numbers], expressions)
         return lambda *numbers: compiled(*numbers, *self.numbers.values())
 
+    @question
     def steady(self, v: float, sigma: float) -> tuple[mpmath.mpf, ...]:
         """v, σ, memory variables and τ of steady sliding."""
         unused = [0] * (len(self.memory) + 1)

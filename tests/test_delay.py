@@ -282,10 +282,5 @@ def test_what_is_not_offered_with_delay_says_so(tmp_path):
     assert "delay" in done.stderr
     with pytest.raises(ss.NotAvailable, match="motion with a delay is not offered"):
         reduce_model(build_model(late_axis("0.1 s")))
-    with pytest.raises(ss.ParameterError, match="describe it as a machine"):
-        ss.Slider(
-            friction=lagging(1.0).contacts["guide"].friction, contact=ss.Constant(preload=1.0), stiffness=1.0,
-            drive=ss.Steady(1.0),
-        )  # fmt: skip
     with pytest.raises(ss.ParameterError, match="delay"):
         ss.PositionPD(velocity=1.0, body="motor", kp=1.0, delay=-0.1)

@@ -1,5 +1,7 @@
 """A machine with one body is a slider: steady sliding, polynomial, eigenvalues, verdict."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,21 @@ DRIVES = {
     "pd": (ss.PD(V, kp=2e8, kd=1e9), ss.PositionPD(velocity=V, body="block", kp=2e8, kd=1e9)),
     "pid": (ss.PID(V, kp=2e8, kd=1e9, ki=1e6), ss.PositionPID(velocity=V, body="block", kp=2e8, kd=1e9, ki=1e6)),
 }
+
+
+LATE = {
+    "late pd": (
+        ss.PD(V, kp=2e8, kd=1e9, delay=0.3),
+        ss.PositionPD(velocity=V, body="block", kp=2e8, kd=1e9, delay=0.3),
+    ),
+    "late pid": (
+        ss.PID(V, kp=2e8, kd=1e9, ki=1e6, delay=0.3),
+        ss.PositionPID(velocity=V, body="block", kp=2e8, kd=1e9, ki=1e6, delay=0.3),
+    ),
+}
+
+LATE_FRICTION = ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=V, viscous=1e4, lag=0.05)
+WET = ss.PoreFluid(preload=5e6, suction=2e5, drainage=0.1, slip_distance=7e-6, v_ref=V)
 
 
 def pair(friction, contact, drive, idle):
@@ -114,3 +131,101 @@ def test_stable_values_of_a_slider_are_its_stable_stiffness():
     """By another route: where the polynomial is looked at, not p and q of the Model."""
     slider, _ = pair(FRICTIONS["two states"], CONTACTS["inclined"], DRIVES["pull"], False)
     assert ss.stable_values(slider, "stiffness") == pytest.approx(ss.stable_stiffness(slider), rel=1e-9)
+
+
+SHORT = {
+    "late pd": (FRICTIONS["slip"], CONTACTS["constant"], LATE["late pd"]),
+    "late pid": (FRICTIONS["two states"], CONTACTS["inclined"], LATE["late pid"]),
+    "lag": (LATE_FRICTION, CONTACTS["inclined"], DRIVES["pull"]),
+    "pore fluid": (FRICTIONS["slip"], WET, DRIVES["pull"]),
+    "pore fluid, pid": (FRICTIONS["aging, Linker-Dieterich, regularised"], WET, DRIVES["pid"]),
+}
+
+
+def short(kind):
+    """With so much mass that nothing is faster than the delays by decades."""
+    slider, machine = pair(*SHORT[kind], False)
+    return replace(slider, mass=1e10), machine.with_values({"bodies.block.mass": 1e10})
+
+
+@pytest.mark.parametrize("kind", SHORT)
+def test_a_slider_has_all_that_its_machine_has(kind):
+    """Friction and controllers that are late, contacts with states of their own: random numbers under both names."""
+    slider, machine = short(kind)
+    mine, other = varied(slider, machine, 20, list(SHORT).index(kind))
+    a, b = ss.eigenvalues(slider, mine), ss.eigenvalues(machine, other)
+    assert np.array_equal(np.isnan(a), np.isnan(b))
+    assert np.isfinite(a).sum() > 20
+    assert np.nan_to_num(b) == pytest.approx(np.nan_to_num(a), rel=1e-6)
+    assert np.array_equal(ss.stability(slider, mine), ss.stability(machine, other))
+    mine.pop("slider.stiffness")
+    other.pop("links.spring.stiffness")
+    mine, other = ({name: values[:4] for name, values in each.items()} for each in (mine, other))
+    sets = ss.stable_stiffness(slider, mine), ss.stable_values(machine, "links.spring.stiffness", other)
+    count = min(one.shape[-2] for one in sets)
+    assert sets[1][:, :count] == pytest.approx(sets[0][:, :count], rel=1e-7, nan_ok=True)
+
+
+@pytest.mark.parametrize("kind", SHORT)
+def test_the_verdict_of_such_a_slider_is_that_of_its_machine(kind):
+    slider, machine = short(kind)
+    one, two = ss.analyze(slider), ss.analyze(machine)
+    assert (one.stable, one.unstable_roots) == (two.stable, two.unstable_roots)
+    assert one.growth_rate == pytest.approx(two.growth_rate, rel=1e-9)
+    assert [delay for delay, _ in one.characteristic_terms] == [delay for delay, _ in two.characteristic_terms]
+    edges = {m.parameter: m.edge.value for m in one.margins if m.edge is not None}
+    found = {m.parameter: m.edge.value for m in two.margins if m.edge is not None}
+    assert len(edges) > 3
+    for name, edge in edges.items():
+        own = {
+            "slider.mass": "bodies.block.mass",
+            "slider.stiffness": "links.spring.stiffness",
+            "slider.damping": "links.spring.damping",
+            "slider.radiation_damping": "links.guide.damping",
+        }.get(name)
+        own = own or (name if name.startswith("drive.") else f"contacts.slide.{name}")
+        assert found[own] == pytest.approx(edge, rel=1e-7), name
+    assert ss.rig_from_text(ss.rig_to_text(slider)) == slider
+    assert "NaN" not in one.to_json()
+
+
+def test_pore_fluid_under_a_slider_follows_in_motion():
+    slider, machine = pair(FRICTIONS["slip"], WET, DRIVES["pull"], False)
+    times = np.linspace(0.0, 60.0, 31)
+    for a, b in ((slider, machine), (replace(slider, mass=0.0), machine.with_values({"bodies.block.mass": 0.0}))):
+        one, two = (ss.simulate(rig, ss.VelocityStep(at=5.0, to=1.5 * V), times=times, until=60.0) for rig in (a, b))
+        assert one["v"] == pytest.approx(two["block.v"], rel=1e-12)
+        assert one["pore_pressure"] == pytest.approx(two["slide.pore_pressure"], rel=1e-9, abs=1e-6)
+        assert np.ptp(one["pore_pressure"]) > 1e4
+    assert one.units["dilation"] == "Pa"
+
+
+@pytest.mark.parametrize("kind", ["late pd", "lag"])
+def test_what_a_delay_does_not_offer_is_said(kind):
+    slider, _ = short(kind)
+    for ask in (
+        lambda: ss.simulate(slider, until=1.0),
+        lambda: ss.simulate_many(slider, {"mass": [1e4, 2e4]}, until=1.0),
+        lambda: ss.hopf(slider),
+        lambda: ss.threshold(slider),
+        lambda: ss.cycles(slider, along="stiffness"),
+        lambda: ss.state_space(slider),
+        lambda: ss.formula(slider),
+    ):
+        with pytest.raises(ss.NotAvailable, match=r"delay|no oscillatory edge"):
+            ask()
+
+
+def test_stable_stiffnesses_of_late_friction_are_the_windows_of_theory():
+    """Theory 10: m s² + (c + S e^(−sδ)) s + k, boundaries m β² − S β sin βδ where cos βδ = −c/S; m = δ = 1."""
+    law = ss.CoulombStribeck(mu_coulomb=0.1, mu_static=0.5, v_stribeck=1.0, lag=1.0)
+    slope = -2.0 * 0.4 * np.exp(-1.0)  # of the curve at v = 1
+    slider = ss.Slider(
+        friction=law, contact=ss.Constant(preload=1.0), stiffness=5.0, mass=1.0, radiation_damping=0.05,
+        drive=ss.Steady(1.0),
+    )  # fmt: skip
+    found = ss.stable_stiffness(slider)
+    turns = np.arccos(-0.05 / slope)
+    beta = np.sort([*(turns + 2 * np.pi * np.arange(4)), *(2 * np.pi * np.arange(1, 4) - turns)])
+    expected = beta**2 - slope * beta * np.sin(beta)
+    assert found.ravel()[: len(expected) - 1] == pytest.approx(expected[: len(expected) - 1], rel=1e-9)

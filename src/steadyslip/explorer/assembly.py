@@ -21,8 +21,8 @@ from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
+from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.search import Search
-from steadyslip.linear.stable_values import linear_set
 from steadyslip.linear.status import STABLE, UNSTABLE, status
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

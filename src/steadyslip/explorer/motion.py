@@ -99,7 +99,7 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
 def _start(reduction: Reduction) -> list[sp.Expr]:
     """Variables that jumps leave alone, and behind them the velocity variable: of steady sliding, but for a blow."""
     model = reduction.model
-    steady = {item.symbol: sp.sympify(model.steady[item.symbol]) for item in model.memory}
+    steady = {item.symbol: sp.sympify(model.steady[item.symbol]) for item in (*model.memory, *model.states)}
     speed = reduction.w_of_v.xreplace(steady | {model.contact.velocity: BLOW * model.parameters["drive.velocity"]})
     found = steady | {W: speed}
     return [*(found.get(symbol, sp.Integer(0)) for symbol in reduction.continuous), speed]

@@ -101,9 +101,12 @@ def response(model: Model) -> Response:
     if not has_closed_form(model):
         if not model.is_slider:
             raise NotAvailable("the closed form is one of a Slider; stable_values gives a machine's edges as numbers")
+        further = [f"{len(model.memory)} memory variables"] if len(model.memory) != 1 else []
+        further += [what for what, there in (("integral control", model.integrals), ("a delay", model.delays),
+                                             ("states of its contact", model.states)) if there]  # fmt: skip
         raise NotAvailable(
-            "the closed form needs exactly one memory variable and no integral control; this model has "
-            f"{len(model.memory)} memory variables; stable_stiffness gives the edges as numbers"
+            "the closed form needs exactly one memory variable, no integral control, no states of the contact and no "
+            f"delay; this model has {', '.join(further)}; stable_stiffness gives the edges as numbers"
         )
     contact, memory = model.contact, model.memory[0].symbol
     v, sigma, tau, balance = contact.velocity, contact.normal, contact.friction, contact.balance

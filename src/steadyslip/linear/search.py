@@ -10,19 +10,20 @@ edges are exact (theory 3), and so are those of whatever enters linearly in a ma
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import Dimension, shown, unit
+from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.polynomials import Array, StableSet
 from steadyslip.linear.spectrum import is_ill_posed, nearness, spectrum, static_sum
-from steadyslip.linear.stable_values import linear_set
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
-from steadyslip.linear.stiffness import set_of_one
+from steadyslip.linear.stiffness import STIFFNESS, set_of_one
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.model.linearisation import linearise
@@ -256,9 +257,12 @@ class Search:
     def _exact(self) -> StableSet | None:
         """The stable set of the stiffness of a slider, and of whatever enters linearly in a machine."""
         point = operating_point(self.rig, None, self.present, self.branch)
-        if self.name == "slider.stiffness":
-            return set_of_one(point)
-        if point.model.is_slider or not point.exists or self.role.domain.low < 0:
+        late = bool(point.model.delays)
+        if self.name == STIFFNESS:
+            with suppress(NotAvailable):  # windows without end
+                return set_of_one(point)
+            return None
+        if (point.model.is_slider and not late) or not point.exists or self.role.domain.low < 0:
             return None
         return linear_set(point, self.name)
 

@@ -9,21 +9,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
-from steadyslip.linear.crossing import APART, linear_split
-from steadyslip.linear.polynomials import Array, StableSet, columns, most_intervals, quietly, stable_set
+from steadyslip.linear.linear_sets import linear_set, not_linear, sets_of
+from steadyslip.linear.polynomials import Array
 from steadyslip.linear.stiffness import in_chunks
-from steadyslip.linear.windows import delay_set, linear_windows
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.linearisation import characteristic_terms
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
-from steadyslip.model.range import quasi, require_range
-
-_WINDOWS = 8  # of a rig with delay that arrays of them have room for
+from steadyslip.model.range import require_range
 
 
 @checked()
@@ -71,22 +66,8 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     require_range(point)
     own = linear_set(point, full)
     if own is None:
-        raise _not_linear(full)
+        raise not_linear(full)
     return np.asarray(own.intervals[np.isfinite(own.intervals[:, 0])])
-
-
-def _not_linear(name: str) -> NotAvailable:
-    return NotAvailable(
-        f"the equations do not depend on {name} linearly, so that its stable set has no exact form; boundary(rig, "
-        f"{name!r}) scans for its edges"
-    )
-
-
-def most_values(point: OperatingPoint) -> int:
-    """How many intervals `stable_intervals` has room for."""
-    return (
-        _WINDOWS if point.model.delays else most_intervals(len(characteristic_terms(point.model)[0].coefficients) - 1)
-    )
 
 
 def stable_intervals(point: OperatingPoint, name: str) -> Array:
@@ -97,26 +78,7 @@ def stable_intervals(point: OperatingPoint, name: str) -> Array:
     NotAvailable
         If it does not enter linearly.
     """
-    most = most_values(point)
-
-    def kernel(part: OperatingPoint) -> Array:
-        found = np.full((*part.shape, most, 2), np.nan)
-        if not part.model.delays:
-            inner = linear_sets(part, name).intervals
-            found[..., : inner.shape[-2], :] = inner
-            return found
-        flat = found.reshape(-1, most, 2)
-        for i, one in enumerate(part.pieces(1)):
-            if not np.all(np.isfinite(quasi(one)[0])):
-                continue
-            own = linear_set(one.with_arguments([np.reshape(a, -1)[0] for a in one.arguments], ()), name)
-            if own is None:
-                raise _not_linear(name)
-            count = min(len(own.intervals), most)
-            flat[i, :count] = own.intervals[:count]
-        return found
-
-    return np.asarray(in_chunks(point, kernel))
+    return np.asarray(in_chunks(point, lambda part: sets_of(part, name)))
 
 
 def nearest_value(intervals: Array, own: Any) -> Array:
@@ -125,70 +87,3 @@ def nearest_value(intervals: Array, own: Any) -> Array:
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)
     distance = np.where(np.isnan(ends), np.inf, np.abs(ends - np.asarray(own, dtype=float)[..., None]))
     return np.take_along_axis(ends, np.argmin(distance, axis=-1)[..., None], axis=-1)[..., 0]
-
-
-def linear_sets(point: OperatingPoint, name: str) -> StableSet:
-    """The stable sets of one parameter for arrays of rigs without delay, whatever value of it these have.
-
-    Raises
-    ------
-    NotAvailable
-        If it does not enter linearly.
-    """
-    place = list(point.model.parameters).index(name)
-    own = np.broadcast_to(np.asarray(point.arguments[place], dtype=float), point.shape)
-    size = np.where(own > 0, own, 1.0)
-    factors = np.array([1 / APART, 1.0, APART])
-    arguments = list(point.arguments)
-    arguments[place] = factors.reshape(3, *(1,) * size.ndim) * size
-    c = quasi(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
-    known = np.all(np.isfinite(c), axis=(0, -1))
-    p, q, bent = _split(c)
-    if np.any(known & (bent | ~np.any(q, axis=-1))):
-        raise _not_linear(name)
-    found, unit = stable_set(p, q), size[..., None]
-    intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
-    return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
-
-
-def _split(c: Array) -> tuple[Array, Array, Array]:
-    """p and q of p + f q from values at three factors f, first axis; and where these do not lie on a line."""
-    low, own, high = (columns(one) for one in c)
-    p, q, straight = linear_split(low, own, high)
-    return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
-
-
-@quietly
-def linear_set(point: OperatingPoint, name: str) -> StableSet | None:
-    """The stable set of one parameter of a single rig; None where it does not enter linearly, or is not positive."""
-    value = float(point.named()[name])
-    symbol = point.model.parameters[name]
-    if any(delay.has(symbol) for delay in point.model.delays):
-        return _delay_set(point, symbol)
-    if not value > 0:
-        return None
-    place = list(point.model.parameters).index(name)
-    factors = np.array([1 / APART, 1.0, APART])
-    arguments = [a if i != place else value * factors for i, a in enumerate(point.arguments)]
-    c, h = quasi(point.with_arguments(arguments, (3,)))
-    if not np.all(np.isfinite(c)):
-        return None
-    p, q, bent = _split(c)
-    if np.any(bent) or not np.any(q):
-        return None
-    late = bool(point.model.delays)
-    found = linear_windows(p, q, h[1], factors[0], factors[2]) if late else stable_set(p[0], q[0])
-    return (
-        None
-        if found is None
-        else StableSet(found.intervals * value, found.edges * value, found.frequencies, found.changes)
-    )
-
-
-def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
-    """That of a delay, where it is the only one."""
-    terms = characteristic_terms(point.model)
-    if [term.delay for term in terms] != [0, symbol]:
-        return None
-    c, _ = quasi(point)
-    return delay_set(c[0], c[1]) if np.all(np.isfinite(c)) else None

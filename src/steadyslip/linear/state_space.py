@@ -52,6 +52,10 @@ def state_matrices(rig: Slider, outputs: Sequence[str]) -> tuple[Array, Array, A
     for name in outputs:
         if name not in model.observables:
             raise UnknownNameError("output", name, model.observables)
+    if model.delays:
+        raise NotAvailable(
+            "a delay has no state space of finitely many variables; eigenvalues gives the rightmost ones"
+        )
     require_range(point)
     stresses = point.all_stresses()
     if not stresses:

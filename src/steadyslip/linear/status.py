@@ -109,7 +109,7 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
         if has_closed_form(point.model):
             part = response_numbers(point)
             terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]
-        elif not point.model.is_slider:
+        elif point.model.delays or not point.model.is_slider:
             terms = [np.broadcast_to(term, point.shape) for term in point.evaluate(_static_terms(point.model))]
         else:
             p, q = stiffness_polynomials(point)

@@ -18,17 +18,19 @@ from steadyslip.core.expressions import array_function
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
-from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, most_intervals, quietly, stable_set
+from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_late
+from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, quietly, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
 from steadyslip.linear.spectrum import is_ill_posed, spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
+from steadyslip.model.linearisation import stiffness_split
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range, quasi, require_range, stacked, surely_in_range, warn_of_range
 from steadyslip.model.steady import steady_equation
 
+STIFFNESS = "slider.stiffness"
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
 _LEAST = 1e-290  # size beneath which a product of numbers is looked at by the general route
 
@@ -105,7 +107,7 @@ def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
         Rigs with fewer than m intervals are padded with NaN; all NaN means that no stiffness is stable.
     """
     point = operating_point(rig, vary)
-    most = 1 if has_closed_form(point.model) else most_intervals(len(characteristic_coefficients(point.model)) - 1)
+    most = 1 if has_closed_form(point.model) else most_values(point)
 
     def kernel(part: OperatingPoint) -> Array:
         low, high = interval_ends(part)
@@ -172,8 +174,18 @@ def stiffness_polynomials(point: OperatingPoint) -> tuple[Array, Array]:
 
 
 def general_set(point: OperatingPoint) -> StableSet:
-    """The stable set by the Model's characteristic polynomial, for any number of states."""
+    """The stable set by the Model's characteristic equation, for any number of states; with a delay only intervals."""
+    if point.model.delays:
+        nothing = np.empty(0)
+        return StableSet(sets_of(point, STIFFNESS, _size(point)), nothing, nothing, nothing.astype(bool))
     return stable_set(*stiffness_polynomials(point))
+
+
+def _size(point: OperatingPoint) -> Array:
+    """A stiffness around which to look for others: that of the spring, else what a controller adds, else one."""
+    own = np.broadcast_to(np.asarray(point.named()[STIFFNESS], dtype=float), point.shape)
+    gain = np.broadcast_to(np.asarray(point.gain, dtype=float), point.shape)
+    return np.where(own > 0, own, np.where(gain > 0, gain, 1.0))
 
 
 @question
@@ -263,6 +275,11 @@ def set_of_one(point: OperatingPoint) -> StableSet:
 
     The closed form keeps its digits where a large mass swamps the direct effect in the polynomial.
     """
+    if point.model.delays:
+        found = linear_set(point, STIFFNESS, float(_size(point)))
+        if found is None:
+            raise too_late(STIFFNESS)
+        return found
     if not has_closed_form(point.model):
         return general_set(point)
     low, high = (float(end) for end in closed_form_interval(point))

@@ -32,6 +32,10 @@ class Drive(FrozenRecord, family="drive", kw_only=False):
         """Stress per unit time integral of the slip x (Pa/(m s)), None without integral action."""
         return None
 
+    def lateness(self) -> Any:
+        """Time (s) between measuring and acting."""
+        return 0
+
 
 class Steady(Drive, name="steady", kw_only=False):
     """A load point pulled at constant velocity."""
@@ -42,12 +46,18 @@ class PD(Drive, name="pd", kw_only=False):
 
     kp: float = parameter("Pa/m", nonnegative, "proportional gain", default=0.0, structural=True, kind="stiffness")
     kd: float = parameter("Pa s/m", nonnegative, "derivative gain", default=0.0, structural=True)
+    delay: float = parameter(
+        "s", nonnegative, "dead time between measuring and acting", default=0.0, structural=True, kind="delay"
+    )
 
     def proportional(self) -> Any:
         return self.kp
 
     def derivative(self) -> Any:
         return self.kd
+
+    def lateness(self) -> Any:
+        return self.delay
 
 
 class PID(PD, name="pid", kw_only=False):

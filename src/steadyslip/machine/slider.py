@@ -62,16 +62,6 @@ class Slider(Rig, section="slider"):
                 f"the contact {self.contact.name!r} has no axis at an angle; give stiffness instead",
             )
 
-        if self.friction.lateness() != 0:
-            yield Problem(
-                "friction.lag", "friction that follows velocity late is not offered for a slider; describe it as a "
-                "machine with one body",
-            )  # fmt: skip
-        if self.contact.memory():
-            yield Problem(
-                "contact", f"the contact {self.contact.name!r} has states of its own, which is not offered for a "
-                "slider; describe it as a machine with one body",
-            )  # fmt: skip
         if self.contact.is_compliant():
             yield Problem(
                 "contact",
@@ -104,15 +94,15 @@ class Slider(Rig, section="slider"):
         """One coordinate, x, with the spring and controller between it and the load point."""
         pulled = {"x": 1, LOAD_POINT: -1}
         drive = self.drive
-        ki = drive.integral()
+        ki, late = drive.integral(), drive.lateness()
         return Mechanism(
             coordinates=(DegreeOfFreedom("x", self.mass, drive.velocity),),
             elements=(
                 Element("", {"x": 1}, pulled, self.stiffness, self.damping),
-                Element("", {"x": 1}, pulled, drive.proportional(), drive.derivative()),
+                Element("", {"x": 1}, pulled, drive.proportional(), drive.derivative(), delay=late),
                 Element("", {"x": 1}, {"x": 1}, 0, self.radiation_damping, grounded=True),
             ),
-            integral=None if ki is None else Integral({"x": 1}, {"x": 1}, ki),
+            integral=None if ki is None else Integral({"x": 1}, {"x": 1}, ki, late),
             touches=(Touch("", self.friction, self.contact, {"x": 1}, {}, 1),),
             velocity=drive.velocity,
             gain=drive.proportional(),

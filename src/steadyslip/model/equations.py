@@ -213,8 +213,8 @@ class Model(Keeper, Displayed):
 
     @property
     def has_closed_form(self) -> bool:
-        """Whether the paper's cubic describes it: a slider with one memory variable and no integral control."""
-        return self.is_slider and len(self.memory) == 1 and not self.integrals and not self.states
+        """Whether the paper's cubic describes it: a slider with one memory variable, no other state and no delay."""
+        return self.is_slider and len(self.memory) == 1 and not self.integrals and not self.states and not self.delays
 
     @property
     def is_slider(self) -> bool:

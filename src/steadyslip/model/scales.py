@@ -350,6 +350,7 @@ def sizes(
         scale = choose((scale > 0) & (scale < np.inf), scale, choose(own > 0, own, 1.0))
         most = choose(own > 1e-3 * scale, own, 1e-3 * scale)
         scales[item.name] = choose((own > 0) & (most < scale), most, scale)
+    scales |= {item.name: choose(direct > 0, direct, by_slip * x) for item in contact.own_states}
     scales |= {item.name: x * x / drive for item in reduction.model.integrals}
     if reduction.model.is_single and reduction.restarts:
         return scales, scales["w"]

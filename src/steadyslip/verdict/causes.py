@@ -89,6 +89,8 @@ def _why_negative(known: Response, denominator: float) -> str:
 
 
 def _why_none_in_general(analysis: Findings) -> str:
+    if analysis.characteristic_terms:
+        return ""
     p, q = stiffness_polynomials(operating_point(analysis.rig, branch=analysis.branch))
     if p[..., 0] <= 0 and q[..., 0] <= 0:
         return ": a disturbance grows without oscillating (static stability, a0 > 0, fails at every stiffness)"

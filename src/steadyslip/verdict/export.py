@@ -47,6 +47,10 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
 
 def common_numbers(found: Verdict) -> dict[str, Any]:
     """What sliders and machines have alike."""
+    late = {
+        "characteristic_terms": [{"delay": h, "coefficients": list(c)} for h, c in found.characteristic_terms],
+        "unstable_roots": found.unstable_roots,
+    }
     return {
         "version": found.version,
         "stable": found.stable,
@@ -62,6 +66,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "time_to_double": found.time_to_double,
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),
+        **(late if found.characteristic_terms else {}),
     }
 
 

@@ -37,6 +37,8 @@ class Verdict(Displayed):
     time_to_halve: float | None = None
     time_to_double: float | None = None
     on_edge: bool = False
+    characteristic_terms: tuple[tuple[float, tuple[float, ...]], ...] = ()
+    unstable_roots: int | None = None
     version: str = field(default="", repr=False)
 
     @property
@@ -73,6 +75,9 @@ class Findings(Verdict):
         Coefficients, lowest power first (theory 3: a0, a1, ...).
     routh : tuple of float
         First column of the Routh array; stable if all are positive.
+    characteristic_terms, unstable_roots
+        With a delay in place of the two before: delays (s) and the polynomials that stand before exp(−s delay), that
+        without delay first; and how many of the infinitely many eigenvalues grow.
     growth_rate : float or None
         Largest real part (1/s), inf if ill-posed.
     period : float or None
@@ -140,5 +145,3 @@ class MachineFindings(Verdict):
     rig: Machine
     steady: SteadyMachine | None = None
     mode: Mode | None = None
-    characteristic_terms: tuple[tuple[float, tuple[float, ...]], ...] = ()
-    unstable_roots: int | None = None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from steadyslip.linear.stable_values import linear_set
+from steadyslip.linear.linear_sets import linear_set
 from steadyslip.model.point import operating_point
 
 if TYPE_CHECKING:

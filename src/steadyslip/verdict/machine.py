@@ -164,13 +164,7 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
 
 def as_dict(found: MachineAnalysis) -> dict[str, Any]:
     """SI units, forces; numbers that do not exist, and infinite ones, are None."""
-    data = common_numbers(found) | {"steady": _steady(found.steady), "mode": _mode(found.mode)}
-    if found.characteristic_terms:
-        data["characteristic_terms"] = [
-            {"delay": delay, "coefficients": list(c)} for delay, c in found.characteristic_terms
-        ]
-        data["unstable_roots"] = found.unstable_roots
-    return data
+    return common_numbers(found) | {"steady": _steady(found.steady), "mode": _mode(found.mode)}
 
 
 def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings, Verdict
 
 NEXT_TO_IT = 1e-6  # change of a parameter that only its weak effect sets apart from the edge that the rig is on
+MOST_WINDOWS = 4  # of stable stiffnesses that are told in words
 
 _ONSETS = {
     "supercritical": "just beyond the edge in stiffness, oscillation begins small and grows with distance",
@@ -231,6 +232,13 @@ def _stable_set(analysis: Findings) -> str:
             parts.append(f"{held.words} below {_stiffness(analysis, high)}")
         else:
             parts.append(f"{held.words} from {_stiffness(analysis, low)} to {_stiffness(analysis, high)}")
+    if len(parts) > MOST_WINDOWS:  # those around the rig's own stiffness, or the lowest
+        at = next((i for i, (low, high) in enumerate(held.stable) if low < held.own < high), 0)
+        first = max(0, min(at - MOST_WINDOWS // 2, len(parts) - MOST_WINDOWS))
+        more = f"{len(parts) - MOST_WINDOWS} windows more, see stable_stiffness"
+        parts = [*parts[first : first + MOST_WINDOWS], more]
+    if not parts and analysis.characteristic_terms and analysis.stable:
+        return f"windows of {held.words} too many to be listed"
     return ", or ".join(parts) or f"no {held.words}"
 
 

@@ -14,7 +14,7 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
 
     Porosity φ follows slip, φ̇ = −(v/d_c)[φ − φ0 − ε ln(v/v_ref)], and pore pressure p, counted from that around,
     ṗ = −c* p − φ̇/β. Here both are pressures, D = (φ − φ0)/β and p, and `suction` is ε/β: by so much the pressure would
-    fall for each e-fold of velocity if nothing drained. `preload` is the effective one. For contacts of machines.
+    fall for each e-fold of velocity if nothing drained. `preload` is the effective one.
     """
 
     suction: float = parameter("Pa", real, "fall of pore pressure ε/β per e-fold of velocity, undrained")

@@ -41,7 +41,7 @@ class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
     τ = σ[g(v) + σ2 v], g as in `StribeckCurve`. Without a memory there is no critical stiffness: where friction falls
     with velocity, the quasistatic problem is ill-posed and with mass no stiffness stabilises. Here to show just that.
 
-    With a `lag` δ, of machines, the curve follows velocity late, τ = σ[g(v(t − δ)) + σ2 v(t)]: the frictional memory of
+    With a `lag` δ the curve follows velocity late, τ = σ[g(v(t − δ)) + σ2 v(t)]: the frictional memory of
     Hess & Soom (1990) and Armstrong-Hélouvry (1991). Then stiffnesses are stable and unstable by turns.
     """
 

@@ -12,10 +12,9 @@ from steadyslip.core.quantities import outside
 from steadyslip.core.records import setting
 from steadyslip.core.roles import Text
 from steadyslip.linear import critical_stiffness, safety_factor, stable_stiffness
-from steadyslip.linear.polynomials import most_intervals
+from steadyslip.linear.linear_sets import most_values
 from steadyslip.linear.response import has_closed_form
-from steadyslip.linear.stable_values import most_values, nearest_value, stable_intervals
-from steadyslip.linear.stiffness import stiffness_polynomials
+from steadyslip.linear.stable_values import nearest_value, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.measures import ONSET, Measure, Output, Vary, block_of
@@ -52,7 +51,7 @@ class StableStiffness(Measure, name="stable_stiffness"):
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
         values = operating_point(rig, None, [n for n in varied if n in rig.parameters()])
         one = has_closed_form(values.model)
-        most = 1 if one else most_intervals(stiffness_polynomials(values)[0].shape[-1] - 1)
+        most = 1 if one else most_values(values)
         extra = (("interval", most), ("end", 2))
         return (Output("stable_stiffness", "Pa/m", "ends of the intervals of stable stiffness", extra=extra),)
 

@@ -46,7 +46,7 @@ def _balance(reduction: Reduction) -> _Balance:
     moved = {velocity: V_LP, contact.sigma_ss: S}
     place: dict[sp.Symbol, sp.Expr] = {
         symbol: sp.sympify(model.steady[symbol]).xreplace(moved)
-        for symbol in (*(item.symbol for item in model.memory), contact.friction)
+        for symbol in (*(item.symbol for item in (*model.memory, *model.states)), contact.friction)
     }
     place |= {contact.velocity: V_LP, contact.acceleration: zero}
     inputs = {model.inputs["load_velocity"]: V_LP, model.inputs["disturbance"]: zero, model.inputs["time"]: zero}

@@ -23,9 +23,9 @@ from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown
 from steadyslip.linear.boundary import boundary
+from steadyslip.linear.linear_sets import linear_sets
 from steadyslip.linear.polynomials import quietly, stable_set
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.stable_values import linear_sets
 from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

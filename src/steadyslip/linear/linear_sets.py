@@ -1,0 +1,139 @@
+"""Stable sets of parameters that enter the characteristic equation linearly, p(s) + θ q(s), with delays or without."""
+
+from __future__ import annotations
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.linear.crossing import APART, linear_split
+from steadyslip.linear.polynomials import Array, StableSet, columns, most_intervals, quietly, stable_set
+from steadyslip.linear.windows import delay_set, linear_windows
+from steadyslip.model.linearisation import characteristic_terms
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.range import quasi
+
+_WINDOWS = 8  # of a rig with delay that arrays of them have room for
+
+
+def not_linear(name: str) -> NotAvailable:
+    """The error that says so."""
+    return NotAvailable(
+        f"the equations do not depend on {name} linearly, so that its stable set has no exact form; boundary(rig, "
+        f"{name!r}) scans for its edges"
+    )
+
+
+def too_late(name: str) -> NotAvailable:
+    """The error of a rig whose own oscillations turn thousands of times during the delay."""
+    return NotAvailable(
+        f"the delay is so long for this rig that the windows of {name} are too many to be listed; boundary(rig, "
+        f"{name!r}) finds those next to its own value"
+    )
+
+
+def most_values(point: OperatingPoint) -> int:
+    """How many intervals `sets_of` has room for."""
+    return (
+        _WINDOWS if point.model.delays else most_intervals(len(characteristic_terms(point.model)[0].coefficients) - 1)
+    )
+
+
+def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Array:
+    """Stable intervals of one parameter for arrays of rigs, (..., m, 2), NaN padded.
+
+    `size` (...) takes the place of the values of rigs with delay, where these need not be positive.
+
+    Raises
+    ------
+    NotAvailable
+        If it does not enter linearly.
+    """
+    most = most_values(point)
+    found = np.full((*point.shape, most, 2), np.nan)
+    if not point.model.delays:
+        inner = linear_sets(point, name).intervals
+        found[..., : inner.shape[-2], :] = inner
+        return found
+    flat = found.reshape(-1, most, 2)
+    sizes = None if size is None else np.broadcast_to(size, point.shape).ravel()
+    for i, one in enumerate(point.pieces(1)):
+        if not np.all(np.isfinite(quasi(one)[0])):
+            continue
+        alone = one.with_arguments([np.reshape(a, -1)[0] for a in one.arguments], ())
+        own = linear_set(alone, name, None if sizes is None else float(sizes[i]))
+        if own is None:
+            raise not_linear(name) if size is None else too_late(name)
+        count = min(len(own.intervals), most)
+        flat[i, :count] = own.intervals[:count]
+    return found
+
+
+def linear_sets(point: OperatingPoint, name: str) -> StableSet:
+    """The stable sets of one parameter for arrays of rigs without delay, whatever value of it these have.
+
+    Raises
+    ------
+    NotAvailable
+        If it does not enter linearly.
+    """
+    place = list(point.model.parameters).index(name)
+    own = np.broadcast_to(np.asarray(point.arguments[place], dtype=float), point.shape)
+    size = np.where(own > 0, own, 1.0)
+    factors = np.array([1 / APART, 1.0, APART])
+    arguments = list(point.arguments)
+    arguments[place] = factors.reshape(3, *(1,) * size.ndim) * size
+    c = quasi(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
+    known = np.all(np.isfinite(c), axis=(0, -1))
+    p, q, bent = _split(c)
+    if np.any(known & (bent | ~np.any(q, axis=-1))):
+        raise not_linear(name)
+    found, unit = stable_set(p, q), size[..., None]
+    intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
+    return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
+
+
+def _split(c: Array) -> tuple[Array, Array, Array]:
+    """p and q of p + f q from values at three factors f, first axis; and where these do not lie on a line."""
+    low, own, high = (columns(one) for one in c)
+    p, q, straight = linear_split(low, own, high)
+    return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
+
+
+@quietly
+def linear_set(point: OperatingPoint, name: str, size: float | None = None) -> StableSet | None:
+    """The stable set of one parameter of a single rig; None where it does not enter linearly, or is not positive.
+
+    With a `size` of the parameter its own value does not matter.
+    """
+    value = float(point.named()[name]) if size is None else size
+    symbol = point.model.parameters[name]
+    if any(delay.has(symbol) for delay in point.model.delays):
+        return _delay_set(point, symbol)
+    if not value > 0:
+        return None
+    place = list(point.model.parameters).index(name)
+    factors = np.array([1 / APART, 1.0, APART])
+    arguments = [a if i != place else value * factors for i, a in enumerate(point.arguments)]
+    c, h = quasi(point.with_arguments(arguments, (3,)))
+    if not np.all(np.isfinite(c)):
+        return None
+    p, q, bent = _split(c)
+    if np.any(bent) or not np.any(q):
+        return None
+    late = bool(point.model.delays)
+    found = linear_windows(p, q, h[1], factors[0], factors[2]) if late else stable_set(p[0], q[0])
+    return (
+        None
+        if found is None
+        else StableSet(found.intervals * value, found.edges * value, found.frequencies, found.changes)
+    )
+
+
+def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
+    """That of a delay, where it is the only one."""
+    terms = characteristic_terms(point.model)
+    if [term.delay for term in terms] != [0, symbol]:
+        return None
+    c, _ = quasi(point)
+    return delay_set(c[0], c[1]) if np.all(np.isfinite(c)) else None

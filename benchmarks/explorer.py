@@ -250,7 +250,7 @@ def _twenty_cycles() -> float:
     made = f"new Motion({text}, {json.dumps(facts)}, {{ advance, observe }})"
     script = Script(f"{base}\nconst motion = {made};\nlet found = null;\nconst pause = async () => {{}};")
     point = operating_point(rig, None, [name for name in present_zeros(rig) if name not in facts["missing"]])
-    ask = "(motion.set(values, sigma).run(asked, () => '', pause).then((r) => (found = r)), 0)"
+    ask = "(motion.set(values, [sigma]).run(asked, () => '', pause).then((r) => (found = r)), 0)"
     asked = {"disturbance": "velocity", "size": 2, "at": 10.0, "until": 750.0}
     given = {"values": [float(v) for v in point.arguments], "sigma": float(point.sigma), "asked": asked}
     times = []

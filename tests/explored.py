@@ -7,10 +7,12 @@ from importlib.resources import files
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 import steadyslip as ss
 from javascript import Script
 from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.motion import driver, motion_part
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.modes import mode_of
@@ -95,6 +97,53 @@ def differences(explored, machine, names=()):
             if mine.shape != exact.shape or not np.allclose(mine, exact, rtol=BAR, atol=0):
                 wrong.append(f"stable values of {name}: {mine.tolist()} for {exact.tolist()}")
     return wrong
+
+
+class MovedOnAPage:
+    """A page's Motion of one kind of rig, whose pauses take no time."""
+
+    def __init__(self, rig):
+        text, self.facts = motion_part(rig, 0)
+        own = files("steadyslip.explorer.web").joinpath("motion.js").read_text(encoding="utf-8")
+        base = javascript.as_script(javascript.runtime(), driver(), own)
+        made = f"new Motion({text}, {json.dumps(self.facts)}, {{ advance, observe }})"
+        self.script = Script(f"{base}\nconst motion = {made};\nlet found = null;\nconst pause = async () => {{}};")
+        if self.script.context is None:
+            pytest.skip("Node starts anew for every question; this needs mini-racer")
+
+    def __call__(self, rig, **asked):
+        point = operating_point(rig)
+        given = {"values": [float(v) for v in point.arguments], "sigmas": [float(s) for s in point.sigmas]}
+        run = "motion.set(values, sigmas).run(asked, () => '', pause).then((r) => (found = r))"
+        assert self.script(f"({run}, motion.refusal(asked.disturbance))", **given, asked=asked) == ""
+        return self.script("found")
+
+    def settings(self, rig):
+        point = operating_point(rig)
+        given = {"values": [float(v) for v in point.arguments], "sigmas": [float(s) for s in point.sigmas]}
+        return self.script("motion.set(values, sigmas).settings", **given)
+
+
+def same_motion(found, runs, until):
+    """A page's motion of a machine beside Python's, whose own error the second run shows."""
+    assert found["status"] == runs[0].status
+    told = [[(one.contact, one.begin, one.end) for one in run.slip_events] for run in runs]
+    mine = [(one["contact"], one["begin"], one["end"]) for one in found["events"]]
+    assert [one[0] for one in mine] == [one[0] for one in told[0]]
+    for one, other, exact in zip(mine, *told, strict=False):
+        error = max(abs(a - b) for a, b in zip(other[1:], exact[1:], strict=True))
+        assert max(abs(a - b) for a, b in zip(one[1:], other[1:], strict=True)) <= 10 * error + 1e-7 * until
+    when = np.linspace(0.1, 0.95, 7) * min(found["end"], runs[0].end)
+    for contact in found["contacts"]:
+        for series, name in (("v", "slip_rate"), ("sigma", "normal_force"), ("tau", "friction_force")):
+            here = np.interp(when, found["times"], np.array(contact[series], dtype=float))
+            there, truth = (np.interp(when, run["t"], run[f"{contact['name']}.{name}"]) for run in runs)
+            size = np.max(np.abs(truth))
+            assert np.max(np.abs(here - there)) <= 10 * np.max(np.abs(there - truth)) + 1e-3 * size
+    for body in found["bodies"]:
+        here = np.interp(when, found["times"], np.array(body["x"], dtype=float))
+        there = np.interp(when, runs[0]["t"], runs[0][f"{body['name']}.x"])
+        assert np.max(np.abs(here - there)) <= 1e-2 * np.max(np.abs(runs[0][f"{body['name']}.x"])) + 1e-30
 
 
 @dataclass

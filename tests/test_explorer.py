@@ -15,9 +15,10 @@ from explored import Explored, compared, library
 from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
-from steadyslip.explorer.assembly import _dense, _narrow, parts
+from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
+from steadyslip.explorer.narrow import dense, narrow
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
@@ -26,7 +27,7 @@ from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
 from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
 from steadyslip.model.reducing import reduce_model
-from steadyslip.model.scales import natural_scales, posed
+from steadyslip.model.scales import eliminable, natural_scales, posed
 from steadyslip.motion.jobs import prepare
 from users_laws import USERS, Turning
 
@@ -173,9 +174,9 @@ def test_shortened_code_says_the_same():
         "/**\n * Many\n * lines.\n */\n"
         "let c = (/** @type {any} */ (b)).d;\n"
     )
-    assert _narrow(text) == 'const a = 1;\nconst b = "// @ /** x */";\nlet c = ((b)).d;\n'
+    assert narrow(text) == 'const a=1;\nconst b="// @ /** x */";\nlet c=((b)).d;\n'
     generated = "function f(R, x, y) {\n    var t1 = R[0] - (-2.5e-07);\n    y[0] = (t1 >= 0) ? t1 : (1 / x);\n}\n"
-    assert _dense(generated) == "function f(R,x,y){\nvar t1=R[0]-(-2.5e-07);\ny[0]=(t1>=0)?t1:(1/x);\n}\n"
+    assert dense(generated) == "function f(R,x,y){\nvar t1=R[0]-(-2.5e-07);\ny[0]=(t1>=0)?t1:1/x;\n}\n"
 
 
 def test_no_two_parameters_of_a_part_are_called_the_same():
@@ -289,7 +290,7 @@ def moved_on_a_page(own, kind, until, stop=""):
     kept = [name for name in present_zeros(own) if name not in facts["missing"]]
     point = operating_point(own, None, kept)
     asked = "{ disturbance: kind, size, at: 1, until }"
-    run = f"motion.set(values, sigma).run({asked}, () => stop, pause).then((r) => (found = r))"
+    run = f"motion.set(values, [sigma]).run({asked}, () => stop, pause).then((r) => (found = r))"
     asked = f"({run}, motion.refusal(kind))"
     values = [float(value) for value in point.arguments]
     assert (
@@ -344,11 +345,11 @@ def test_scales_of_a_page_are_those_of_python(name):
     script = Script(f"{library()}\n{motion_text()}\nconst motion = new Motion({text}, {json.dumps(facts)}, null);")
     kept = [one for one in present_zeros(own) if one not in facts["missing"]]
     point = operating_point(own, None, kept)
-    reduction = reduce_model(point.model, facts["eliminated"])
+    reduction = reduce_model(point.model, eliminable(point))
     scales, _ = natural_scales(point, reduction)
     values = [float(value) for value in point.arguments]
     motion, settings = script(
-        "[motion.set(values, sigma).scales, motion.settings]", values=values, sigma=float(point.sigma)
+        "[motion.set(values, [sigma]).scales, motion.settings]", values=values, sigma=float(point.sigma)
     )
     jobs = prepare(own, (), 1.0, {}, {}, OPTIONS)
     expected = jobs.tables(jobs.runner(1, True), 0, 1, True, True)[2][0]

@@ -3,14 +3,18 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import steadyslip as ss
-from explored import ExploredMachine, differences
+from explored import ExploredMachine, MovedOnAPage, differences, same_motion
 from machines import at_random, two_mass
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.motion import OPTIONS
 from steadyslip.files.specifications.read import rig_from_text
+from steadyslip.kernels.layout import Setting
+from steadyslip.motion.jobs import prepare
 
 MACHINES = Path(__file__).parents[1] / "examples" / "machines"
 NAMES = sorted(path.stem for path in MACHINES.glob("*.toml"))
@@ -46,6 +50,66 @@ def test_machines_drawn_at_random_are_judged_as_in_python(seed):
 def test_contacts_that_press_on_each_other_slide_or_do_not_as_in_python(changes):
     machine = example("geared-servo").with_values(changes)
     assert differences(ExploredMachine(machine), machine) == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_settings_of_a_page_are_those_of_python(name):
+    """Scales of bodies and contacts, tolerances, limits: printed from the lines that arrays go through."""
+    machine = example(name)
+    jobs = prepare(machine, (), 1.0, {}, {}, OPTIONS)
+    expected = jobs.tables(jobs.runner(1, True), 0, 1, True, True)[2][0]
+    expected[Setting.GUESS] = 0.0
+    np.testing.assert_allclose(MovedOnAPage(machine).settings(machine), expected, rtol=1e-14)
+
+
+def disturbances(machine, at):
+    """What a page asks for, the same in Python, and what it starts from."""
+    body, contact = list(machine.bodies)[-1], list(machine.contacts)[-1]
+    steady = ss.steady_state(machine)
+    v0, force = machine.value("drive.velocity"), 0.01 * steady.contacts[contact].normal_force
+    blown = {f"{body}.v": 3 * steady.speeds[body]}
+    return [
+        ({"disturbance": "velocity", "size": 2.0}, ss.VelocityStep(at=at, to=2 * v0), {}),
+        ({"disturbance": "pull", "on": body, "size": force}, ss.DisturbanceStep(at=at, by=force, on=body), {}),
+        ({"disturbance": "normal", "on": contact, "size": force}, ss.NormalStressStep(at=at, by=force, on=contact), {}),
+        ({"disturbance": "hold", "size": at}, ss.Hold(at=at, duration=at), {}),
+        ({"disturbance": "blow", "on": body, "size": 3.0}, (), blown),
+    ]
+
+
+def moves_as_python(machine, which, until):
+    found = MovedOnAPage(machine)
+    for asked, piece, initial in [disturbances(machine, until / 12)[i] for i in which]:
+        runs = [ss.simulate(machine, piece, until=until, rtol=rtol, initial=initial) for rtol in (1e-6, 1e-9)]
+        same_motion(found(machine, **asked, at=until / 12, until=until), runs, until)
+
+
+def test_a_machine_moves_on_a_page_as_in_python():
+    """Slip events of each contact, velocities, forces and places; disturbed at a named body and a named contact."""
+    moves_as_python(example("geared-servo"), (1, 2), 40.0)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("name", "until"), [
+    ("brake-pad", 0.016), ("feed-axis", 6.0), ("geared-servo", 55.0), ("telescope", 4.0), ("two-guides", 3.0),
+])  # fmt: skip
+def test_examples_move_on_pages_as_in_python(name, until):
+    moves_as_python(example(name), range(5), until)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(0, 40, 2))
+def test_machines_drawn_at_random_move_on_pages_as_in_python(seed):
+    machine, _ = at_random(seed)
+    try:
+        found = MovedOnAPage(machine)
+    except ss.NotAvailable as refused:
+        with pytest.raises(ss.NotAvailable, match=re.escape(str(refused)[:40])):
+            ss.simulate(machine, until=1.0)
+        return
+    (asked, piece, _), *_ = disturbances(machine, 1.0)
+    runs = [ss.simulate(machine, piece, until=8.0, rtol=rtol) for rtol in (1e-6, 1e-9)]
+    same_motion(found(machine, **asked, at=1.0, until=8.0), runs, 8.0)
 
 
 def test_a_delay_is_refused_in_words():

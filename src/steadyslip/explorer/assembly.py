@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import json
 import math
-import re
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from typing import Any
@@ -17,6 +16,7 @@ from steadyslip.core.quantities import outside
 from steadyslip.core.records import Address, twin
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.motion import driver, motion_part
+from steadyslip.explorer.narrow import dense, narrow, narrow_style
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
@@ -35,7 +35,7 @@ from steadyslip.verdict.numbers import linear_numbers
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map",
-    "locus", "facts", "mover", "sketch", "course", "leaving", "page",
+    "locus", "facts", "mover", "sketch", "disturbances", "course", "leaving", "page",
 )  # fmt: skip
 """Modules of the page, each after those that it imports."""
 LIBRARY = ("motion",)
@@ -66,7 +66,7 @@ def document(title: str, styles: str, body: str) -> str:
 
 def style() -> str:
     """The style of a `fragment`."""
-    return _web("style.css")
+    return narrow_style(_web("style.css"))
 
 
 def fragment(rig: Slider | Machine, title: str, branch: int) -> str:
@@ -101,24 +101,22 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
     text, facts = linear_part(rig)
     machine, driven, moving, still = "null", "const advance = null, observe = null;", None, ""
     try:
-        if isinstance(rig, Machine):
-            raise NotAvailable("motion of machines is not on pages yet")
         machine, moving = motion_part(rig, branch)
         driven = driver()
     except NotAvailable as refused:  # the verdict can be shown all the same
         still = str(refused)
     modules = [_web(f"{name}.js") for name in MODULES]
     library = [_web(f"{name}.js") for name in LIBRARY]
-    script = _narrow(javascript.as_script(javascript.runtime(), *modules))
-    worker = _narrow(javascript.as_script(javascript.runtime(), *library)) + _dense(driven)
+    script = narrow(javascript.as_script(javascript.runtime(), *modules))
+    worker = narrow(javascript.as_script(javascript.runtime(), *library)) + dense(driven)
     known = _data(rig, title, branch, facts) | {
         "motion": moving,
         "still": still,
         "sketch": sketch(rig) if isinstance(rig, Slider) else "",
     }
     code = (
-        f"{script}\nconst programs = {_dense(text)};\n"
-        f"const library = () => {{\n{worker}\nconst machine = {_dense(machine)};\n"
+        f"{script}\nconst programs = {dense(text)};\n"
+        f"const library = () => {{\n{worker}\nconst machine = {dense(machine)};\n"
         "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
     )
     return code, known
@@ -126,18 +124,6 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
 
 def _web(name: str) -> str:
     return files("steadyslip.explorer.web").joinpath(name).read_text(encoding="utf-8")
-
-
-def _narrow(text: str) -> str:
-    """Code without indentation and lines of comment, a fifth of its length; no string goes over several lines."""
-    bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
-    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # types within a line
-    return re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
-
-
-def _dense(text: str) -> str:
-    """Generated code, which has no strings, without the spaces beside signs."""
-    return re.sub(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *", r"\1", re.sub(r"^ +", "", text, flags=re.M))
 
 
 def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:

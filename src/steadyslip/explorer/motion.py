@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.errors import InternalError, NotAvailable
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.records import twin
+from steadyslip.explorer.moving import Shares, scales_program, start_program
 from steadyslip.explorer.programs import program
+from steadyslip.kernels.driver.places import searched
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import LOG_COLUMNS, SETTINGS, Cursor, Final, Kind, Out, Recorded, Setting
-from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
+from steadyslip.kernels.nodes import Program, as_node
 from steadyslip.kernels.printers import javascript
 from steadyslip.kernels.printers.transpile import transpiled
-from steadyslip.kernels.runner import STATUSES, TALLY
+from steadyslip.kernels.runner import LOG_KINDS, STATUSES, TALLY
 from steadyslip.linear.boundary import present_zeros
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
-from steadyslip.model.reducing import reduce_model
-from steadyslip.model.reduction import Reduction, W
-from steadyslip.model.scales import LEAST_WEIGHT, Weights, eliminable, posed, sizes, weighed
-from steadyslip.motion.jobs import Options, automatic_method, numbers
+from steadyslip.model.reducing import EVERYWHERE, reduce_model
+from steadyslip.model.reduction import Reduction
+from steadyslip.model.scales import LEAST_WEIGHT, eliminable, posed
+from steadyslip.motion.jobs import Options, automatic_method
 from steadyslip.protocol import (
     DisplacementStep,
     DisturbanceStep,
@@ -48,8 +52,6 @@ DISTURBANCES: dict[str, Callable[[float, float, float], Any] | None] = {
 }
 """What a page can do to a rig at a time: pieces of a protocol of a size, given the velocity of the drive."""
 _TOLD = 3.0, 5.0, 1e3, 7.0  # at, size, until, drive: numbers that can be told apart, sums and products too
-BLOW = sp.Symbol("blow", positive=True)
-"""Velocity of the block at the start over that of steady sliding."""
 DRIVER = {"advance": "steadyslip.kernels.driver.lanes", "observe": "steadyslip.kernels.driver.states"}
 
 
@@ -58,10 +60,10 @@ def driver() -> str:
     return transpiled(DRIVER)
 
 
-def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
+def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]]:
     """The kernel of a rig as an expression of JavaScript, and what must be known about it.
 
-    Terms that are zero in the rig can be varied from there unless they would give it inertia, which is another kernel.
+    Terms that are zero in a slider can be varied from there unless they would give it inertia, which is another kernel.
 
     Raises
     ------
@@ -71,55 +73,36 @@ def motion_part(rig: Slider, branch: int) -> tuple[str, dict[str, Any]]:
     inertial = build_model(rig).inertial
     kept = [name for name in present_zeros(rig) if inertial or not build_model(rig, [name]).inertial]
     point = operating_point(rig, None, kept, branch)
-    if not np.all(point.stresses > 0):
-        raise NotAvailable("the rig of the file does not slide steadily")
+    what = "machine" if isinstance(rig, Machine) else "rig"
+    if not np.all(point.exists):
+        raise NotAvailable(f"the {what} of the file does not slide steadily")
     if not np.all(posed(point)):
-        raise NotAvailable("the motion of the rig is ill-posed")
+        raise NotAvailable(f"the motion of the {what} is ill-posed")
     eliminate = eliminable(point)
-    if isinstance(eliminate, tuple):
-        raise InternalError("a slider has one contact")
-    reduction = reduce_model(point.model, eliminate)
+    named = isinstance(rig, Machine)
+    reduction = reduce_model(point.model, eliminate, *((EVERYWHERE, EVERYWHERE) if named else ()))
     kernel = Kernel(reduction, Choice(automatic_method(reduction, OPTIONS.rtol), "constant", 0, 1, True))
     kernel_text = javascript.machine(kernel.programs, kernel.layout)
-    model = point.model
+    model, shares = point.model, Shares.of(rig, point.model)
     programs = [
-        program(model, "constants", list(kernel.constants.symbols)),
-        program(model, "scales", _weighed(model), then=partial(_scales, reduction, eliminate)),
-        program(model, "start", _start(reduction), [BLOW]),
-        program(model, "dashpot", [-sp.diff(model.definitions[model.contact.spring], model.contact.velocity)]),
+        program(model, "constants", list(kernel.constants.symbols), shares.symbols),
+        scales_program(reduction, eliminate, OPTIONS),
+        start_program(reduction, shares),
+        program(model, "dashpot", [_through(rig, model)]),
     ]
     segments = [_segments(name, piece) for name, piece in DISTURBANCES.items()]
     functions = "".join(javascript.text(one) for one in (*programs, *segments))
     own, several = (", ".join(one.name for one in some) for some in (programs, segments))
     text = f"(() => {{\n{functions}return {{ {own}, segments: {{ {several} }}, ...{kernel_text} }};\n}})()"
-    facts = _facts(reduction, kernel, eliminate, set(present_zeros(rig)) - set(kept))
+    facts = _facts(reduction, kernel, set(present_zeros(rig)) - set(kept))
+    facts |= {"shares": shares.places(), "behind": len(shares.symbols)}
     return text, facts | {"segments": max(len(one.stores) for one in segments) // facts["segment"]}
 
 
-def _start(reduction: Reduction) -> list[sp.Expr]:
-    """Variables that jumps leave alone, and behind them the velocity variable: of steady sliding, but for a blow."""
-    model = reduction.model
-    steady = {item.symbol: sp.sympify(model.steady[item.symbol]) for item in (*model.memory, *model.states)}
-    speed = reduction.w_of_v.xreplace(steady | {model.contact.velocity: BLOW * model.parameters["drive.velocity"]})
-    found = steady | {W: speed}
-    return [*(found.get(symbol, sp.Integer(0)) for symbol in reduction.continuous), speed]
-
-
-def _weighed(model: Model) -> list[sp.Expr]:
-    """Drive and steady normal stress, and behind them what scales are made of."""
-    return [model.parameters["drive.velocity"], model.contact.sigma_ss, *weighed(model)]
-
-
-def _scales(reduction: Reduction, eliminate: int | None, found: list[Node]) -> list[Value]:
-    """The scale of slip, whether the motion is posed, the weight of the state left out, then settings."""
-    drive, stress, *derivatives = found
-    weights = Weights.of(derivatives)
-    scales, unknown = sizes(weights, drive, reduction, select)
-    share = 1.0 if eliminate is None else abs(weights.by_memory[eliminate] / weights.direct)
-    given = {"watch": 1.0, "record": 1.0, "guess": 0.0}
-    own = given | numbers(drive, stress, scales["x"], unknown, OPTIONS)
-    rows = [own[name] for name in SETTINGS] + [OPTIONS.rtol * scales[name] for name in reduction.names]
-    return [scales["x"], select(weights.by_unknown > 0, 1.0, 0.0), share, *rows]
+def _through(rig: Slider | Machine, model: Model) -> Any:
+    """The dashpots through which the load point pulls: a jump of it would be an infinite force."""
+    elements = twin(rig, dict(model.parameters)).mechanism().elements
+    return sp.Add(*(abs(sp.sympify(one.damping)) for one in elements if LOAD_POINT in one.senses))
 
 
 def _segments(name: str, piece: Callable[[float, float, float], Any] | None) -> Program:
@@ -139,21 +122,26 @@ def _segments(name: str, piece: Callable[[float, float, float], Any] | None) -> 
     return made
 
 
-def _facts(reduction: Reduction, kernel: Kernel, eliminate: int | None, missing: set[str]) -> dict[str, Any]:
-    model = reduction.model
+def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str, Any]:
+    model, layout = reduction.model, kernel.layout
+    further, begin = searched(layout) - 1, Setting.ATOL + layout.size
+    guesses = [int(Setting.GUESS), *range(begin, begin + further)]
     return {
         "parameters": list(model.parameters),
+        "contacts": [contact.name for contact in model.contacts],
+        "bodies": _bodies(reduction) if model.contacts[0].name else [],
+        "kinds": len(LOG_KINDS) - 2,
         "constants": len(kernel.constants.symbols),
         "all": len(kernel.constants.all),
         "kept": len(reduction.continuous),
-        "rows": kernel.layout.rows,
-        "size": len(reduction.names),
-        "eliminated": eliminate,
+        "further": len(reduction.further),
+        "rows": layout.rows,
+        "point": layout.size + searched(layout),
         "least": LEAST_WEIGHT,
         "inertial": model.inertial,
         "missing": sorted(missing),
-        "settings": len(SETTINGS) + len(reduction.names),
-        "guess": int(Setting.GUESS),
+        "settings": len(SETTINGS) + len(reduction.names) + 2 * further,
+        "guesses": guesses[: len(reduction.searched)],
         "cursor": {name.name: int(name) for name in Cursor},
         "kind": {name.name: int(name) for name in Kind},
         "out": {name.name: int(name) for name in Out},
@@ -164,3 +152,14 @@ def _facts(reduction: Reduction, kernel: Kernel, eliminate: int | None, missing:
         "logged": LOG_COLUMNS,
         "statuses": list(STATUSES),
     }
+
+
+def _bodies(reduction: Reduction) -> list[list[Any]]:
+    """Of every coordinate its name, the unit of its displacement, and where this and its velocity are observed."""
+    first = Out.W_SLOPE * len(reduction.slidings)
+    places = {name: first + len(reduction.continuous) + i for i, name in enumerate(reduction.further)}
+    kept = {symbol: first + i for i, symbol in enumerate(reduction.continuous)}
+    return [
+        [one.name, one.unit, kept.get(one.displacement, places.get(f"{one.name}.x", -1)), places[f"{one.name}.v"]]
+        for one in reduction.model.coordinates
+    ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import sympy as sp
 
@@ -70,7 +69,7 @@ def _together(model: Model, joint: JointEquation) -> Program:
             replaced = [[found[n * n + i] if j == k else left[i][j] for j in range(n)] for i in range(n)]
             above = _determinant(replaced)
             sigmas.append(float("nan") if whole is None else 0.0 if above is None else above / whole)
-        return [*sigmas, *_characteristic(a)]
+        return [*sigmas, *characteristic_polynomial(a)]
 
     return program(model, "steady", wanted, then=solved)
 
@@ -98,20 +97,20 @@ def _determinant(rows: Rows) -> Value | None:
     return total
 
 
-def _characteristic(a: Rows) -> list[Value]:
+def characteristic_polynomial(a: Rows) -> list[Value]:
     """Coefficients of det(λ − A), lowest power first, by the method of Faddeev and LeVerrier."""
     n = len(a)
-    coefficients: list[Any] = [1.0]
+    coefficients: list[Value | None] = [1.0]
     m: Rows = [[None] * n for _ in range(n)]
     for k in range(1, n + 1):
         m = [[_entry(a, m, i, j) for j in range(n)] for i in range(n)]
         for i in range(n):
-            m[i][i] = _sum(m[i][i], coefficients[0] or None)
+            m[i][i] = _sum(m[i][i], coefficients[0])
         trace: Value | None = None
         for i in range(n):
             trace = _sum(trace, _entry(a, m, i, i))
-        coefficients.insert(0, 0.0 if trace is None else -trace / float(k))
-    return coefficients
+        coefficients.insert(0, None if trace is None else -trace / float(k))
+    return [0.0 if one is None else one for one in coefficients]
 
 
 def _entry(a: Rows, b: Rows, i: int, j: int) -> Value | None:

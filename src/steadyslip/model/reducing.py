@@ -33,6 +33,8 @@ from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, P, Q, Reducti
 
 Row = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
+EVERYWHERE = "*"
+"""In place of a name: disturbances act on every coordinate, or at every contact, by a share that is a constant."""
 STANDSTILL = -200
 """Of ln(v/v0): a block with mass slower than this keeps still to every purpose; products of 1/v stay numbers there."""
 
@@ -51,7 +53,8 @@ def reduce_model(
         *eliminated* is possible, for all contacts or each; None forbids that form (the variable's weight in friction is
         zero or tiny).
     push, press : str, optional
-        The coordinate that disturbances push, and the contact at which they press; where there is but one, that.
+        The coordinate that disturbances push, and the contact at which they press; where there is but one, that; or
+        `EVERYWHERE`, with shares that are constants.
 
     Raises
     ------
@@ -348,15 +351,24 @@ class _Reducing:
 
 
 def _inputs(model: Model, push: str, press: str) -> Row:
-    """What stands for the inputs of a Model: disturbances act on one coordinate and at one contact."""
+    """What stands for the inputs of a Model: disturbances act on one coordinate and at one contact, or `EVERYWHERE`."""
     given: Row = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
     alone = model.is_single
     for one in model.coordinates:
-        given[one.push] = Q if alone or one.name == push else sp.Integer(0)
+        given[one.push] = (
+            Q * share_of(one.push) if push == EVERYWHERE else Q if alone or one.name == push else sp.S.Zero
+        )
     for contact in model.contacts:
         pressed = P / contact.area if alone or contact.name == press else sp.Integer(0)
+        if press == EVERYWHERE:
+            pressed = P / contact.area * share_of(contact.press)
         given[contact.press] = pressed + contact.imposed.xreplace({model.inputs["time"]: TIME})
     return given
+
+
+def share_of(input_: sp.Symbol) -> sp.Symbol:
+    """The constant that says whether a disturbance acts at an input of a Model, where it may act `EVERYWHERE`."""
+    return sp.Symbol(f"share_of_{input_}", real=True)
 
 
 def _kept_moving(rate: sp.Expr, w: sp.Symbol) -> sp.Expr:

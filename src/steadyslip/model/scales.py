@@ -125,14 +125,13 @@ def posed(point: OperatingPoint) -> np.ndarray:
     entries = [np.broadcast_to(np.asarray(e, dtype=float), point.shape or (1,)) for e in function(*_arrays(point))]
     matrix = np.moveaxis(np.array(entries).reshape(size, size, -1), -1, 0)
     good = np.isfinite(matrix).all(axis=(1, 2))
-    rising = np.ones(len(matrix), dtype=bool)
+    rises = np.ones(len(matrix), dtype=bool)
     if size:
-        rising = np.linalg.eigvals(np.where(good[:, None, None], matrix, 0.0)).real.min(axis=1) > 0
-    return np.asarray(rising & good)
+        rises = np.linalg.eigvals(np.where(good[:, None, None], matrix, 0.0)).real.min(axis=1) > 0
+    return np.asarray(rises & good)
 
 
-@question
-def _rising(model: Model) -> tuple[Callable[..., list[Any]], int]:
+def rising(model: Model) -> list[list[sp.Expr]]:
     """Derivatives of the balances of coordinates in accelerations, or without inertia in velocities of contacts."""
     moving = kinematics(model)
     places = [one for one in model.coordinates if one.inertial or moving.contact_at(one) is not None]
@@ -144,16 +143,24 @@ def _rising(model: Model) -> tuple[Callable[..., list[Any]], int]:
             for one in places
             for s in (one.acceleration, one.velocity)
         }
-    entries = []
+    rows = []
     for one in places:
         balance = model.inlined(sp.Integer(0) if one.balance is None else one.balance)
+        entries = []
         for other in places:
             symbol = other.acceleration if other.inertial else other.velocity
             total = derivative(balance, symbol)
             for friction, slope in slopes.items():
                 total += derivative(balance, friction) * slope[symbol]
             entries.append(model.at_steady(total.doit()))
-    return model.function(entries), len(places)
+        rows.append(entries)
+    return rows
+
+
+@question
+def _rising(model: Model) -> tuple[Callable[..., list[Any]], int]:
+    rows = rising(model)
+    return model.function(e for row in rows for e in row), len(rows)
 
 
 @question
@@ -249,77 +256,108 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
         return scales, (unknown,)
 
 
-@question
-def _coordinate_function(model: Model) -> Callable[..., list[Any]]:
-    """Speed of every coordinate in steady sliding, its share in the slip of every contact, stiffness and area."""
+def moving_parts(model: Model) -> list[sp.Expr]:
+    """Speed of every coordinate in steady sliding, its share in the slip of every contact, stiffness; areas."""
     wanted = [one.speed for one in model.coordinates]
     for contact in model.contacts:
         slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
         wanted += [derivative(slip, one.velocity) for one in model.coordinates]
     balances = [model.inlined(sp.Integer(0) if one.balance is None else one.balance) for one in model.coordinates]
     wanted += [derivative(e, one.displacement) for e, one in zip(balances, model.coordinates, strict=True)]
-    return model.function(model.at_steady(e) for e in (*wanted, *(contact.area for contact in model.contacts)))
+    return [model.at_steady(e) for e in (*wanted, *(contact.area for contact in model.contacts))]
+
+
+@question
+def _moving_function(model: Model) -> Callable[..., list[Any]]:
+    return model.function(moving_parts(model))
 
 
 def _together(
     point: OperatingPoint, reduction: Reduction, speeds: list[Any], each: list[tuple[dict[str, Any], Any]]
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
-    """Scales of a machine, from those at its contacts.
+    """Scales of a machine, from those at its contacts."""
+    numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_moving_function(point.model))]
+    directs = [np.abs(weights(point, i).direct) for i in range(len(point.model.contacts))]
+    scales, searched = joined_sizes(reduction, numbers, speeds, point.sigmas, directs, each, np.where)
+    return scales, searched or (np.ones(1),)
+
+
+def joined_sizes(
+    reduction: Reduction,
+    numbers: Sequence[Any],
+    speeds: Sequence[Any],
+    stresses: Sequence[Any],
+    directs: Sequence[Any],
+    each: Sequence[tuple[dict[str, Any], Any]],
+    choose: Choose,
+) -> tuple[dict[str, Any], tuple[Any, ...]]:
+    """`natural_scales` of a machine in plain arithmetic, of arrays or of the nodes of a program.
 
     A coordinate matters by what it slips at its contacts, or else by how far it moves in the shortest time that matters
     at any of them; one that stands still by how far the largest friction stretches what holds it.
+
+    Parameters
+    ----------
+    numbers : sequence
+        What `moving_parts` lists.
+    speeds, stresses, directs, each : sequence
+        Of every contact: slip rate and normal stress in steady sliding, size of the direct effect, its own `sizes`.
     """
-    model, n = point.model, len(point.model.coordinates)
-    numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_coordinate_function(model))]
+
+    def least(values: Sequence[Any]) -> Any:
+        found = values[0]
+        for one in values[1:]:
+            found = choose(one < found, one, found)
+        return found
+
+    model, n, count = reduction.model, len(reduction.model.coordinates), len(speeds)
     own, rest = numbers[:n], numbers[n:]
-    count = len(model.contacts)
     stiff, areas = rest[n * count : n * count + n], rest[n * count + n :]
     slips = [found["x"] for found, _ in each]
-    least = np.minimum.reduce(np.broadcast_arrays(*slips))
-    time: Any = np.inf
-    force: Any = 0.0
-    for i, (slip, speed) in enumerate(zip(slips, speeds, strict=True)):
-        time = np.minimum(time, slip / speed)
-        force = np.maximum(force, areas[i] * np.abs(weights(point, i).direct))
+    time = least([slip / speed for slip, speed in zip(slips, speeds, strict=True)])
+    force = -least([-(area * direct) for area, direct in zip(areas, directs, strict=True)])
     scales: dict[str, Any] = {}
     for k, one in enumerate(model.coordinates):
         x: Any = np.inf
         for i in range(count):
-            share = np.abs(rest[n * i + k])
-            x = np.minimum(x, np.where(share > 0, slips[i] / np.where(share > 0, share, 1.0), np.inf))
-        x = np.where(x < np.inf, x, np.abs(own[k]) * time)
-        held = force / np.abs(stiff[k])
-        x = np.where(x > 0, x, np.where((held > 0) & (held < np.inf), held, least))
+            share = abs(rest[n * i + k])
+            way = choose(share > 0, slips[i] / choose(share > 0, share, 1.0), np.inf)
+            x = choose(way < x, way, x)
+        x = choose(x < np.inf, x, abs(own[k]) * time)
+        held = force / abs(stiff[k])
+        x = choose(x > 0, x, choose((held > 0) & (held < np.inf), held, least(slips)))
         scales[f"{one.name}.x"] = x
-        scales[f"{one.name}.v"] = np.where(own[k] != 0, np.abs(own[k]), x / time)
-    for i, (contact, stress) in enumerate(zip(model.contacts, point.sigmas, strict=True)):
-        direct = np.abs(weights(point, i).direct)  # a pressure matters where friction feels it
-        scales |= {item.name: np.where(direct > 0, direct, np.abs(stress)) for item in contact.own_states}
+        scales[f"{one.name}.v"] = choose(abs(own[k]) > 0, abs(own[k]), x / time)
+    for contact, stress, direct in zip(model.contacts, stresses, directs, strict=True):
+        # a pressure matters where friction feels it
+        scales |= {item.name: choose(direct > 0, direct, abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.w": found["w"]}
     for item, rate in zip(model.variables, model.rates, strict=True):
         if item.kind == "integral":
             sensed = [scales[f"{one.name}.x"] for one in model.coordinates if rate.has(one.displacement)]
-            scales[item.name] = time * np.minimum.reduce(np.broadcast_arrays(*sensed))
-    return scales, tuple(_searched(point, reduction, symbol, each) for symbol in reduction.searched) or (np.ones(1),)
+            scales[item.name] = time * least(sensed)
+
+    def searched(symbol: sp.Symbol) -> Any:
+        """The size of an unknown: of a velocity variable, a friction or an acceleration."""
+        for i, (one, (found, _)) in enumerate(zip(reduction.slidings, each, strict=True)):
+            if one.variable is not None and symbol is one.variable.w:
+                return found["w"]
+            if symbol is model.contacts[i].friction:
+                return directs[i]
+        return least([unknown for _, unknown in each])
+
+    return scales, tuple(searched(symbol) for symbol in reduction.searched)
 
 
-def _searched(
-    point: OperatingPoint, reduction: Reduction, symbol: sp.Symbol, each: list[tuple[dict[str, Any], Any]]
-) -> Any:
-    """The size of an unknown of a machine: of a velocity variable, a friction or an acceleration."""
-    for i, (one, (found, _)) in enumerate(zip(reduction.slidings, each, strict=True)):
-        if one.variable is not None and symbol is one.variable.w:
-            return found["w"]
-        if symbol is reduction.model.contacts[i].friction:
-            return np.abs(weights(point, i).direct)
-    return np.minimum.reduce(np.broadcast_arrays(*(unknown for _, unknown in each)))
-
-
-def shortest_time(scales: Mapping[str, Any]) -> Any:
+def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
     """The shortest time that matters in a machine, s."""
     own = [name.removesuffix(".x") for name in scales if name.endswith(".x")]
-    return np.minimum.reduce(np.broadcast_arrays(*(scales[f"{name}.x"] / scales[f"{name}.v"] for name in own)))
+    found: Any = np.inf
+    for name in own:
+        time = scales[f"{name}.x"] / scales[f"{name}.v"]
+        found = choose(time < found, time, found)
+    return found
 
 
 def sizes(

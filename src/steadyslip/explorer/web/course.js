@@ -1,21 +1,16 @@
 // What the rig does after a disturbance: curves over time, phase plane, events, the mechanism; one time for all of them.
+import { DISTURBANCES, asked } from "./disturbances.js";
 import { button, make, svg } from "./dom.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
-import { digits, parse, shown, unitIn } from "./quantities.js";
+import { shown, unitIn } from "./quantities.js";
 import { Sketch } from "./sketch.js";
 import { outcome, quantity } from "./words.js";
 
-/** What can be done to a rig: in words, in which unit, what is usual (of the scales of the rig), how it reads. */
-const DISTURBANCES = {
-  velocity: { words: "step of the drive velocity", unit: "1", usual: () => 2, ratio: true },
-  hold: { words: "hold of the load point", unit: "s", usual: ({ period }) => period, positive: true },
-  push: { words: "push of the load point", unit: "m", usual: ({ slip }) => slip },
-  normal: { words: "step of the normal stress", unit: "Pa", usual: ({ sigma }) => 0.05 * sigma },
-  pull: { words: "pull on the block", unit: "Pa", usual: ({ tau }) => 0.01 * tau },
-  blow: { words: "blow on the block, its velocity", unit: "1", usual: () => 10, ratio: true },
-};
+/** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; those of the phase plane */
+
+const AWAY = 1e6; // times the velocity of steady sliding, beyond which a run away is not drawn
 const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // ms of the whole when it is played
 
 export class Course {
@@ -24,6 +19,7 @@ export class Course {
   /** @type {any} */ now; // its series as they are drawn
   /** @type {any[]} */ boxes;
   /** @type {any[]} */ dots;
+  choose = () => {}; // names of what the disturbance can act on
   playing = 0;
   units = { size: "", length: "" }; // of what was typed last
 
@@ -48,10 +44,20 @@ export class Course {
     this.size = make("input", { type: "text", "aria-label": "size of the disturbance", size: 9 });
     this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself" });
     this.halt = make("button", { type: "button", textContent: "stop", disabled: true, onclick: () => this.mover.stop() });
+    const { contacts, bodies, shares } = this.page.rig.data.motion, named = [...contacts, ...bodies.map(([name]) => name)].filter(Boolean);
+    this.on = make("select", { "aria-label": "where it acts", onchange: () => this.forget() });
+    this.where = make("label", {}, "on ", this.on);
+    this.view = make("select", { "aria-label": "contact or body", onchange: () => this.draw() }, ...named.map((name, n) => make("option", { value: String(n), textContent: `${n < contacts.length ? "contact" : "body"} ${name}` })));
+    this.shown = make("label", { hidden: !named.length }, "shown: ", this.view);
+    this.choose = () => {
+      const names = Object.keys(shares[this.disturbance.value] ?? {}).filter(Boolean);
+      this.on.replaceChildren(...names.map((name) => make("option", { value: name, textContent: name })));
+      this.where.hidden = !names.length;
+    };
+    this.choose();
     this.disturbance.addEventListener("change", () => {
-      this.size.value = this.size.placeholder = this.units.size = "";
-      this.course = null;
-      this.soon();
+      this.choose();
+      this.forget();
     });
     for (const name of ["size", "length"]) this[name].addEventListener("change", () => this.typed(name));
     this.strips = svg("svg", { class: "chart strips", role: "img" });
@@ -63,13 +69,21 @@ export class Course {
     this.reading = make("output", { className: "reading" });
     this.phase = svg("svg", { class: "chart phase", role: "img", viewBox: `0 0 ${PLANE.left + PLANE.width + 14} ${PLANE.top + PLANE.height + 46}` });
     this.events = make("tbody", {});
-    const heads = ["begins", "lasts", "peak velocity", "stress drop", "since the last"];
+    const { area, phrases } = this.page.rig.data, drop = phrases || area !== null ? "drop of force" : "stress drop";
+    const heads = [...(phrases ? ["contact"] : []), "begins", "lasts", "peak velocity", drop, "since the last"];
     this.list = make("details", { className: "events" }, make("summary", { textContent: "Slip events" }),
       make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "slip events" }, make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", { textContent: text, scope: "col" })))), this.events)));
     this.box.append(
-      make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt),
-      this.told, this.done, this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
-      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", {}, make("figcaption", { textContent: "The mechanism, seen from the load point" }), this.sketch.canvas)), this.list);
+      make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), this.where, make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt),
+      this.told, this.done, make("p", { className: "pick" }, this.shown), this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
+      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), ...(this.sketch ? [make("figure", {}, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)] : [])), this.list);
+  }
+
+  /** Something else is done to the rig: sizes and curves are not those of before. */
+  forget() {
+    this.size.value = this.size.placeholder = this.units.size = "";
+    this.course = null;
+    this.soon();
   }
 
   /** A bare number counts in the unit that the field shows, or showed before, and is written with it. */
@@ -105,15 +119,16 @@ export class Course {
     }
     try {
       this.mover.forget();
-      const asked = this.asked();
+      const wanted = asked(this.page, this.mover.own, { kind: this.disturbance.value, on: this.on.value, size: this.size.value, length: this.length.value });
+      [this.size.placeholder, this.length.placeholder] = wanted.usual;
       this.halt.disabled = false;
       this.late = setTimeout(() => (this.told.textContent = "Computing the motion …"), 100);
-      const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(asked.until, "s", 3)} so far; curves are those of before.`);
-      const found = await this.mover.run(this.model, this.page.answer.sigma, asked, told);
+      const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(wanted.until, "s", 3)} so far; curves are those of before.`);
+      const found = await this.mover.run(this.model, this.page.answer.sigmas, wanted, told);
       clearTimeout(this.late);
-      this.course = { ...found, until: found.status === "done" ? asked.until : found.end, disturbance: asked.disturbance, at: asked.from };
-      this.told.textContent = outcome(this.course, this.page.rig.data.area);
-      this.done.textContent = asked.words;
+      this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
+      this.told.textContent = outcome(this.course, this.page.rig.data);
+      this.done.textContent = wanted.words;
       this.draw();
     } catch (error) {
       clearTimeout(this.late);
@@ -140,35 +155,22 @@ export class Course {
     if (added) return `the rig of the file has no ${added}; write it there, and make the page anew`;
     const model = Array.from(rig.set(rig.values).R);
     this.model = motion.parameters.map((name) => model[facts.parameters.indexOf(name)]);
-    return this.mover.own.set(this.model, answer.sigma).refusal(this.disturbance.value);
-  }
-
-  /** Size, begin and length as they stand in the fields, or what shows most. */
-  asked() {
-    const { eigenvalues, sigma, observed } = this.page.answer, lead = eigenvalues.find((s) => s.im > 0) ?? eigenvalues[0], { area } = this.page.rig.data;
-    const disturbance = this.disturbance.value, { unit, usual, ratio, positive } = DISTURBANCES[disturbance];
-    const period = Math.abs(lead.im > 0 ? (2 * Math.PI) / lead.im : 5 / (lead.re || 1)), per = unit === "Pa" ? area ?? 1 : 1, si = unit === "Pa" && area !== null ? "N" : unit;
-    const until = this.length.value ? parse(this.length.value, "s", "s") : 12 * period;
-    if (until === Infinity) throw new Error("a small disturbance grows or dies out too slowly to show; say how long the run lasts");
-    const own = usual({ period: Math.min(period, until), slip: this.mover.own.scales.x, sigma, tau: observed.shear_stress ?? sigma }) * per;
-    const size = this.size.value ? parse(this.size.value.replace(/^×\s*/, ""), si, si) : own;
-    if (!(until > 0)) throw new Error("the length of a run is above 0 s");
-    if (ratio && !(size > 0)) throw new Error("the velocity is multiplied by a number above 0");
-    if (positive && !(size > 0)) throw new Error("a hold lasts for more than 0 s");
-    this.size.placeholder = ratio ? `× ${own}` : shown(own, si, 3);
-    this.length.placeholder = shown(12 * period, "s", 3);
-    const at = disturbance === "blow" ? 0 : until / 20, much = ratio ? `× ${digits(size)}` : shown(size, si);
-    const words = `${at ? `At ${shown(at, "s")} (dashed line)` : "At the start"}: ${DISTURBANCES[disturbance].words}, ${much}.`;
-    return { disturbance, size: size / per, at: until / 20, from: at, until, words };
+    return this.mover.own.set(this.model, answer.sigmas).refusal(this.disturbance.value);
   }
 
   // -- drawing
 
-  /** Series of a course, without what follows once it has run away. */
+  /** What is shown of a course, of a contact or a body, without what follows once it has run away. @returns {View} */
   series(course) {
-    const most = 1e6 * this.mover.own.drive, end = course.status === "blow-up" ? course.v.findIndex((one) => one > most) : -1, { area } = this.page.rig.data;
-    const [times, v, tau, sigma] = [course.times, course.v, course.tau, course.sigma].map((all) => (end < 0 ? all : all.subarray(0, end)));
-    return { times, v, friction: tau.map((one, i) => one / sigma[i]), sigma: sigma.map((one) => one * (area ?? 1)) };
+    const { area, phrases } = this.page.rig.data, { sliding } = this.mover.own, n = Number(this.view.value || 0);
+    const end = course.status === "blow-up" ? Math.min(...course.contacts.map((one, i) => one.v.findIndex((v) => v > AWAY * sliding[i].rate)).filter((at) => at >= 0), course.times.length) : course.times.length;
+    const cut = (all) => all.subarray(0, end), times = cut(course.times);
+    if (n >= course.contacts.length) {
+      const { unit, x, v } = course.bodies[n - course.contacts.length];
+      return { times, shown: [[cut(v), `${unit}/s`, "velocity"], [cut(x), unit, "ahead"]], plane: [1, 0] };
+    }
+    const { v, tau, sigma } = course.contacts[n], friction = cut(tau).map((one, i) => one / sigma[i]), normal = area ? cut(sigma).map((one) => one * area) : cut(sigma);
+    return { times, shown: [[cut(v), "m/s", "velocity"], [friction, "1", "friction"], [normal, area === null && !phrases ? "Pa" : "N", "normal"]], plane: [0, 1] };
   }
 
   draw() {
@@ -177,35 +179,35 @@ export class Course {
     for (const part of [this.done, this.strips, this.phase.parentElement, this.time.parentElement, this.list]) part.style.display = shows;
     if (!course) return;
     const past = this.before && this.before !== course && this.before.disturbance === course.disturbance ? [this.series(this.before)] : [], now = this.series(course), all = [...past, now];
-    const { left, width } = this.page.size, { area } = this.page.rig.data, spread = Math.max(...now.sigma.reduce(([a, b], c) => [Math.min(a, c), Math.max(b, c)], [Infinity, -Infinity]).map((end, i) => (i ? end / now.sigma[0] - 1 : 1 - end / now.sigma[0])));
-    const shownSeries = [["v", "m/s", "velocity"], ["friction", "1", "friction"]];
-    if (spread > 1e-6) shownSeries.push(["sigma", area === null ? "Pa" : "N", "normal"]);
-    this.boxes = shownSeries.map((_, n) => ({ left, width, top: 8 + n * (HIGH + 14), height: HIGH }));
-    const parts = shownSeries.map(([name, unit, label], n) => strip(this.boxes[n], all.map((one) => ({ times: one.times, values: one[name] })), course.until, unit, label, n === shownSeries.length - 1));
+    const { left, width } = this.page.size, { plane: [across, up] } = now, steady = (values) => values.every((one) => Math.abs(one - values[0]) <= 1e-6 * Math.abs(values[0]));
+    const strips = now.shown.map((_, n) => n).filter((n) => n < 2 || !steady(now.shown[n][0]));
+    this.boxes = strips.map((_, row) => ({ left, width, top: 8 + row * (HIGH + 14), height: HIGH }));
+    const parts = strips.map((n, row) => strip(this.boxes[row], all.map((one) => ({ times: one.times, values: one.shown[n][0] })), course.until, now.shown[n][1], now.shown[n][2], row === strips.length - 1));
     const bottom = this.boxes[this.boxes.length - 1].top + HIGH;
     this.cursor = svg("line", { class: "cursor", y1: this.boxes[0].top, y2: bottom });
     const when = left + straight(0, course.until).of(course.at) * width, step = svg("line", { class: "step", x1: when, x2: when, y1: this.boxes[0].top, y2: bottom });
-    this.dots = shownSeries.map(() => svg("circle", { class: "at", r: 4 }));
+    this.dots = strips.map(() => svg("circle", { class: "at", r: 4 }));
     this.strips.setAttribute("viewBox", `0 0 ${left + width + 14} ${bottom + 40}`);
-    this.strips.setAttribute("aria-label", `velocity and friction over time: ${this.told.textContent}`);
+    this.strips.setAttribute("aria-label", `${now.shown.map(([, , label]) => label).join(", ")} over time: ${this.told.textContent}`);
     this.strips.replaceChildren(...parts.map((part) => part.group), ...(when < left + width ? [step] : []), this.cursor, ...this.dots);
-    const drawn = plane(PLANE, all.map((one) => ({ x: one.v, y: one.friction })), ["m/s", "velocity"], ["1", "friction"]);
+    const named = (n) => /** @type {[string, string]} */ ([now.shown[n][1], now.shown[n][2]]);
+    const drawn = plane(PLANE, all.map((one) => ({ x: one.shown[across][0], y: one.shown[up][0] })), named(across), named(up));
     this.mark = svg("circle", { class: "at", r: 5 });
-    this.phase.setAttribute("aria-label", "friction over velocity");
+    this.phase.setAttribute("aria-label", `${now.shown[up][2]} over ${now.shown[across][2]}`);
     this.phase.replaceChildren(drawn.group, this.mark);
-    this.now = { ...now, names: shownSeries.map(([name]) => name), ups: parts.map((part) => part.up), plane: drawn };
-    this.sketch.take(course);
+    this.now = { ...now, strips, ups: parts.map((part) => part.up), drawn };
+    this.sketch?.take(course);
     this.table();
     this.show(Number(this.time.value) / 1000 || 0);
   }
 
   table() {
-    const { events } = this.course, { area } = this.page.rig.data, from = Math.max(0, events.length - LISTED);
+    const { events } = this.course, { area, phrases } = this.page.rig.data, from = Math.max(0, events.length - LISTED);
     this.list.style.display = events.length ? "" : "none";
     this.list.firstChild.textContent = `${events.length} slip event${events.length === 1 ? "" : "s"}${from ? `, the last ${LISTED} of them` : ""}`;
     this.events.replaceChildren(...events.slice(from).map((one, n) => {
-      const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show(one.begin / this.course.until)), before = events[from + n - 1];
-      const cells = [go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), quantity(one.drop, "Pa", area), before ? shown(one.begin - before.begin, "s", 3) : ""];
+      const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show(one.begin / this.course.until)), before = events.slice(0, from + n).findLast((other) => other.contact === one.contact);
+      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? shown(one.drop, "N") : quantity(one.drop, "Pa", area), before ? shown(one.begin - before.begin, "s", 3) : ""];
       return make("tr", {}, ...cells.map((cell) => make("td", {}, cell)));
     }));
   }
@@ -222,7 +224,7 @@ export class Course {
   /** @param {number} share of the run */
   show(share) {
     if (!this.course || !this.now.times.length) return;
-    const at = Math.min(1, Math.max(0, share)) * this.course.until, { times, v, friction, sigma, plane: drawn } = this.now, { left, width } = this.page.size;
+    const at = Math.min(1, Math.max(0, share)) * this.course.until, { times, shown: series, strips, drawn, plane: [across, up] } = this.now, { left, width } = this.page.size;
     let low = 0, high = times.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
@@ -236,15 +238,15 @@ export class Course {
     this.cursor.setAttribute("x1", x.toFixed(1));
     this.cursor.setAttribute("x2", x.toFixed(1));
     this.dots.forEach((dot, n) => {
-      const y = this.boxes[n].top + (1 - this.now.ups[n].of(between(this.now[this.now.names[n]]))) * HIGH;
+      const y = this.boxes[n].top + (1 - this.now.ups[n].of(between(series[strips[n]][0]))) * HIGH;
       dot.setAttribute("cx", x.toFixed(1));
       dot.setAttribute("cy", y.toFixed(1));
     });
-    this.mark.setAttribute("cx", (PLANE.left + drawn.across.of(between(v)) * PLANE.width).toFixed(1));
-    this.mark.setAttribute("cy", (PLANE.top + (1 - drawn.up.of(between(friction))) * PLANE.height).toFixed(1));
-    this.sketch.place(between(this.course.x), between(this.course.load));
-    const normal = shown(between(sigma), this.page.rig.data.area === null ? "Pa" : "N");
-    this.reading.textContent = `${shown(at, "s")}: ${shown(between(v), "m/s", 3)}, friction ${between(friction).toPrecision(4)}, ${normal}`;
+    this.mark.setAttribute("cx", (PLANE.left + drawn.across.of(between(series[across][0])) * PLANE.width).toFixed(1));
+    this.mark.setAttribute("cy", (PLANE.top + (1 - drawn.up.of(between(series[up][0]))) * PLANE.height).toFixed(1));
+    this.sketch?.place(between, this.course);
+    const now = series.map(([values, unit, label]) => (unit === "1" ? `friction ${between(values).toPrecision(4)}` : `${label === "ahead" ? "ahead by " : ""}${shown(between(values), unit, unit === "N" || unit === "Pa" ? 4 : 3)}`));
+    this.reading.textContent = `${shown(at, "s")}: ${now.join(", ")}`;
   }
 
   play() {

@@ -8,18 +8,20 @@ export class Motion {
   /** @type {{x: number, posed: boolean, share: number}} */ scales;
   /** @type {number[]} */ settings;
   /** @type {number} */ drive;
+  /** @type {{name: string, rate: number, area: number}[]} */ sliding; // contacts, in steady sliding
 
   /** @param {any} machine @param {any} facts @param {any} driver */
   constructor(machine, facts, driver) {
     this.machine = machine;
     this.facts = facts;
     this.driver = driver;
-    this.R = new Float64Array(facts.parameters.length + 2); // behind the parameters σss and the blow
+    this.behind = facts.parameters.length + facts.contacts.length; // where shares of disturbances begin
+    this.R = new Float64Array(this.behind + facts.behind);
     this.log = []; // rows to write on, kept from run to run
     this.recorded = [];
     this.points = [];
     this.grow();
-    this.y = new Float64Array(Math.max(facts.constants, 3 + facts.settings, facts.kept + 1, facts.segments * facts.segment) + 1);
+    this.y = new Float64Array(Math.max(facts.constants, 3 + 2 * facts.contacts.length + facts.settings, facts.kept + facts.guesses.length, facts.segments * facts.segment) + 1);
   }
 
   ask(name, many) {
@@ -27,36 +29,46 @@ export class Motion {
     return Array.from(this.y.subarray(0, many));
   }
 
-  /** Parameters and steady normal stress. @param {ArrayLike<number>} values @param {number} sigma */
-  set(values, sigma) {
+  /** Parameters and steady normal stresses. @param {ArrayLike<number>} values @param {ArrayLike<number>} sigmas */
+  set(values, sigmas) {
+    const { contacts, parameters, settings } = this.facts, many = contacts.length;
     this.R.set(values);
-    this.R[values.length] = sigma;
-    this.R[values.length + 1] = 1;
-    this.drive = this.R[this.facts.parameters.indexOf("drive.velocity")];
-    const [x, posed, share, ...settings] = this.ask("scales", 3 + this.facts.settings);
+    this.R.set(sigmas, parameters.length);
+    this.share("", "", 1);
+    this.drive = this.R[parameters.indexOf("drive.velocity")];
+    const [x, posed, share, ...rest] = this.ask("scales", 3 + 2 * many + settings);
     this.scales = { x, posed: posed > 0, share };
-    this.settings = settings;
+    this.sliding = contacts.map((name, i) => ({ name, rate: rest[2 * i], area: rest[2 * i + 1] }));
+    this.settings = rest.slice(2 * many);
     return this;
+  }
+
+  /** Where a disturbance acts. @param {string} disturbance @param {string} on @param {number} size */
+  share(disturbance, on, size) {
+    for (const [kind, places] of Object.entries(this.facts.shares)) {
+      for (const [name, place] of Object.entries(places)) this.R[this.behind + place] = kind === "blow" ? 1 : 0;
+      if (kind === disturbance && on in places) this.R[this.behind + places[on]] = kind === "blow" ? size : 1;
+    }
   }
 
   /** Why the rig cannot be moved so at these values; empty if it can. @param {string} disturbance */
   refusal(disturbance) {
     if (disturbance === "push" && this.ask("dashpot", 1)[0] !== 0) return "a sudden push through a dashpot is an infinite force";
-    if (disturbance === "blow" && !this.facts.inertial) return "a blow needs a mass: without it the block takes any velocity at once";
+    if (disturbance === "blow" && !Object.keys(this.facts.shares.blow).length) return "a blow needs a mass: without it the block takes any velocity at once";
     if (!this.scales.posed) return "the motion is ill-posed here";
     if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";
     return "";
   }
 
   /** The arrays that the driver takes: constants, start, settings, segments. */
-  tables(disturbance, size, at, until) {
+  tables(disturbance, on, size, at, until) {
     const { facts } = this, constants = zeros(1, facts.all), start = zeros(1, facts.kept), settings = zeros(1, facts.settings);
+    this.share(disturbance, on, size);
     constants[0].set(this.ask("constants", facts.constants));
-    this.R[facts.parameters.length + 1] = disturbance === "blow" ? size : 1;
-    const found = this.ask("start", facts.kept + 1);
+    const found = this.ask("start", facts.kept + facts.guesses.length);
     start[0].set(found.slice(0, facts.kept));
     settings[0].set(this.settings);
-    if (!facts.inertial) settings[0][facts.guess] = found[facts.kept];
+    facts.guesses.forEach((column, k) => (settings[0][column] = found[facts.kept + k]));
     const rows = this.rows(disturbance, size, at, until), segments = zeros(1, rows.length, facts.segment);
     rows.forEach((row, i) => segments[0][i].set(row));
     return [constants, start, settings, segments];
@@ -73,14 +85,14 @@ export class Motion {
 
   /**
    * Move the rig, slice by slice. Stopped, there is what there was; where it is not wanted any more, nothing.
-   * @param {{disturbance: string, size: number, at: number, until: number}} asked
+   * @param {{disturbance: string, on?: string, size: number, at: number, until: number}} asked
    * @param {() => string} stopped empty, "stopped" or "unwanted"; asked between slices
    * @param {() => Promise<void>} pause between slices
    * @param {(time: number) => void} [told] how far it has come
    */
-  async run({ disturbance, size, at, until }, stopped, pause, told = () => {}) {
+  async run({ disturbance, on = "", size, at, until }, stopped, pause, told = () => {}) {
     const { facts, machine, driver } = this, { layout, routines } = machine, c = facts.cursor;
-    const tables = this.tables(disturbance, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows), point = 1 + facts.size;
+    const tables = this.tables(disturbance, on, size, at, until), cursor = zeros(c.SIZE + 1), S = zeros(facts.rows), { point } = facts;
     cursor[c.LAST_JOB] = cursor[c.BUSY] = 1;
     cursor[c.PAUSED] = -1;
     const out = [zeros(1), zeros(1, facts.final + point), zeros(1, facts.tally), zeros(1, 0, point)];
@@ -101,9 +113,9 @@ export class Motion {
 
   /** More room for what is written down. */
   grow() {
-    const { logged, recorded, size } = this.facts;
+    const { logged, recorded, point } = this.facts;
     for (const row of zeros(Math.max(128, this.log.length), logged)) this.log.push(row);
-    for (const row of zeros(Math.max(2048, this.recorded.length), recorded + 1 + size)) {
+    for (const row of zeros(Math.max(2048, this.recorded.length), recorded + point)) {
       this.recorded.push(row);
       this.points.push(row.subarray(recorded));
     }
@@ -111,28 +123,39 @@ export class Motion {
 
   /** Series over time, slip events and how it ended. */
   observed(tables, many, log, status, end) {
-    const { facts, machine, recorded } = this, o = facts.out, own = zeros(many), values = zeros(8 + facts.kept, many);
+    const { facts, machine, recorded } = this, o = facts.out, own = zeros(many), each = o.W_SLOPE, values = zeros(each * facts.contacts.length + facts.kept + facts.further, many);
     const points = this.points.slice(0, many), segment = zeros(many), times = zeros(many);
     for (let i = 0; i < many; i++) {
       times[i] = recorded[i][0];
       segment[i] = recorded[i][1];
     }
-    /** @type {any} */ (points).shape = [many, 1 + facts.size];
+    /** @type {any} */ (points).shape = [many, facts.point];
     const [constants, , settings, segments] = tables;
     this.driver.observe(machine.layout, machine.routines, constants, settings, segments, points, own, segment, times, values);
-    const events = [], { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind;
-    let open = null;
-    for (const [kind, time, v, , , stress] of Array.from(log).sort((a, b) => a[1] - b[1])) {
-      if (kind === SLIP_BEGINS) open = { begin: time, peak: v, stress };
-      else if (open && kind === PEAK) open.peak = Math.max(open.peak, v);
-      else if (open && kind === SLIP_ENDS) {
-        events.push({ begin: open.begin, end: time, peak: open.peak, drop: open.stress - stress });
-        open = null;
+    const events = /** @type {any[]} */ ([]), { SLIP_BEGINS, SLIP_ENDS, PEAK } = facts.kind, open = /** @type {any[]} */ (facts.contacts.map(() => null));
+    for (const [number, time, v, , , stress] of Array.from(log).sort((a, b) => a[1] - b[1])) {
+      const c = Math.floor((number - 1) / facts.kinds), kind = ((number - 1) % facts.kinds) + 1, { name: contact, area } = this.sliding[c];
+      if (kind === SLIP_BEGINS) open[c] = { contact, begin: time, peak: v, stress };
+      else if (open[c] && kind === PEAK) open[c].peak = Math.max(open[c].peak, v);
+      else if (open[c] && kind === SLIP_ENDS) {
+        events.push({ contact, begin: open[c].begin, end: time, peak: open[c].peak, drop: area * (open[c].stress - stress) });
+        open[c] = null;
       }
     }
-    const x = values[o.W_SLOPE], load = values[o.ADVANCE]; // of what follows the outputs, slip is first
-    return { times, v: values[o.V], sigma: values[o.SIGMA], tau: values[o.TAU], x, load, events, status, end };
+    const contacts = this.sliding.map(({ name, area }, c) => {
+      const own = (place) => values[each * c + place];
+      return { name, v: own(o.V), sigma: scaled(area, own(o.SIGMA)), tau: scaled(area, own(o.TAU)), way: own(o.ADVANCE) };
+    });
+    const bodies = facts.bodies.map(([name, unit, x, v]) => ({ name, unit, x: values[x], v: values[v] })), [{ v, sigma, tau, way }] = contacts;
+    const x = values[each * contacts.length]; // of what follows the outputs, the slip of a slider is first
+    return { times, v, sigma, tau, x, load: way, contacts, bodies, ratio: this.sliding[0].rate / this.drive, events, status, end };
   }
+}
+
+/** A series in place, so many times as large. @param {number} factor @param {any} series */
+function scaled(factor, series) {
+  if (factor !== 1) for (let i = 0; i < series.length; i++) series[i] *= factor;
+  return series;
 }
 
 /**
@@ -146,7 +169,7 @@ export function serve(scope, begin) {
     await new Promise((done) => setTimeout(done)); // then the page is heard
     heard = Date.now();
   };
-  scope.onmessage = async ({ data: { facts, stop, id, values, sigma, asked } }) => {
+  scope.onmessage = async ({ data: { facts, stop, id, values, sigmas, asked } }) => {
     if (facts) motion = begin(facts);
     else if (stop) halted = true;
     else {
@@ -158,7 +181,7 @@ export function serve(scope, begin) {
         scope.postMessage({ id, reached: time });
       };
       try {
-        const course = await motion.set(values, sigma).run(asked, () => (wanted !== id ? "unwanted" : halted ? "stopped" : ""), pause, told);
+        const course = await motion.set(values, sigmas).run(asked, () => (wanted !== id ? "unwanted" : halted ? "stopped" : ""), pause, told);
         if (course) scope.postMessage({ id, course }, [course.times.buffer, course.v.buffer]); // of which the other series are parts
       } catch (error) {
         scope.postMessage({ id, fault: error instanceof Error ? error.message : String(error) });

@@ -33,14 +33,14 @@ export class Mover {
 
   /**
    * What comes of a disturbance; never, where another has been asked for since.
-   * @param {ArrayLike<number>} values @param {number} sigma @param {any} asked @param {(time: number) => void} told
+   * @param {ArrayLike<number>} values @param {ArrayLike<number>} sigmas @param {any} asked @param {(time: number) => void} told
    */
-  run(values, sigma, asked, told) {
+  run(values, sigmas, asked, told) {
     this.id++;
     this.halted = false;
     return new Promise((done, failed) => {
       this.heard = { done, failed, told };
-      this.last = { id: this.id, values: Array.from(values), sigma, asked };
+      this.last = { id: this.id, values: Array.from(values), sigmas: Array.from(sigmas), asked };
       if (this.worker) this.worker.postMessage(this.last);
       else this.here(this.last);
     });
@@ -58,7 +58,7 @@ export class Mover {
     this.worker?.postMessage({ stop: true });
   }
 
-  async here({ id, values, sigma, asked }) {
+  async here({ id, values, sigmas, asked }) {
     let began = performance.now();
     const pause = async () => {
       if (performance.now() < began + HERE) return;
@@ -66,7 +66,7 @@ export class Mover {
       began = performance.now();
     };
     try {
-      const course = await this.own.set(values, sigma).run(asked, () => (this.id !== id ? LATEST : this.halted ? "stopped" : ""), pause, (reached) => this.hear({ id, reached }));
+      const course = await this.own.set(values, sigmas).run(asked, () => (this.id !== id ? LATEST : this.halted ? "stopped" : ""), pause, (reached) => this.hear({ id, reached }));
       if (course) this.hear({ id, course });
     } catch (error) {
       this.hear({ id, fault: error instanceof Error ? error.message : String(error) });

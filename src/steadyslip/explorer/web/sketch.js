@@ -4,6 +4,7 @@ const SHIFT = 16, MOVING = ".ground, .body, .link"; // how far the block goes in
 export class Sketch {
   gain = 0; // how far parts move for a metre of slip
   first = 0;
+  caption = "The mechanism, seen from the load point";
 
   /** @param {string} text drawn by steadyslip/explorer/sketch.py */
   constructor(text) {
@@ -19,9 +20,9 @@ export class Sketch {
     this.first = x;
   }
 
-  /** Where everything is: slip against the load point, and the way of that, m. */
-  place(x, load) {
-    const shift = this.gain * (x - this.first), passed = this.gain * load;
+  /** Where everything is: slip against the load point, and the way of that, m. @param {(series: any) => number} now @param {any} course */
+  place(now, course) {
+    const x = now(course.x), load = now(course.load), shift = this.gain * (x - this.first), passed = this.gain * load;
     for (const part of this.parts) {
       if (part.classList.contains("ground")) part.setAttribute("transform", `translate(${-(passed % this.period)} 0)`);
       else if (part.classList.contains("body")) part.setAttribute("transform", `translate(${shift} 0)`);

@@ -73,15 +73,21 @@ const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math
 /** How a motion ends before its time, where the driver has a word of its own for it. @type {Record<string, string>} */
 const ENDED = { "no velocity": "no velocity balances the forces" };
 
-/** What came of a motion. @param {any} course @param {number | null} area */
-export function outcome({ events, status, end, v, at }, area) {
+/** What came of a motion. @param {any} course @param {any} data */
+export function outcome({ events, status, end, contacts, at }, { area, phrases }) {
   if (status === "blow-up") return `It runs away at ${shown(end, "s")}, ${shown(end - at, "s")} after the disturbance: neither mass nor damping limits the velocity.`;
   const ended = status === "done" ? "" : ` It ends at ${shown(end, "s")}: ${ENDED[status] ?? status}.`;
   if (!events.length) {
-    const least = v.reduce((a, b) => Math.min(a, b), Infinity), most = v.reduce((a, b) => Math.max(a, b), -Infinity);
-    return `No slip event; velocity ${shown(least, "m/s", 3)} to ${shown(most, "m/s", 3)}.${ended}`;
+    const ranges = contacts.map(({ name, v }) => {
+      const least = v.reduce((a, b) => Math.min(a, b), Infinity), most = v.reduce((a, b) => Math.max(a, b), -Infinity);
+      return `${name ? `${name} ` : ""}${shown(least, "m/s", 3)} to ${shown(most, "m/s", 3)}`;
+    });
+    return `No slip event; ${phrases ? "slip rate of " : "velocity "}${ranges.join(", of ")}.${ended}`;
   }
-  const last = events[events.length - 1], before = events[events.length - 2];
-  const every = before ? `, the last two ${shown(last.begin - before.begin, "s", 3)} apart` : "";
-  return `${events.length} slip event${events.length > 1 ? "s" : ""}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, stress drop ${quantity(last.drop, "Pa", area)}.${ended}`;
+  const last = events[events.length - 1], before = events.slice(0, -1).findLast((one) => one.contact === last.contact);
+  const every = before ? `, the last two${phrases ? ` of ${last.contact}` : ""} ${shown(last.begin - before.begin, "s", 3)} apart` : "";
+  const counts = contacts.map(({ name }) => [events.filter((one) => one.contact === name).length, name]).filter(([many]) => many);
+  const where = phrases ? ` (${counts.map(([many, name]) => (counts.length > 1 ? `${many} of ${name}` : name)).join(", ")})` : "";
+  const drop = phrases ? `force drop ${shown(last.drop, "N")}` : `stress drop ${quantity(last.drop, "Pa", area)}`;
+  return `${events.length} slip event${events.length > 1 ? "s" : ""}${where}${every}; the last: peak ${shown(last.peak, "m/s", 3)}, ${drop}.${ended}`;
 }

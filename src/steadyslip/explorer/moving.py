@@ -1,0 +1,167 @@
+"""What starts a motion on a page, at any values: scales and settings, starting values, shares of disturbances.
+
+Programs read the record R: parameters, steady normal stresses, and behind them the `Shares`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import sympy as sp
+
+from steadyslip.explorer.programs import program
+from steadyslip.explorer.sliding import characteristic_polynomial
+from steadyslip.kernels.layout import SETTINGS
+from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
+from steadyslip.linear import crossing
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import NORMAL
+from steadyslip.machine.slider import Slider
+from steadyslip.model.equations import Contact, Coordinate, Model
+from steadyslip.model.reducing import share_of
+from steadyslip.model.reduction import Reduction
+from steadyslip.model.scales import Weights, joined_sizes, moving_parts, rising, shortest_time, sizes, weighed
+from steadyslip.motion.jobs import Options, numbers
+
+
+@dataclass(frozen=True)
+class Shares:
+    """How much of a disturbance acts where: on bodies, at contacts; and by how much a blow multiplies velocities.
+
+    The single block of a slider has no names: disturbances act on it, and `blown` is its velocity.
+    """
+
+    pushed: dict[str, sp.Symbol]
+    pressed: dict[str, sp.Symbol]
+    blown: dict[str, sp.Symbol]
+
+    @classmethod
+    def of(cls, rig: Slider | Machine, model: Model) -> Shares:
+        if not isinstance(rig, Machine):
+            return cls({}, {}, {"": _blow(model.coordinates[0])} if model.inertial else {})
+        own = [one for one in model.coordinates if one.name in rig.bodies]
+        return cls(
+            {one.name: share_of(one.push) for one in model.coordinates},
+            {contact.name: share_of(contact.press) for contact in model.contacts},
+            {one.name: _blow(one) for one in own if one.inertial and one.speed != 0},
+        )
+
+    @property
+    def symbols(self) -> list[sp.Symbol]:
+        """All of them, in the order in which they stand in a record."""
+        return [*self.pushed.values(), *self.pressed.values(), *self.blown.values()]
+
+    def places(self) -> dict[str, dict[str, int]]:
+        """Where they stand behind the steady normal stresses, by what a page calls them."""
+        order = {symbol: place for place, symbol in enumerate(self.symbols)}
+        along = {name: symbol for name, symbol in self.pushed.items() if not name.endswith(NORMAL)}
+        named = {"pull": along, "normal": self.pressed, "blow": self.blown}
+        return {kind: {name: order[symbol] for name, symbol in own.items()} for kind, own in named.items()}
+
+
+def _blow(coordinate: Coordinate) -> sp.Symbol:
+    """Velocity at the start over that of steady sliding."""
+    return sp.Symbol(f"blow_on_{coordinate.velocity}", positive=True)
+
+
+# -- starting values
+
+
+def start_program(reduction: Reduction, shares: Shares) -> Program:
+    """Variables that jumps leave alone, and behind them guesses of what is searched for: of steady sliding, but for a
+    blow."""
+    model = reduction.model
+    memory = {item.symbol: sp.sympify(model.steady[item.symbol]) for item in (*model.memory, *model.states)}
+    speeds = {one.velocity: one.speed * _blown(one, model, shares) for one in model.coordinates}
+    found = {**memory, **speeds}
+    for contact, sliding in zip(model.contacts, reduction.slidings, strict=True):
+        if sliding.variable is not None:
+            slip = _slip_rate(contact, model, speeds)
+            found[sliding.variable.w] = sliding.variable.w_of_v.xreplace(memory | {contact.velocity: slip})
+    starts = [found.get(symbol, sp.Integer(0)) for symbol in reduction.continuous]
+    guesses = [found.get(symbol, model.steady.get(symbol, sp.Integer(0))) for symbol in reduction.searched]
+    return program(model, "start", [*starts, *guesses], shares.symbols)
+
+
+def _blown(coordinate: Coordinate, model: Model, shares: Shares) -> sp.Expr:
+    name = coordinate.name if model.contacts[0].name else ""
+    return shares.blown.get(name, sp.Integer(1))
+
+
+def _slip_rate(contact: Contact, model: Model, speeds: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """That which belongs to velocities of bodies, with the load point at that of steady sliding."""
+    load = model.inputs["load_velocity"]
+    slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
+    return slip.xreplace({load: model.steady[load], **speeds})
+
+
+# -- scales
+
+
+def scales_program(reduction: Reduction, eliminate: int | tuple[int | None, ...] | None, options: Options) -> Program:
+    """The scale of the load point's way, whether the motion is posed, the least weight of the states left out; then of
+    every contact its slip rate and area; then settings."""
+    model = reduction.model
+    wanted: list[Any] = [model.parameters["drive.velocity"]]
+    wanted += [model.steady[contact.velocity] for contact in model.contacts]
+    wanted += [contact.sigma_ss for contact in model.contacts]
+    wanted += [contact.area for contact in model.contacts]
+    several = [weighed(model, index) for index in range(len(model.contacts))]
+    wanted += [sp.sympify(e).xreplace({sp.zoo: sp.nan}) for own in several for e in own]  # of what holds nothing
+    if model.contacts[0].name:
+        wanted += moving_parts(model)
+    if not model.is_single:
+        wanted += [e for row in rising(model) for e in row]
+    each = eliminate if isinstance(eliminate, tuple) else (eliminate,)
+    return program(model, "scales", wanted, then=partial(_scaled, reduction, each, options, list(map(len, several))))
+
+
+def _scaled(
+    reduction: Reduction, eliminate: tuple[int | None, ...], options: Options, counts: list[int], found: list[Node]
+) -> Sequence[Value]:
+    model, many = reduction.model, len(reduction.model.contacts)
+    drive, *rest = found
+    speeds, stresses, areas = (rest[start : start + many] for start in (0, many, 2 * many))
+    rest = rest[3 * many :]
+    weights = []
+    for count in counts:
+        weights.append(Weights.of(rest[:count]))
+        rest = rest[count:]
+    own = [sizes(one, speed, reduction, select, i) for i, (one, speed) in enumerate(zip(weights, speeds, strict=True))]
+    way: Any
+    if model.contacts[0].name:
+        count = len(moving_parts(model))
+        directs = [abs(one.direct) for one in weights]
+        scales, searched = joined_sizes(reduction, rest[:count], speeds, stresses, directs, own, select)
+        way, searched, rest = speeds[0] * shortest_time(scales, select), searched or (1.0,), rest[count:]
+    else:
+        scales, unknown = own[0]
+        way, searched = scales["x"], (unknown,)
+    posed = weights[0].by_unknown > 0 if model.is_single else _rises(rest)
+    shares: Any = 1.0
+    for one, which in zip(weights, eliminate, strict=True):
+        if which is not None:
+            share = abs(one.by_memory[which] / one.direct)
+            shares = select(share < shares, share, shares)
+    given = {"watch": 1.0, "record": 1.0, "guess": 0.0}
+    settings = given | numbers(speeds[0], stresses[0], way, searched[0], options)
+    rows = [settings[name] for name in SETTINGS] + [options.rtol * scales[name] for name in reduction.names]
+    rows += [0.0] * (len(searched) - 1) + list(searched[1:])
+    told = [value for pair in zip(speeds, areas, strict=True) for value in pair]
+    return [way * drive / speeds[0], select(posed, 1.0, 0.0), shares, *told, *rows]
+
+
+def _rises(entries: list[Node]) -> Any:
+    """Whether all eigenvalues of a matrix are positive."""
+    size = round(len(entries) ** 0.5)
+    less: list[list[Value | None]] = [
+        [None if _is_zero(e) else -e for e in entries[size * i : size * (i + 1)]] for i in range(size)
+    ]
+    return crossing.is_hurwitz(list(map(as_node, characteristic_polynomial(less))), select) if size else as_node(True)
+
+
+def _is_zero(node: Node) -> bool:
+    return node.op == "number" and node.args[0] == 0

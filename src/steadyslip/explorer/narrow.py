@@ -1,0 +1,79 @@
+"""Code and styles without what only people read: comments, indentation, spaces; names stay."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import groupby
+
+_OTHER = re.compile(
+    r""""(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'"""  # strings
+    r"|(?<=[(,=:?&|!]) ?/(?![/*])(?:\\.|\[(?:\\.|[^\]\\\n])*\]|[^/\\\n\[])+/[a-z]*"  # regular expressions
+)
+_PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
+_SUM = re.compile(r"(?<=[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
+"""Products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order."""
+_SPACE = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
+
+
+def narrow(text: str) -> str:
+    """A module; no string of it goes over several lines."""
+    bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
+    bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # types within a line
+    bare = re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
+    return "".join(_SPACE.sub(_close, part) if code else part for part, code in _parts(bare))
+
+
+def _parts(text: str) -> Iterator[tuple[str, bool]]:
+    """Code, and what must stay as it is: strings, templates, regular expressions; whether it is code."""
+    start = at = 0
+    while at < len(text):
+        found = _OTHER.match(text, at)
+        end = found.end() if found else _template_end(text, at) if text[at] == "`" else at
+        if end > at:
+            yield text[start:at], True
+            yield text[at:end], False
+            start = at = end
+        else:
+            at += 1
+    yield text[start:], True
+
+
+def _template_end(text: str, at: int) -> int:
+    """Where a template ends that begins here; others may be within."""
+    at += 1
+    while text[at] != "`":
+        if text.startswith("${", at):
+            at, depth = at + 2, 1
+            while depth:
+                depth += {"{": 1, "}": -1}.get(text[at], 0)
+                at = _template_end(text, at) if text[at] == "`" else at + 1
+        else:
+            at += 2 if text[at] == "\\" else 1
+    return at + 1
+
+
+def _close(found: re.Match[str]) -> str:
+    """Signs without the spaces around, but for two that would be another sign together."""
+    signs, whole = found[1], found[0]
+    before = " " if whole[0] == " " and signs[0] in "+-" else ""
+    after = " " if whole[-1] == " " and signs[-1] in "+-" else ""
+    return before + signs + after
+
+
+def dense(text: str) -> str:
+    """Generated code, which has no strings, without the spaces beside signs; declarations in a row are one."""
+    bare = re.sub(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *", r"\1", re.sub(r"^ +", "", text, flags=re.M))
+    before = ""
+    while before != bare:
+        before, bare = bare, _SUM.sub(r"\1", _PRODUCT.sub(r"\1", bare))
+    rows: list[str] = []
+    for declared, lines in groupby(bare.split("\n"), lambda line: line.startswith("var ") and line.endswith(";")):
+        own = list(lines)
+        rows += ["var " + ",".join(line[4:-1] for line in own) + ";"] if declared else own
+    return "\n".join(rows)
+
+
+def narrow_style(text: str) -> str:
+    """A style sheet."""
+    return re.sub(r"(?<=[;{},]) +|(?<=[a-z]:) (?=[^{}]*[;}])|;? *(?=\})", "", re.sub(r"^ +", "", text, flags=re.M))

@@ -60,7 +60,10 @@ WATCHED = {
 
 @pytest.mark.parametrize("case", WATCHED)
 def test_lanes_see_what_single_runs_see(case):
-    """The tally that lanes keep within the step is that of the driver's log: all counts, every digit that matters."""
+    """The tally that lanes keep within the step is that of the driver's log: all counts, every digit that matters.
+
+    A single run adds up in another order than lanes do (`kernels/chains.py`), and rounding grows along the way.
+    """
     a_rig, protocol, initial, until = WATCHED[case]
     k = float(a_rig.stiffness) * np.random.default_rng(0).uniform(0.75, 1.5, 24)
     tally = ss.simulate_many(a_rig, {"stiffness": k}, protocol, until=until, initial=initial).events
@@ -71,8 +74,8 @@ def test_lanes_see_what_single_runs_see(case):
         assert tally["events"][i] == len(run.slip_events)
         assert tally["velocity_peaks"][i] == len(peaks) > 0
         assert tally["arrests"][i] == kinds.count("arrest")
-        assert tally["last_peak_time"][i] == pytest.approx(peaks[-1].time, rel=1e-11)
-        assert tally["peak_velocity"][i] >= max(peak.velocity for peak in peaks) * (1 - 1e-12)
+        assert tally["last_peak_time"][i] == pytest.approx(peaks[-1].time, rel=1e-9)
+        assert tally["peak_velocity"][i] >= max(peak.velocity for peak in peaks) * (1 - 1e-9)
         if len(peaks) > 1:
             assert tally["peak_period"][i] == pytest.approx(peaks[-1].time - peaks[-2].time, rel=1e-9)
         if run.slip_events:

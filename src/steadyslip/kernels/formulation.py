@@ -10,6 +10,7 @@ import sympy as sp
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import derivative
+from steadyslip.kernels.chains import with_short_chains
 from steadyslip.kernels.events import EVENTS
 from steadyslip.kernels.layout import Layout, make_layout
 from steadyslip.kernels.methods import METHODS, Method
@@ -140,6 +141,9 @@ class Formulation:
         if reduction.unknowns:
             slopes = [matrix[i][k] for i, k in self.slopes]
             self.residuals = self._formulas([self._fixed(e) for e in (*reduction.residuals, *slopes)])
+        if self.choice.lanes == 1 and not self.method.implicit:
+            own = [one.variable.w for one in reduction.slidings if one.variable is not None]
+            self._rates = with_short_chains(self._rates, own)
         self.rates = self._formulas(self._rates)
         self.full = self._formulas(self._rates + [e for one in seen for e in one[:3]])
         also = [*reduction.further.values(), *(one.slip for one in reduction.slidings)]

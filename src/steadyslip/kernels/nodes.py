@@ -14,10 +14,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, cast
 
-PRIMITIVES = (
+FUNCTIONS = (
     "exp", "log", "log1p", "expm1", "sinh", "cosh", "tanh", "asinh", "asinh_exp", "sin", "cos", "sqrt", "power", "sign",
 )  # fmt: skip
-"""Elementary functions that programs may use; `steadyslip.kernels.primitives` says what they are."""
+"""Elementary functions that formulas may use; `steadyslip.kernels.primitives` says what they are."""
+PRIMITIVES = (*FUNCTIONS, "rough_log")
+"""Those that programs may use."""
 _order = itertools.count()
 
 

@@ -17,7 +17,7 @@ from sympy.logic.boolalg import Boolean
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import array_function, occurrences
-from steadyslip.kernels.nodes import PRIMITIVES, Value, as_node, primitive, select
+from steadyslip.kernels.nodes import FUNCTIONS, Value, as_node, primitive, select
 
 
 class Constants:
@@ -244,10 +244,10 @@ class _Evaluation:
             return primitive("sin", *arguments) / primitive("cos", *arguments)
         if name == "DiracDelta":
             return 0.0  # the derivative of sign, but for one point
-        if name not in PRIMITIVES:
+        if name not in FUNCTIONS:
             raise NotAvailable(
                 f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
-                f"{', '.join(PRIMITIVES)}, tan, abs, powers and Piecewise"
+                f"{', '.join(FUNCTIONS)}, tan, abs, powers and Piecewise"
             )
         return primitive(name, *arguments)
 

@@ -1,0 +1,94 @@
+"""Rates written so that a step waits as little as possible for their slowest parts.
+
+One trajectory keeps a processor waiting: each stage of a step begins with what the last one found. An expression in
+which a velocity, an exponential of the state, comes late is therefore written as A e + B wherever it is linear in the
+exponential e: A and B are computed while e is, and one multiplication and addition are left to wait for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+__all__ = ["with_short_chains"]
+
+
+def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Symbol]) -> list[sp.Expr]:
+    """The same expressions, linear in functions of `variables` wherever they can be.
+
+    Parameters
+    ----------
+    expressions : iterable of sympy.Expr
+    variables : iterable of sympy.Symbol
+        What the slow functions depend on: the velocity variables.
+    """
+    written, late = list(expressions), frozenset(variables)
+    names: list[tuple[sp.Symbol, sp.Expr]] = []
+    while slow := _innermost(written, late | {name for name, _ in names}):
+        name = sp.Dummy(real=True)
+        names.append((name, slow))
+        written = [e.xreplace({slow: name}) for e in written]
+        written = [_Collector(name).collected(e) for e in written]
+    for name, slow in reversed(names):
+        written = [e.xreplace({name: slow}) for e in written]
+    return written
+
+
+def _innermost(expressions: Iterable[sp.Expr], late: frozenset[sp.Symbol]) -> sp.Expr | None:
+    """A function of what is late without such a function in its argument."""
+    for expression in expressions:
+        for node in sp.postorder_traversal(expression):
+            is_slow = isinstance(node, sp.Function) and not isinstance(node, (AppliedUndef, sp.Piecewise))
+            if is_slow and node.free_symbols & late:
+                return node
+    return None
+
+
+class _Collector:
+    """Collects one symbol."""
+
+    def __init__(self, symbol: sp.Symbol) -> None:
+        self.symbol = symbol
+        self._known: dict[sp.Basic, tuple[sp.Expr, sp.Expr] | None] = {}
+
+    def collected(self, e: sp.Basic) -> sp.Basic:
+        """An expression with every largest linear part as A s + B."""
+        if not e.has(self.symbol) or e is self.symbol:
+            return e
+        linear = self.linear(e)
+        if linear is not None:
+            return linear[0] * self.symbol + linear[1]
+        if e.is_Add or e.is_Mul:
+            parts = [self.linear(a) for a in e.args]
+            if e.is_Add:
+                together = [p for p in parts if p is not None]
+                others = [self.collected(a) for a, p in zip(e.args, parts, strict=True) if p is None]
+                return sp.Add(self.symbol * sp.Add(*(a for a, _ in together)), *(b for _, b in together), *others)
+        return e.func(*map(self.collected, e.args))
+
+    def linear(self, e: sp.Basic) -> tuple[sp.Expr, sp.Expr] | None:
+        """A and B; None where it is not linear."""
+        if e not in self._known:
+            self._known[e] = self._linear(e)
+        return self._known[e]
+
+    def _linear(self, e: sp.Basic) -> tuple[sp.Expr, sp.Expr] | None:
+        if not e.has(self.symbol):
+            return sp.Integer(0), e
+        if e is self.symbol:
+            return sp.Integer(1), sp.Integer(0)
+        if e.is_Add:
+            parts = [part for part in map(self.linear, e.args) if part is not None]
+            if len(parts) < len(e.args):
+                return None
+            return sp.Add(*(a for a, _ in parts)), sp.Add(*(b for _, b in parts))
+        if e.is_Mul:
+            own = [a for a in e.args if a.has(self.symbol)]
+            inner = self.linear(own[0]) if len(own) == 1 else None
+            if inner is None:
+                return None
+            rest = sp.Mul(*(a for a in e.args if a is not own[0]))
+            return rest * inner[0], rest * inner[1]
+        return None

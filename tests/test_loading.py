@@ -10,6 +10,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.commanded import CommandedInputs
+from steadyslip.experiments.loading import runs
 from steadyslip.experiments.loading.kinks import load_course, smooth_load
 from steadyslip.experiments.loading.loading import Loading, shifted
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
@@ -148,6 +149,28 @@ def test_an_oscillation_is_followed_without_its_noise():
     assert wave.period == pytest.approx(20, rel=0.02)
     course = stress_course(time, noisy)
     assert np.sqrt(np.mean((course.at(time) - clean) ** 2)) < 2e3
+
+
+@pytest.mark.parametrize("at", [30.0, 41.0337, 60.0071])
+def test_a_change_among_very_many_samples_is_found_to_the_sample(monkeypatch, at):
+    """Runs are looked for on means of samples; where they part is known better."""
+    monkeypatch.setattr(runs, "COARSE", 400)
+    time = np.arange(0.0, 100.0, 5e-3)
+    rng = np.random.default_rng(2)
+    moved = 1e-6 * time + 4e-6 * np.maximum(time - at, 0.0) + 3e-8 * rng.standard_normal(len(time))
+    (change,) = load_course(time, moved).changes
+    assert change.earliest <= at <= change.latest
+    assert change.latest - change.earliest < 0.08  # three times the noise over the change of rate, on both sides
+    assert change.time == pytest.approx(at, abs=5e-3)
+
+
+@pytest.mark.parametrize(("at", "count"), [(93.3, 1), (27990.0, 1), (45.0, 0)])
+def test_a_short_run_at_an_end_of_the_record_is_one(at, count):
+    """Seven samples of another rate where nothing is noisy; two may be the sensor's."""
+    time = np.linspace(0.0, 28087.0, 2000)
+    moved = 1e-6 * np.minimum(time, at) + 1e-7 * np.maximum(time - at, 0.0)
+    found = load_course(time, moved).changes
+    assert [change.time for change in found] == [pytest.approx(at, abs=0.1)] * count
 
 
 # -- tables

@@ -15,7 +15,7 @@ from steadyslip.experiments.fitting.identify import combinations, prior_informat
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan, check_friction, check_width, make_plan
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import MOST, Told, ordered, searched
+from steadyslip.experiments.fitting.search import MOST, Told, in_order, searched
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record
@@ -158,7 +158,7 @@ def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
     ).sorted()
     if not ends.ssq[0] < result.ssq * (1 - BETTER):
         return result
-    found = ordered(ends.coordinates, space)[0]
+    found, _ = in_order(comparison, ends)
     errors = "correlated" if result.correlated else "independent"
     search = replace(result.search, arrived=1, iterations=int(ends.iterations[0]), converged=bool(ends.converged[0]))
     return finished(plan, comparison, found, search, errors, result.bounds)

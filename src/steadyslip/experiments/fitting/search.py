@@ -33,6 +33,7 @@ FEW = 8  # starts of a simpler model, to see whether it comes near
 NEAREST = 3  # of the ends on few numbers that go on with all samples
 STARTING, REFINING = 0.5, 0.8  # of the work of a search: what may be done by the ends of its first two stages
 BESIDES = 0.2  # of it: what may be done with each simpler model, besides its own search
+SAME_IN_ORDER = 1e-9  # of the sum of squares: what the order of states may change of it
 SURPASSED = 1e-8  # of the sum of squares: by so much less on few numbers, an end is worth a look on all samples
 SMALL = 50_000  # derivatives at all samples, of all the promising: so few that nothing is won by fewer
 INSIDE = (0.25, 0.5, 0.75)  # of its window: where a time that ran to an end of it begins anew
@@ -115,8 +116,8 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
     found = search.nested(found, {} if known is None else known)
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
-    best = ordered(found.coordinates[:1], search.whole.space)[0]
-    return Found(best, float(found.ssq[0]), search.whole, search.story(found), (search.low, search.high))
+    best, ssq = in_order(search.whole, found)
+    return Found(best, ssq, search.whole, search.story(found), (search.low, search.high))
 
 
 class _Search:
@@ -328,6 +329,21 @@ def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
     """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
     r = whole.residuals(coordinates[None])[0][0]
     return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
+
+
+def in_order(comparison: Comparison, found: Minima) -> tuple[Array, float]:
+    """The first of some minima and its sum of squares, states by rising slip distance.
+
+    Of a motion that amplifies whatever there is, rounding too, the order decides; then it stays.
+    """
+    best, ssq = found.coordinates[0], float(found.ssq[0])
+    rising = ordered(found.coordinates[:1], comparison.space)
+    if np.any(rising[0] != best):
+        residuals, slopes = comparison.residuals(rising)
+        again = float(residuals[0] @ residuals[0])
+        if np.all(np.isfinite(slopes)) and again <= ssq * (1 + SAME_IN_ORDER):
+            return rising[0], min(again, ssq)
+    return best, ssq
 
 
 def ordered(coordinates: Array, space: Space) -> Array:

@@ -27,7 +27,7 @@ SLIP = 0.01  # share of the time of a record that a slip of the sensor may take
 MAIN = 0.6  # share of what is left out between two pieces that one of them makes up: a run of its own
 LEAD = 8.0  # how far a change of rate must lead, in units of how far a displacement strays from straight lines
 PLAIN = 100.0  # how far a piece must lead, in the same units, to be a run of its own however short
-RELIABLE = 8  # samples
+RELIABLE, FEWEST = 8, 5  # samples of such a piece, within a run and at an end of the record
 COARSE = 20_000  # samples on which runs are looked for
 
 
@@ -105,7 +105,7 @@ def straight_runs(time: Array, displacement: Array) -> list[Run]:
         runs = straight_runs(*(_means(values, step) for values in (time, displacement)))
         for run in runs:
             run.members = [(i * step, min(j * step, len(time))) for i, j in run.members]
-        return [levelled(run, time, displacement) for run in runs]
+        return _parted(runs, step, time, displacement)
     noise = displacement_noise(time, displacement)
     pieces = _Pieces(time, displacement, split(time, displacement, noise, linear=True), noise)
     groups = _with_holds(_chosen(pieces), pieces)
@@ -115,6 +115,20 @@ def straight_runs(time: Array, displacement: Array) -> list[Run]:
         groups = _without_wander(_without_excursions(_of_one_rate(groups, pieces), pieces), pieces)
     runs = [levelled(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
     return _without_returns(runs, time, displacement, pieces.usual)
+
+
+def _parted(runs: list[Run], step: int, time: Array, displacement: Array) -> list[Run]:
+    """Runs that were found on means of so many samples, neighbours parted at the very sample where their lines meet."""
+    runs = [levelled(run, time, displacement) for run in runs]
+    for before, after in pairwise(runs):
+        if before.last != after.first or before.rate == after.rate:
+            continue
+        meet = time[0] + (before.levels[-1] - after.levels[0]) / (after.rate - before.rate)
+        sample = int(np.searchsorted(time, meet))
+        first, last = before.members[-1][0], after.members[0][1]
+        if abs(sample - before.last) <= 2 * step and first + 1 < sample < last - 1:
+            before.members[-1], after.members[0] = (first, sample), (sample, last)
+    return [levelled(run, time, displacement) for run in runs]
 
 
 def _without_returns(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
@@ -203,14 +217,16 @@ def _with_holds(groups: list[list[int]], pieces: _Pieces) -> list[list[int]]:
             own.append(other)
         found.append(own)
     (first, early), (last, late) = ((m, _mean_slope(m, pieces)[0]) for m in (groups[0], groups[-1]))
-    before = _leading_away(np.arange(first[0]), early, pieces.begin[first[0]] - pieces.begin[0], pieces)
-    beyond = np.arange(last[-1] + 1, len(pieces.ends))
-    after = _leading_away(beyond, late, pieces.end[-1] - pieces.end[last[-1]], pieces)
+    before = _leading_away(np.arange(first[0]), early, None, pieces)
+    after = _leading_away(np.arange(last[-1] + 1, len(pieces.ends)), late, None, pieces)
     return [members for members in (before, *found, after) if members]
 
 
-def _leading_away(inner: Array, rate: float, gap: float, pieces: _Pieces) -> list[int]:
-    """Those of some pieces, left out of a run, that are a run of their own."""
+def _leading_away(inner: Array, rate: float, gap: float | None, pieces: _Pieces) -> list[int]:
+    """Those of some pieces, left out of a run, that are a run of their own.
+
+    Within a run, what is over soon (`gap`, s) is a slip of the sensor. At an end of the record there is no `gap`.
+    """
     if not len(inner):
         return []
     away = (pieces.slope[inner] - rate) * pieces.duration[inner]
@@ -219,10 +235,12 @@ def _leading_away(inner: Array, rate: float, gap: float, pieces: _Pieces) -> lis
     like = SURE * np.hypot(pieces.slope_error[inner], error) + LIKE * np.maximum(abs(slope), abs(rate))
     main = inner[np.abs(pieces.slope[inner] - slope) <= like]
     lasting = abs(np.sum(away)) > max(LEAD * pieces.usual, 0.7 * float(np.sum(np.abs(away))))
-    whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= RELIABLE
+    whole = np.sum(pieces.size[main]) > MAIN * np.sum(pieces.size[inner]) and np.sum(pieces.size[main]) >= (
+        RELIABLE if gap is not None else FEWEST
+    )
     still = abs(slope) < 0.02 * abs(rate) + SURE * error and SURE * error < 0.05 * abs(rate)
     far = np.sum(pieces.lengths[main]) > SHORTEST or abs(np.sum(away)) > PLAIN * pieces.usual
-    long = gap > SLIP * pieces.span and far
+    long = (gap is None or gap > SLIP * pieces.span) and far
     return [int(k) for k in main] if lasting and whole and (still or long) else []
 
 

@@ -55,6 +55,18 @@ def pytest_sessionfinish():
     gc.freeze()
 
 
+@pytest.fixture
+def unpainted(monkeypatch):
+    """Figures are made but not painted, which takes most of their time; for tests of everything else."""
+    from matplotlib.figure import Figure
+
+    def savefig(self, to, **_):
+        text = '<svg viewBox="0 0 9 9"></svg>'
+        to.write(text) if hasattr(to, "write") else Path(to).write_text(text, encoding="utf-8")
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
+
+
 def pytest_configure(config):
     if config.args_source is config.ArgsSource.TESTPATHS and not config.option.markexpr:
         config.option.markexpr = "not campaign"

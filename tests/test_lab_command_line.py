@@ -153,6 +153,7 @@ def test_laws_are_compared_and_records_fitted_together(tmp_path):
     assert data["bootstrap"]["friction.a"]["error"] > 0
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_reports_escape_what_came_from_outside():
     record = lab.record(lab.rig(), lab.STEP)
     fit = ss.fit(ss.lab_rig(), replace(record, source="<script>alert(1)</script>"))

@@ -253,6 +253,7 @@ def test_functions_that_machines_do_not_have_yet(call):
         CALLS[call](two_mass())
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_results_of_machines_can_be_shown_in_notebooks_and_documents():
     machine = two_mass()
     for result in (machine, ss.analyze(machine), ss.steady_state(machine), ss.modes(machine)[0]):

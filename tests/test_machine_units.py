@@ -18,6 +18,7 @@ TELESCOPE = ss.read_rig(FOLDER / "telescope.toml")
 SHEAR = ss.read_rig(FOLDER / "two-surfaces.toml")
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_no_stress_is_spoken_of_where_nobody_gave_an_area():
     for machine in (AXIS, TELESCOPE, two_mass(), three_bodies()):
         found = ss.analyze(machine)

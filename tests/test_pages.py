@@ -25,7 +25,6 @@ from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import math, table, typed
 from steadyslip.reports.results import LISTED, _told_apart
 from steadyslip.reports.rig import inputs
-from unpainted import unpainted  # noqa: F401 -- a fixture
 
 MACHINES = Path(__file__).parents[1] / "examples" / "machines"
 VOID = {"br", "img", "meta", "hr", "input", "link"}
@@ -190,6 +189,7 @@ def test_sketches_name_the_controller_that_drives(drive, name):
     assert f">{name}</text>" in sketch(rig(stiffness=None, drive=drive))
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_formulas_call_functions_what_people_know():
     """What is computed so that it cannot overflow is read as asinh(x exp(y))."""
     document = ss.report(ss.read_rig("examples/slow-axis.toml"), explorer=False).html
@@ -226,6 +226,7 @@ def test_one_parameter_has_one_name_in_a_report(path):
     assert [name for name in names if not any(f"{one}.".startswith(f"{name}.") for one in found.parameters())] == []
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_machine_has_a_report():
     machine = ss.read_rig(MACHINES / "two-surfaces.toml")
     analysis = ss.analyze(machine)

@@ -122,6 +122,7 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
         assert isinstance(caught.value, OSError)
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_another_figure_is_one_entry(tmp_path, monkeypatch):
     extra = PaperFigure("fig1", lambda ax: ss.figures.root_locus(paper_rig(), ax))
     monkeypatch.setattr("steadyslip.reproduce.FIGURES", (FIGURES[-1], extra))

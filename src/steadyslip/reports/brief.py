@@ -28,7 +28,7 @@ from steadyslip.reports.elements import STYLE, Markup, figure, heading, letter, 
 
 _BY_UNIT = {
     "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times",
-    "m/s": "velocity v peak_velocity lowest_velocity velocities slip_rate",
+    "m/s": "velocity v speed peak_velocity lowest_velocity velocities slip_rate",
     "m": "slip x displacement",
     "Pa": "normal_stress shear_stress spring_stress stress_drop lowest_normal_stress highest_normal_stress normal "
     "shear stress_ratio",

@@ -12,6 +12,7 @@ from pathlib import Path
 from steadyslip.core.errors import NotAvailable
 from steadyslip.explorer.assembly import document, fragment, style
 from steadyslip.files.standalone import Standalone
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.reports.elements import STYLE, heading, listing, paragraph, table, typed
 
@@ -49,7 +50,7 @@ class Parts:
         Words: the answer, why, and what was asked.
     body : sequence of str
         HTML.
-    rig : Slider or None
+    rig : Slider, Machine or None
         Of the explorer.
     text : str
         The rig as a file; empty where there is none.
@@ -61,7 +62,7 @@ class Parts:
     lead: str
     question: str
     body: Sequence[str]
-    rig: Slider | None
+    rig: Slider | Machine | None
     text: str
     branch: int = 0
 

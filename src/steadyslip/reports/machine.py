@@ -29,7 +29,7 @@ def about(analysis: MachineAnalysis) -> Parts:
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
-    return Parts(of_rig.in_a_sentence(analysis), lead, question, body, None, of_rig.as_file(machine))
+    return Parts(of_rig.in_a_sentence(analysis), lead, question, body, machine, of_rig.as_file(machine))
 
 
 def _picture(analysis: MachineAnalysis) -> str:

@@ -13,8 +13,11 @@ from steadyslip import figures
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, shown_range
+from steadyslip.core.records import key_of
+from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
+from steadyslip.files.specifications.layout import own_fields
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps import MapResult, Sensitivity
@@ -22,11 +25,12 @@ from steadyslip.motion import History
 from steadyslip.motion.events import ContactSlip
 from steadyslip.nonlinear import Basin, CycleBranch, Threshold
 from steadyslip.nonlinear.commands import Thresholds
+from steadyslip.protocol import Protocol
 from steadyslip.reports import machine as of_machine, rig as of_rig
 from steadyslip.reports.brief import inside, rows_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
-from steadyslip.reports.elements import figure, heading, listing, paragraph, table
+from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
 
 LISTED = 24
@@ -47,7 +51,7 @@ def parts_of(result: Any, **options: Any) -> Parts:
         got = ", ".join([type(result).__name__, *options])
         raise ParameterError([Problem("result", f"got {got}; allowed: a rig or a result, such as that of analyze")])
     rig = getattr(result, "rig", None)
-    rig = rig if isinstance(rig, Slider) else None  # a machine has no page yet
+    rig = rig if isinstance(rig, Slider | Machine) else None
     first = str(result).partition("\n")[0]
     kind = " ".join(re.findall("[A-Z]+[a-z]*", type(result).__name__)).lower()
     if first.startswith(f"{type(result).__name__}("):  # a repr
@@ -63,11 +67,6 @@ def about_rig(rig: Slider | Machine | None) -> list[str]:
     if isinstance(rig, Machine):
         return [heading("The machine"), inside(rig)]
     return [] if rig is None else [heading("The rig"), figure(sketch(rig)), of_rig.inputs(rig)]
-
-
-def _with_page(rig: Slider | Machine) -> Slider | None:
-    """The rig, if there is an explorer of it."""
-    return rig if isinstance(rig, Slider) else None
 
 
 @parts_of.register
@@ -140,7 +139,7 @@ def _sensitivity(result: Sensitivity) -> Parts:
         body.append(paragraph("It was stopped before all points were done.", "warning"))
     (first, *_), question = result.first, "Which parameters decide, over the ranges below?"
     head = f"{result.ranked(first)[0]} decides most about the {first.replace('_', ' ')}"
-    return Parts(head, "", question, body, _with_page(result.rig), of_rig.as_file(result.rig))
+    return Parts(head, "", question, body, result.rig, of_rig.as_file(result.rig))
 
 
 @parts_of.register
@@ -181,14 +180,13 @@ def _analysis(result: Analysis) -> Parts:
 
 @parts_of.register
 def _history(result: History) -> Parts:
-    rig = result.rig if isinstance(result.rig, Slider) else None
-    text = of_rig.as_file(result.rig, result.protocol)
-    plane = [] if rig is None else [
+    rig, text = result.rig, of_rig.as_file(result.rig, result.protocol)
+    plane = [] if isinstance(rig, Machine) else [
         figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), PLANE)
     ]  # fmt: skip
     body = [
         *about_rig(rig),
-        heading("What was done to it"), listing(text.partition("[protocol]")[2].strip()),
+        heading("What was done to it"), *done_to(rig, result.protocol),
         heading("What it did"), *_words(result.summary()),
         figure(drawn(lambda: figures.history(result), "history", 7.0), "Velocity, friction, normal stress."),
         *plane,
@@ -198,6 +196,26 @@ def _history(result: History) -> Parts:
     head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {shown(result.end, 's')}"
     question = f"What does this rig do in {shown(result.protocol.until or result.end, 's')} under the protocol below?"
     return Parts(head, sentence(result.message), question, body, rig, text)
+
+
+def done_to(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
+    """The pieces of a protocol one below the other, numbers in units that people read."""
+    area = rig.area if isinstance(rig, Slider) else 1.0  # in forces
+    turns = rig.parameters()["drive.velocity"].role.unit == "rad/s"
+    rows = []
+    for piece in protocol.pieces:
+        told = []
+        for item, role in own_fields(type(piece)):
+            value = getattr(piece, item.name)
+            if value is None or value == item.default:
+                continue
+            if isinstance(role, Parameter) and isinstance(value, float | int):
+                unit = {"m/s": "rad/s", "m": "rad"}.get(role.unit, role.unit) if turns else role.unit
+                told.append(f"{key_of(item)} {shown(value, unit, area=area)}")
+            else:
+                told.append(f"{key_of(item)} {value if isinstance(value, str) else f'{np.size(value)} numbers'}")
+        rows.append((piece.name.replace("-", " "), ", ".join(told)))
+    yield table(rows) if rows else paragraph("Nothing: it starts in steady sliding.")
 
 
 def _slips(result: History) -> Iterator[str]:
@@ -248,7 +266,7 @@ def _branch(result: CycleBranch) -> Parts:
         sentence(first),
         question,
         body,
-        _with_page(result.rig),
+        result.rig,
         of_rig.as_file(result.rig),
     )
 
@@ -270,7 +288,7 @@ def _map(result: MapResult) -> Parts:
     ]  # fmt: skip
     question = "How does the answer depend on the numbers that vary here?"
     head = sentence(first).rstrip(".").replace(" x ", " × ")
-    return Parts(head, "", question, body, _with_page(rig), of_rig.as_file(rig))
+    return Parts(head, "", question, body, rig, of_rig.as_file(rig))
 
 
 def _pictures(result: MapResult) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +10,28 @@ import h5py
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, from_vectors
+from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
 
 MOST_DATASETS = 10_000
+COLUMN_NAMES = ("columns", "column_names", "names", "header", "channels")
 
 
 def read(path: Path, table: str | None) -> Table:
     """Numeric datasets of a file, or below one of its groups."""
     with h5py.File(path, "r") as file:
         if table is None:
-            return from_vectors(path, dict(_datasets(path, file)))
+            return from_vectors(path, _named(path, _datasets(path, file)))
         if table not in file:
             chosen_part(path, "group", table, _groups(file))
-        return from_vectors(path, dict(_datasets(path, file[table])))
+        return from_vectors(path, _named(path, _datasets(path, file[table])))
+
+
+def _named(path: Path, found: Iterable[tuple[str, tuple[Any, str | None]]]) -> dict[str, tuple[Any, str | None]]:
+    """Columns by the last part of their names, where that tells them apart."""
+    pairs = list(found)
+    check_apart(path, [name for name, _ in pairs], "group")
+    short = [name.rpartition("/")[2] for name, _ in pairs]
+    return {(last if short.count(last) == 1 else name): one for last, (name, one) in zip(short, pairs, strict=True)}
 
 
 def _groups(file: Any) -> list[str]:
@@ -48,6 +57,21 @@ def _datasets(path: Path, group: Any) -> Iterator[tuple[str, tuple[Any, str | No
         unit = raw.decode() if isinstance(raw, bytes) else None if raw is None else str(raw)
         if item.dtype.names:
             for column in item.dtype.names:
-                yield column, (np.asarray(item[column]), None)
+                yield f"{name}/{column}", (np.asarray(item[column]), None)
         elif item.dtype.kind in "iuf":
-            yield name.rpartition("/")[2], (np.asarray(item[()]), unit)
+            numbers = np.asarray(item[()])
+            if names := _names_of_columns(item):
+                columns = numbers.T if numbers.shape[1] == len(names) else numbers
+                yield from ((f"{name}/{own}", (one, None)) for own, one in zip(names, columns, strict=True))
+            else:
+                yield name, (numbers, unit)
+
+
+def _names_of_columns(item: h5py.Dataset) -> list[str]:
+    """Names that a matrix gives its columns in an attribute; none if it does not."""
+    for attribute in COLUMN_NAMES:
+        raw = np.atleast_1d(item.attrs.get(attribute, ()))
+        names = [one.decode() if isinstance(one, bytes) else str(one) for one in raw]
+        if item.ndim == 2 and len(names) > 1 and len(names) in item.shape:
+            return names
+    return []

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat, whosmat
 
-from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, from_vectors
+from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
 
 DEEPEST = 8
+Numbers = dict[str, tuple[Any, None]]
 
 
 def read(path: Path, table: str | None) -> Table:
@@ -33,8 +34,25 @@ def read(path: Path, table: str | None) -> Table:
         name: np.asarray(value) for name, value in parts.items() if part is None or f"{name}.".startswith(f"{part}.")
     }
     numeric = {name: (value, None) for name, value in inside.items() if value.dtype.kind in "iuf"}
-    named: dict[str, tuple[Any, str | None]] = {**_shortened(numeric)}
+    check_apart(path, list(numeric), "structure")
+    named: dict[str, tuple[Any, str | None]] = {**_shortened(_with_header(numeric, inside))}
     return from_vectors(path, named)
+
+
+def _with_header(numeric: Numbers, inside: dict[str, Any]) -> Numbers:
+    """Columns of the only matrix by the names in the only list of as many words, as `importdata` leaves them."""
+    matrices = [name for name, (value, _) in numeric.items() if value.ndim == 2]
+    if len(matrices) != 1:
+        return numeric
+    matrix = numeric[matrices[0]][0]
+    headers = [
+        words for value in inside.values() if value.dtype.kind in "OU" and value.size in matrix.shape
+        and len(words := [one.strip() for one in value.ravel().tolist() if isinstance(one, str)]) == value.size > 1
+    ]  # fmt: skip
+    if not headers or any(words != headers[0] for words in headers):
+        return numeric
+    columns = matrix.T if matrix.shape[1] == len(headers[0]) else matrix
+    return {name: (column, None) for name, column in zip(headers[0], columns, strict=True)}
 
 
 def _parts(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:
@@ -46,7 +64,7 @@ def _parts(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:
             yield from _parts(f"{name}.{field}", array[field].item(), deep - 1)
 
 
-def _shortened(found: dict[str, tuple[Any, None]]) -> dict[str, tuple[Any, None]]:
+def _shortened(found: Numbers) -> Numbers:
     """Names without the structures around them, where they remain different."""
     short = [name.rpartition(".")[2] for name in found]
     return dict(zip(short, found.values(), strict=True)) if len(set(short)) == len(short) else found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from pyarrow import parquet
 
 from steadyslip.core.errors import NotAvailable
@@ -18,4 +19,14 @@ def read(path: Path, table: str | None) -> Table:
     check_size(path, about.num_rows * about.num_columns)
     content = parquet.read_table(path)
     columns = {name: content.column(name).to_numpy() for name in content.column_names}
-    return from_vectors(path, {name: (column, None) for name, column in columns.items() if column.dtype.kind in "iuf"})
+    return from_vectors(
+        path, {name: _numbers(column) for name, column in columns.items() if column.dtype.kind in "iufmM"}
+    )
+
+
+def _numbers(column: np.ndarray) -> tuple[np.ndarray, str | None]:
+    """Numbers as they are; moments as seconds since the first, durations in seconds."""
+    if column.dtype.kind not in "mM":
+        return column, None
+    spans = column - column[0] if column.dtype.kind == "M" and len(column) else column
+    return np.where(np.isnat(spans), np.nan, spans / np.timedelta64(1, "s")), "s"

@@ -58,6 +58,28 @@ def check_size(path: Path, size: int, remedy: str = "") -> None:
         raise NotAvailable(f"{str(path)!r} has {size} numbers; allowed: up to {MOST_VALUES}{remedy}")
 
 
+def check_apart(path: Path, found: Sequence[str], kind: str) -> None:
+    """Refuse parts of one file that have columns of the same names: nobody can tell which is meant.
+
+    Parameters
+    ----------
+    found : sequence of str
+        Full names of columns, parts of a name divided by ``/`` or ``.``.
+    kind : str
+        What such a part is called.
+    """
+    homes: dict[str, list[str]] = {}
+    for name in found:
+        home, mark, last = name.rpartition("/" if "/" in name else ".")
+        homes.setdefault(last, []).append(home if mark else "")
+    shared = [parts for parts in homes.values() if len(parts) > 1]
+    if shared and len(shared) == len(homes) and all(parts == shared[0] for parts in shared):
+        several = ", ".join(part or "the top" for part in shared[0])
+        raise NotAvailable(
+            f"{str(path)!r} has columns of the same names in several {kind}s; say which with table=: {several}"
+        )
+
+
 def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) -> str | None:
     """The part of a file that is asked for, None for all of it.
 

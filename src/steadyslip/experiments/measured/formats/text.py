@@ -22,6 +22,13 @@ Array = np.ndarray
 SHOWN = 8  # bad lines that a message lists
 MOST_TEXT = 2**30  # bytes of a file
 MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines that are looked at one by one; characters of one
+KNOWN = {
+    b"\xd0\xcf\x11\xe0": "it is of an old Office program; save it as .xlsx",
+    b"PK\x03\x04": "it is a workbook or an archive; save a workbook as .xlsx, unpack an archive",
+    b"\x1f\x8b": "it is packed; unpack it",
+    b"ARROW1": "it is in Arrow's own format; save it as .parquet",
+}
+"""How other files begin, and what to do."""
 UTF16 = (b"\xff\xfe", b"\xfe\xff")  # how texts begin that are written so, such as Excel's "Unicode text"
 LARGE, LOOKED_AT = 2**20, 2**17  # bytes beyond which NumPy is tried first; from which it learns the columns
 _QUOTED = re.compile(r'"[^"]*"')
@@ -46,10 +53,10 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
         return Table(names, values, np.arange(1, values.shape[1] + 1), known, ["read as XLOOK file"])
     if raw[:2] in UTF16:
         raw = raw.decode("utf-16", errors="replace").encode()
-    if b"\0" in raw[:4096]:
-        raise NotAvailable(
-            f"{str(path)!r} is not text; endings of other formats: .h5, .hdf5, .nc, .mat, .parquet, .xlsx, .tdms"
-        )
+    if b"\0" in raw[:4096] or raw.startswith(tuple(KNOWN)):
+        remedy = next((said for begin, said in KNOWN.items() if raw.startswith(begin)), "")
+        endings = "endings of other formats: .h5, .hdf5, .nc, .mat, .parquet, .xlsx, .tdms"
+        raise NotAvailable(f"{str(path)!r} is not text; {remedy or endings}")
     if len(raw) > LARGE and (table := _plain(path, raw)) is not None:
         return table
     text, notes = _decoded(raw)

@@ -71,7 +71,8 @@ def loads(channel):
         Harmonic: waves,
         StressTable: lambda law: tables(law, "change"),
     }
-    assert len(kinds) == len(by_shape)
+    assert {shape for shape in by_shape for law in kinds if issubclass(law, shape)} == set(by_shape)
+    assert all(issubclass(law, tuple(by_shape)) for law in kinds)
     return st.one_of(*(make(law) for shape, make in by_shape.items() for law in kinds if issubclass(law, shape)))
 
 

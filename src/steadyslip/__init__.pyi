@@ -221,6 +221,9 @@ from .nonlinear import (
     threshold_map as threshold_map,
 )
 from .protocol import (
+    CreepRamp as CreepRamp,
+    CreepStep as CreepStep,
+    CreepTable as CreepTable,
     DisplacementStep as DisplacementStep,
     DisturbanceHarmonic as DisturbanceHarmonic,
     DisturbancePulse as DisturbancePulse,
@@ -228,6 +231,10 @@ from .protocol import (
     DisturbanceStep as DisturbanceStep,
     DisturbanceTable as DisturbanceTable,
     Hold as Hold,
+    InjectionPulse as InjectionPulse,
+    InjectionRamp as InjectionRamp,
+    InjectionStep as InjectionStep,
+    InjectionTable as InjectionTable,
     LoadPointTable as LoadPointTable,
     NormalStressHarmonic as NormalStressHarmonic,
     NormalStressPulse as NormalStressPulse,

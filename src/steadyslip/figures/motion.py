@@ -129,6 +129,7 @@ def _three(ax: Sequence[Axes] | None) -> np.ndarray:
 def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
     """On a logarithmic axis where the block never rests or reverses."""
     v, load = run["v"], run["load_velocity"]
+    reference = "steady sliding" if Protocol.of(run.protocol).frees_load_point else "load point"
     drive = run.rig.drive.velocity
     top = drive * 10.0**_DECADES
     factor, unit = display_unit("m/s", drive)
@@ -143,7 +144,7 @@ def _velocity_panel(run: History, ax: Axes, time: np.ndarray) -> None:
             ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_formatter(NullFormatter())
-    ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label="load point")
+    ax.plot(time, load / factor, color=BLACK, linewidth=0.8, zorder=1.5, label=reference)
     ax.plot(time, np.minimum(v, 10 * top) / factor, color=BLUE, label="block")
     ax.set_ylabel(labelled("velocity", unit))
     if ax.get_yscale() == "linear":

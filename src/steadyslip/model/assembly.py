@@ -14,6 +14,7 @@ from typing import Any
 
 import sympy as sp
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.roles import Parameter
 from steadyslip.laws.contact import Motion
@@ -43,6 +44,7 @@ class _Place:
     memory: tuple[sp.Symbol, ...]
     states: tuple[sp.Symbol, ...]
     press: sp.Symbol
+    outside: sp.Symbol
 
     @cached_property
     def tau_ss(self) -> sp.Expr:
@@ -51,8 +53,9 @@ class _Place:
 
 
 def assemble(
-    mechanism: Mechanism, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter], letter: Letters
-) -> Model:
+    mechanism: Mechanism, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter], letter: Letters,
+    imposed: bool = False,
+) -> Model:  # fmt: skip
     """The Model of a mechanism in symbols.
 
     Parameters
@@ -64,15 +67,25 @@ def assemble(
         What is declared of them.
     letter : callable
         A letter for a dotted name that nothing else has.
+    imposed : bool
+        Whether the force of the drive is imposed, and its motion free.
+
+    Raises
+    ------
+    NotAvailable
+        If it is open what a force of the drive does.
     """
-    return _Assembly(mechanism, letter).model(given, roles)
+    return _Assembly(mechanism, letter, imposed).model(given, roles)
 
 
 class _Assembly:
     """One pass from a mechanism to its Model."""
 
-    def __init__(self, mechanism: Mechanism, letter: Letters) -> None:
-        self.mechanism, self.letter = mechanism, letter
+    def __init__(self, mechanism: Mechanism, letter: Letters, imposed: bool) -> None:
+        self.mechanism, self.letter, self.imposed = mechanism, letter, imposed
+        self.loading = sp.Symbol(letter("drive.loading"), real=True) if imposed else sp.Integer(0)
+        if imposed:
+            self._check_loading()
         names = [one.name for one in mechanism.coordinates]
         self.single = len(names) == 1 and [dict(touch.slip) for touch in mechanism.touches] == [{names[0]: 1}]
         self.bare = not all(touch.name for touch in mechanism.touches)
@@ -88,6 +101,20 @@ class _Assembly:
         self.definitions: dict[sp.Symbol, sp.Expr] = {}
         self.late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = {}
         self._define()
+
+    def _check_loading(self) -> None:
+        """One link, or a controller, must carry the force of the drive."""
+        acting = [dict(one.acts) for one in self.mechanism.elements if LOAD_POINT in one.senses and _present(one)]
+        if not acting or any(acts != acting[0] for acts in acting):
+            names = ", ".join(one.name for one in self.mechanism.elements if LOAD_POINT in one.senses and one.name)
+            raise NotAvailable(
+                f"a drive that pulls with a force of its own needs one link that carries it; {names or 'none'} "
+                "would share it, and how is open"
+            )
+        if any(LOAD_POINT in touch.slip for touch in self.mechanism.touches):
+            raise NotAvailable(
+                "a drive that pulls with a force of its own is not offered where a contact slides on the drive"
+            )
 
     # -- contacts in symbols
 
@@ -115,6 +142,7 @@ class _Assembly:
             memory,
             states,
             P if self.single else symbol("p", real=True),
+            sp.Symbol(self.letter(f"{touch.name or 'contact'}.p_out"), real=True),
         )
 
     @cached_property
@@ -145,7 +173,7 @@ class _Assembly:
         return Motion(
             place.slip, place.velocity, place.acceleration, place.spring, spring_ss, place.tau, place.tau_ss,
             stiffness, place.speed, separation, steady_separation, row_of(place.touch.separation, self.v),
-            place.states, tuple(map(sp.sympify, place.touch.contact.steady_memory(place.speed))),
+            place.states, tuple(map(sp.sympify, place.touch.contact.steady_memory(place.speed))), place.outside,
         )  # fmt: skip
 
     # -- forces
@@ -171,12 +199,26 @@ class _Assembly:
 
     def _pull(self, name: str, elements: list[Element]) -> sp.Expr:
         """Force of elements on a coordinate, besides that of steady displacements."""
-        total = sp.Integer(0)
-        for one in self._grouped([one for one in elements if name in one.acts]):
+        total, acting = sp.Integer(0), [one for one in elements if name in one.acts]
+        if self.imposed:
+            driven = [one for one in acting if LOAD_POINT in one.senses and _present(one)]
+            acting = [one for one in acting if LOAD_POINT not in one.senses]
+            total -= sp.Add(*(one.acts[name] * self._tension(one, {}, self.speeds) for one in driven))
+            total += self._loaded(driven[0], name) * self._per_area() if driven else 0
+        for one in self._grouped(acting):
             total -= one.acts[name] * one.stiffness * row_of(one.senses, self._before(one.delay, self.x))
             total -= one.acts[name] * one.damping * row_of(one.senses, self._before(one.delay, self.moving))
         late = 0 if self.mechanism.integral is None else self.mechanism.integral.delay
         return total - self._integrated(name, self._before(late, {"": INTEGRAL})[""])
+
+    def _loaded(self, element: Element, name: str) -> sp.Expr:
+        """What the imposed force does through its element: as much at the drive's end as is imposed there."""
+        at_drive = element.acts.get(LOAD_POINT, -1)
+        return -sp.sympify(element.acts[name]) / at_drive * self.loading
+
+    def _per_area(self) -> Any:
+        """What a unit of the force of the drive is: of a slider a stress."""
+        return self.places[0].touch.area if self.bare else 1
 
     def _before(self, delay: Any, now: Mapping[str, sp.Symbol]) -> Mapping[str, sp.Symbol]:
         """What moves as it was a delay ago, as symbols of its own; what the drive does is steady and has none."""
@@ -200,7 +242,9 @@ class _Assembly:
 
     def _integrated(self, name: str, integral: sp.Expr) -> sp.Expr:
         acting = self.mechanism.integral
-        return sp.Integer(0) if acting is None else acting.acts.get(name, 0) * acting.gain * integral
+        if acting is None or (self.imposed and integral is INTEGRAL):
+            return sp.Integer(0)
+        return acting.acts.get(name, 0) * acting.gain * integral
 
     # -- definitions
 
@@ -285,6 +329,9 @@ class _Assembly:
         if not self.bare:
             disturbances = {f"{one.name}.push": one.push for one in coordinates}
             disturbances |= {f"{one.name}.press": one.press for one in contacts}
+        disturbances |= {f"{one.name}.pores": one.outside for one in contacts if one.outside is not None}
+        if self.imposed:
+            disturbances["loading"] = self.loading
         inputs = {"load_velocity": V_LP, **disturbances, "time": TIME}
         share = self.mechanism.axial_share
         return Model(
@@ -335,6 +382,7 @@ class _Assembly:
             direction=sp.sympify(friction.direction(place.velocity, place.speed)),
             area=sp.sympify(place.touch.area),
             press=place.press,
+            outside=place.outside if contact.has_pores() else None,
         )
 
     def _strength(self, place: _Place) -> sp.Expr:
@@ -386,7 +434,8 @@ class _Assembly:
             found |= dict(zip(place.memory, map(sp.sympify, memory), strict=True))
             found |= dict(zip(place.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
-        none = dict.fromkeys((*self.push.values(), *(place.press for place in self.places)), zero)
+        without = (*self.push.values(), *(one for place in self.places for one in (place.press, place.outside)))
+        none = dict.fromkeys((*without, *([self.loading] if self.imposed else [])), zero)
         return found | {V_LP: sp.sympify(self.mechanism.velocity)} | none
 
     def _observables(self) -> dict[str, tuple[sp.Expr, str]]:
@@ -417,5 +466,13 @@ class _Assembly:
                 resting = self._known(self._tension(element, self.statics.displacement, {}))
                 twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
                 force = -resting - self._tension(element, self.x, self.moving)
+                if self.imposed and LOAD_POINT in element.senses:
+                    force = -resting - self._tension(element, {}, self.speeds)
+                    force -= self.loading / element.acts[LOAD_POINT]
                 found[f"{element.name}.force"] = (force, "N m" if twisted else "N")
         return found
+
+
+def _present(element: Element) -> bool:
+    """Whether an element carries anything at all."""
+    return not (element.stiffness == 0 and element.damping == 0)

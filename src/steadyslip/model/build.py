@@ -41,18 +41,18 @@ def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
     return model_of(rig, present)
 
 
-def model_of(rig: Rig, present: Iterable[str] = ()) -> Model:
-    """`build_model` without its checks."""
+def model_of(rig: Rig, present: Iterable[str] = (), imposed: bool = False) -> Model:
+    """`build_model` without its checks; with the force of the drive `imposed`, not its motion, where asked for."""
     kept = frozenset(present)
-    key = (shape_of(rig), kept)
-    return _build_cached(_Structure(key, rig, kept))
+    key = (shape_of(rig), kept, imposed)
+    return _build_cached(_Structure(key, rig, kept, imposed))
 
 
 class _Structure:
     """A rig that compares equal to every other of the same structure."""
 
-    def __init__(self, key: Any, rig: Rig, present: frozenset[str]) -> None:
-        self.key, self.rig, self.present = key, rig, present
+    def __init__(self, key: Any, rig: Rig, present: frozenset[str], imposed: bool) -> None:
+        self.key, self.rig, self.present, self.imposed = key, rig, present, imposed
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -70,7 +70,8 @@ def _build_cached(structure: _Structure) -> Model:
         given.pop(name, None)
     roles = {name: address.role for name, address in rig.parameters().items()}
     taken = set(RESERVED) | {str(symbol) for symbol in given.values()}
-    return assemble(twin(rig, symbols).mechanism(), given, roles, lambda name: _unused_letter(name, taken))
+    mechanism = twin(rig, symbols).mechanism()
+    return assemble(mechanism, given, roles, lambda name: _unused_letter(name, taken), structure.imposed)
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> dict[str, Any]:

@@ -90,6 +90,8 @@ class Contact:
         Over which the stresses act.
     press : sympy.Symbol
         A disturbance of the normal stress.
+    outside : sympy.Symbol or None
+        Change of the pressure around, of a contact law with pore fluid.
     sigma_ss : sympy.Symbol
         Normal stress in steady sliding.
     steady_stress : sympy.Expr
@@ -122,6 +124,7 @@ class Contact:
     direction: sp.Expr
     area: sp.Expr
     press: sp.Symbol
+    outside: sp.Symbol | None = None
     own_states: tuple[Variable, ...] = ()
 
     @property
@@ -157,7 +160,8 @@ class Model(Keeper, Displayed):
     contacts : tuple of Contact
     inputs : dict of str to sympy.Symbol
         Load-point velocity, disturbance stress q, normal-stress disturbance (B4 of eq. 12), time; of machines,
-        pushes at every coordinate and normal-stress disturbances at every contact.
+        pushes at every coordinate and normal-stress disturbances at every contact. Where there is pore fluid, the
+        change of pressure around; where the force of the drive is imposed, its change, ``loading``.
     parameters : dict of str to sympy.Symbol
         By dotted name. ``slider.stiffness`` is always the component along the sliding direction.
     roles : dict of str to Parameter

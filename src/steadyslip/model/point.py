@@ -146,8 +146,9 @@ class OperatingPoint(Keeper):
 
 
 def operating_point(
-    rig: Rig, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False
-) -> OperatingPoint:
+    rig: Rig, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False,
+    imposed: bool = False,
+) -> OperatingPoint:  # fmt: skip
     """The model of a rig and its parameters' values.
 
     Parameters
@@ -163,6 +164,8 @@ def operating_point(
     scan : bool, optional
         Whether values are steps of a search, which goes beyond the conditions that numbers obey together (a rod
         shorter than its crank): these are marked in `OperatingPoint.valid` instead of refused.
+    imposed : bool, optional
+        Whether the force of the drive is imposed, and its motion free.
 
     Raises
     ------
@@ -170,12 +173,12 @@ def operating_point(
         If names are unknown, values are outside their domain or break a condition with others, or shapes do not
         broadcast; all problems are listed.
     """
-    if not (vary or present or scan):
+    if not (vary or present or scan or imposed):
         return _own_point(rig, branch)
     together = _varied(rig, vary or {})
     varied = together.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
-    return _placed(model_of(rig, present=[*structural, *present]), rig, together, branch, scan)
+    return _placed(model_of(rig, [*structural, *present], imposed), rig, together, branch, scan)
 
 
 @lru_cache(maxsize=256)

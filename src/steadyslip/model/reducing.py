@@ -27,6 +27,7 @@ import sympy as sp
 from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
+from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.kinematics import in_variables, kinematics, solved_in_turn, solved_together
 from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, P, Q, Reduction, Sliding
@@ -35,6 +36,8 @@ Row = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
 EVERYWHERE = "*"
 """In place of a name: disturbances act on every coordinate, or at every contact, by a share that is a constant."""
+PORES = ".pores"
+"""Behind the name of a contact: what would press there changes the pressure of the fluid around it."""
 STANDSTILL = -200
 """Of ln(v/v0): a block with mass slower than this keeps still to every purpose; products of 1/v stay numbers there."""
 
@@ -54,7 +57,8 @@ def reduce_model(
         zero or tiny).
     push, press : str, optional
         The coordinate that disturbances push, and the contact at which they press; where there is but one, that; or
-        `EVERYWHERE`, with shares that are constants.
+        `EVERYWHERE`, with shares that are constants. The former may be `steadyslip.machine.mechanism.LOAD_POINT`, the
+        latter the contact's name with `PORES` behind it.
 
     Raises
     ------
@@ -353,16 +357,20 @@ class _Reducing:
 def _inputs(model: Model, push: str, press: str) -> Row:
     """What stands for the inputs of a Model: disturbances act on one coordinate and at one contact, or `EVERYWHERE`."""
     given: Row = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
-    alone = model.is_single
+    alone, pulled = model.is_single, push == LOAD_POINT
+    if pulled:
+        given[model.inputs["loading"]] = Q
     for one in model.coordinates:
-        given[one.push] = (
-            Q * share_of(one.push) if push == EVERYWHERE else Q if alone or one.name == push else sp.S.Zero
-        )
+        shared = Q * share_of(one.push) if push == EVERYWHERE else sp.S.Zero
+        given[one.push] = Q if (alone and not pulled and push != EVERYWHERE) or one.name == push else shared
     for contact in model.contacts:
-        pressed = P / contact.area if alone or contact.name == press else sp.Integer(0)
+        filled = press == contact.name + PORES
+        pressed = P / contact.area if (alone and not filled) or contact.name == press else sp.Integer(0)
         if press == EVERYWHERE:
             pressed = P / contact.area * share_of(contact.press)
         given[contact.press] = pressed + contact.imposed.xreplace({model.inputs["time"]: TIME})
+        if contact.outside is not None:
+            given[contact.outside] = P / contact.area if filled else sp.Integer(0)
     return given
 
 

@@ -25,9 +25,8 @@ from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import eliminable, natural_scales, posed, resolved, shortest_time, slip_rates
 from steadyslip.model.start import guesses, initial_values
+from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol, Segments, pack
-from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS
-from steadyslip.protocol.stress import OnBlock, OnNormalStress
 
 METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
@@ -217,7 +216,8 @@ def prepare(
     plan = Protocol.of(protocol).varied({name: value for name, value in vary.items() if name not in own})
     if branch and isinstance(rig, Machine):
         raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
-    point = operating_point(rig, own, branch=branch)
+    push, press = targets(rig, plan)
+    point = operating_point(rig, own, branch=branch, imposed=push == LOAD_POINT)
     _refuse_singular(rig, point, bool(own))
     if not own:
         require_range(point)
@@ -233,54 +233,11 @@ def prepare(
                      "an infinite force; use a short velocity step instead")]
         )  # fmt: skip
     eliminate = eliminable(point)
-    push, press = targets(rig, plan)
     reduction = reduce_model(point.model, eliminate, push, press)
     _refuse_endless(reduction, options.method)
     start, velocity = initial_values(reduction, point, initial)
     size = max(*map(np.size, point.sigmas), len(segments.start), len(start), point.size, 1)
     return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, push, press)
-
-
-def targets(rig: Slider | Machine, plan: Protocol) -> tuple[str, str]:
-    """The coordinate that a protocol pushes, and the contact at which it presses; empty where it does neither.
-
-    Raises
-    ------
-    ParameterError
-        If it is open what a piece acts on, or several pieces act on different ones.
-    """
-    if not isinstance(rig, Machine):
-        problems = [
-            Problem(f"protocol.pieces.{i}.on", f"got {piece.on!r}; a slider is one block, leave it out")
-            for i, piece in enumerate(plan.pieces, start=1)
-            if isinstance(piece, OnBlock | OnNormalStress) and piece.on is not None
-        ]
-        if problems:
-            raise ParameterError(problems)
-        return "", ""
-    known = {DISTURBANCE: list(rig.bodies), NORMAL_STRESS: list(rig.contacts)}
-    found: dict[int, str] = {}
-    problems = []
-    for i, piece in enumerate(plan.pieces, start=1):
-        if not isinstance(piece, OnBlock | OnNormalStress):
-            continue
-        where, names = f"protocol.pieces.{i}.on", known[piece.channel]
-        kind = "body" if piece.channel == DISTURBANCE else "contact"
-        given = piece.on
-        if given is None and len(names) > 1:
-            problems.append(Problem(where, f"missing; name the {kind} that {piece.name} acts on: {', '.join(names)}"))
-        elif given is not None and given not in names:
-            problems.append(Problem(where, unknown_name(kind, given, names)))
-        else:
-            own = given or names[0]
-            if found.setdefault(piece.channel, own) != own:
-                message = (
-                    f"got {own!r}, but an earlier piece acts on {found[piece.channel]!r}; allowed: one {kind} a run"
-                )
-                problems.append(Problem(where, message))
-    if problems:
-        raise ParameterError(problems)
-    return found.get(DISTURBANCE, ""), found.get(NORMAL_STRESS, "")
 
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:

@@ -73,6 +73,8 @@ def _function(model: Model) -> tuple[list[str], list[str], Callable[..., list[An
         given |= {symbol: own + name for symbol, name in zip(stresses, STRESSES, strict=True)}
         if contact.velocity not in given:
             given[contact.velocity] = f"{own}slip_rate"
+    if "loading" in model.inputs:
+        given[model.inputs["loading"]] = "disturbance"
     given |= {item.symbol: item.name for item in (*model.memory, *model.states, *model.integrals)}
     given[model.inputs["load_velocity"]] = "load_velocity"
     known = set(given.values())

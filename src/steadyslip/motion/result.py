@@ -19,6 +19,8 @@ from steadyslip.motion.events import AnySlip, ContactEvent, ContactSlip, Event, 
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.status import remedy
 
+STILL = 1e-6  # share by which velocities of steady sliding may differ in a run
+
 
 @dataclass(frozen=True, eq=False)
 class History(HistoryData):  # noqa: D101 -- its base has it
@@ -60,11 +62,23 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
         if late := [f"{name} at {shown(at, 's')}" for name, at in begins if at >= until]:
             lines.append(f"left out        {', '.join(late)}: the run is to end at {shown(until, 's')}")
+        lines += self._caveats()
         arrests = sum(event.kind == "arrest" for event in self.events)
         if arrests:
             lines.append(f"arrests         {arrests}")
         lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
         return "\n".join(lines)
+
+    def _caveats(self) -> list[str]:
+        """What a reader must know to make no mistake about the run."""
+        lines = []
+        if self.protocol.frees_load_point:
+            lines.append("drive           pulls with a force of its own; its motion does not hold anything back")
+        known = self.velocities.values() if isinstance(self.velocities, dict) else [self.velocities]
+        still = all(high - low <= STILL * abs(high) for low, high in known)
+        if not self.protocol.pieces and still and self.status == "done":
+            lines.append("disturbance     none: steady sliding goes on, were it unstable too; analyze tells")
+        return lines
 
     def _contacts(self) -> list[str]:
         """Of a machine: what its contacts do."""

@@ -16,11 +16,18 @@ from steadyslip.protocol.load_point import (
 from steadyslip.protocol.protocol import Piece, Protocol
 from steadyslip.protocol.segments import Segments, pack
 from steadyslip.protocol.stress import (
+    CreepRamp,
+    CreepStep,
+    CreepTable,
     DisturbanceHarmonic,
     DisturbancePulse,
     DisturbanceRamp,
     DisturbanceStep,
     DisturbanceTable,
+    InjectionPulse,
+    InjectionRamp,
+    InjectionStep,
+    InjectionTable,
     NormalStressHarmonic,
     NormalStressPulse,
     NormalStressRamp,
@@ -29,6 +36,9 @@ from steadyslip.protocol.stress import (
 )
 
 __all__ = [
+    "CreepRamp",
+    "CreepStep",
+    "CreepTable",
     "DisplacementStep",
     "DisturbanceHarmonic",
     "DisturbancePulse",
@@ -36,6 +46,10 @@ __all__ = [
     "DisturbanceStep",
     "DisturbanceTable",
     "Hold",
+    "InjectionPulse",
+    "InjectionRamp",
+    "InjectionStep",
+    "InjectionTable",
     "LoadPointTable",
     "NormalStressHarmonic",
     "NormalStressPulse",

@@ -29,6 +29,8 @@ class Piece(FrozenRecord, family="protocol piece"):
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", None)
     channel: ClassVar[int] = LOAD_POINT
+    frees_load_point: ClassVar[bool] = False
+    """Whether the drive pulls with a force of its own throughout, however the load point moves."""
 
     def curve(self, before: Any) -> Curve | None:
         """The part that is linear between knots.
@@ -86,6 +88,11 @@ class Protocol(FrozenRecord):
             return cls(pieces=tuple(given))
         message = f"got {given!r}; allowed: None, a piece such as VelocityStep(at=10, to=2e-6), a list or a Protocol"
         raise ParameterError([Problem("protocol", message)])
+
+    @property
+    def frees_load_point(self) -> bool:
+        """Whether the force of the drive is imposed in place of its motion: creep."""
+        return any(piece.frees_load_point for piece in self.pieces)
 
     def varied(self, changes: Mapping[str, Any]) -> Protocol:
         """The protocol with arrays in place of some of its numbers, for many lanes at once.

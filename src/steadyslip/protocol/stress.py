@@ -1,4 +1,4 @@
-"""Pieces that act on the block: the disturbance stress q, and the normal stress added to the contact law's."""
+"""Pieces that act on the block: a disturbance stress, normal stress added to the contact law's, creep, injection."""
 
 from __future__ import annotations
 
@@ -24,6 +24,51 @@ class OnBlock(Piece):
     channel: ClassVar[int] = DISTURBANCE
 
     on: str | None = setting(Text("the body, of a machine that has several"), default=None)
+
+
+class OnPores(Piece):
+    """Base of what changes the pressure around a contact with pore fluid (theory 4), as injection does."""
+
+    channel: ClassVar[int] = NORMAL_STRESS
+
+    on: str | None = setting(Text("the contact, of a machine that has several"), default=None)
+
+
+class OnDrive(Piece):
+    """Base of loading at imposed stress, creep: throughout the run the drive pulls as it does in steady sliding, and as
+    much more as the piece says, whatever the block does; nothing holds its motion back.
+    """
+
+    channel: ClassVar[int] = DISTURBANCE
+    frees_load_point: ClassVar[bool] = True
+
+
+class CreepStep(StressStep, OnDrive, name="creep-step"):
+    """The drive pulls with a constant stress, which changes at once and stays so."""
+
+
+class CreepRamp(StressRamp, OnDrive, name="creep-ramp"):
+    """The drive pulls with a stress that grows at a constant rate for some time and stays so."""
+
+
+class CreepTable(StressTable, OnDrive, name="creep-table"):
+    """The drive pulls with a measured stress: linear between samples, constant before the first and after the last."""
+
+
+class InjectionStep(StressStep, OnPores, name="injection-step"):
+    """The pressure around a contact with pore fluid changes at once and stays so."""
+
+
+class InjectionPulse(StressPulse, OnPores, name="injection-pulse"):
+    """The pressure around a contact with pore fluid changes at once, and back after some time."""
+
+
+class InjectionRamp(StressRamp, OnPores, name="injection-ramp"):
+    """The pressure around a contact with pore fluid changes at a constant rate for some time and stays so."""
+
+
+class InjectionTable(StressTable, OnPores, name="injection-table"):
+    """A measured pressure around a contact with pore fluid: linear between samples, constant before and after."""
 
 
 class NormalStressStep(StressStep, OnNormalStress, name="normal-stress-step"):

@@ -14,7 +14,8 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
 
     Porosity φ follows slip, φ̇ = −(v/d_c)[φ − φ0 − ε ln(v/v_ref)], and pore pressure p, counted from that around,
     ṗ = −c* p − φ̇/β. Here both are pressures, D = (φ − φ0)/β and p, and `suction` is ε/β: by so much the pressure would
-    fall for each e-fold of velocity if nothing drained. `preload` is the effective one.
+    fall for each e-fold of velocity if nothing drained. What is injected changes the pressure around, p∞, by a part of
+    the protocol: ṗ = −c* (p − p∞) − φ̇/β. `preload` is the effective one.
     """
 
     suction: float = parameter("Pa", real, "fall of pore pressure ε/β per e-fold of velocity, undrained")
@@ -29,7 +30,10 @@ class PoreFluid(PreloadedContact, name="pore-fluid"):
         dilation, pressure = motion.memory
         v = motion.velocity
         opening = -v / self.slip_distance * (dilation - self.suction * sp.log(v / self.v_ref))
-        return opening, -self.drainage * pressure - opening
+        return opening, -self.drainage * (pressure - motion.outside) - opening
+
+    def has_pores(self) -> bool:
+        return True
 
     def steady_memory(self, velocity: Expression) -> tuple[Expression, ...]:
         return self.suction * sp.log(velocity / self.v_ref), sp.Integer(0)

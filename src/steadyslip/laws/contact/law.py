@@ -36,6 +36,8 @@ class Motion:
         of a machine that move away from the surface have one; a law that depends on it is `is_compliant`.
     memory, steady_memory
         The law's own states, in steady sliding too; empty for most.
+    outside
+        Change (Pa) of the pressure around the contact, of laws that have pores.
     """
 
     slip: Expression
@@ -52,6 +54,7 @@ class Motion:
     separation_rate: Expression = 0
     memory: tuple[Expression, ...] = ()
     steady_memory: tuple[Expression, ...] = ()
+    outside: Expression = 0
 
     @property
     def steady(self) -> Motion:
@@ -66,6 +69,7 @@ class Motion:
             spring=self.steady_spring,
             friction=self.steady_friction,
             memory=self.steady_memory,
+            outside=0,
         )
 
 
@@ -134,6 +138,10 @@ class ContactLaw(FrozenRecord, family="contact law"):
     def is_imposed(self) -> bool:
         """Whether the normal stress is given from outside, whatever the block does."""
         return type(self).coupling is ContactLaw.coupling
+
+    def has_pores(self) -> bool:
+        """Whether fluid in its pores feels the pressure around, `Motion.outside`."""
+        return False
 
     def is_compliant(self) -> bool:
         """Whether it depends on the distance of the surfaces, so that bodies must be able to move apart."""

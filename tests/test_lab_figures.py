@@ -29,7 +29,7 @@ def fit(record):
 def test_a_record_with_its_commanded_loading(record):
     panels = ss.figures.record(record, Figure().subplots(3, 1))
     np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), record.friction)
-    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point\nrate (µm/s)", "normal stress (MPa)"]
+    assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point\nrate (µm/s)", "normal\nstress (MPa)"]
     assert len(panels[0].lines) == 1 + len(record.steps)
     np.testing.assert_allclose(panels[1].lines[1].get_ydata(), 1e6 * record.loading.load.at(record.time))
     np.testing.assert_allclose(panels[2].lines[1].get_ydata(), 1e-6 * record.loading.stress.at(record.time))
@@ -39,10 +39,13 @@ def test_a_record_with_its_commanded_loading(record):
 
 
 def test_a_fit_with_its_residuals_and_their_memory(fit):
-    panels = ss.figures.fit(fit, Figure().subplots(4, 1))
-    np.testing.assert_array_equal(panels[1].lines[1].get_ydata(), fit.model)
-    np.testing.assert_allclose(panels[2].lines[0].get_ydata(), 1e3 * fit.residuals)
-    heights = [bar.get_height() for bar in panels[3].patches[: len(panels[3].lines[0].get_xdata())]]
+    _, stress, *panels = ss.figures.fit(fit, Figure().subplots(5, 1))
+    loading = fit.plan.records[0].loading
+    np.testing.assert_allclose(stress.lines[1].get_ydata(), 1e-6 * loading.stress.at(fit.plan.records[0].time))
+    assert len(ss.figures.fit(lab.stepped(), Figure().subplots(4, 1))) == 4  # nothing presses there
+    np.testing.assert_array_equal(panels[0].lines[1].get_ydata(), fit.model)
+    np.testing.assert_allclose(panels[1].lines[0].get_ydata(), 1e3 * fit.residuals)
+    heights = [bar.get_height() for bar in panels[2].patches[: len(panels[2].lines[0].get_xdata())]]
     assert heights[0] == 1.0
     assert heights[1] == pytest.approx(lag_one(fit.residuals))
 
@@ -106,7 +109,7 @@ def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
     np.testing.assert_allclose(ends, expected)
     parabola = next(line for line in ax.lines if line.get_label() == "its error alone")
     np.testing.assert_allclose(parabola.get_ydata()[0], 16.0)  # four standard deviations from the best value
-    assert ax.get_title() == ("Gaussian" if found.gaussian else "not Gaussian")
+    assert ax.get_title() == "likelihood: " + ("Gaussian" if found.gaussian else "not Gaussian")
     assert ax.get_xlabel() == "d_c (µm)"
 
 

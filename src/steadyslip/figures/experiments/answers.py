@@ -64,7 +64,7 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
     ax.set_ylim(0.0, min(top, 12.0))
     ax.set_xlabel(labelled(brief(result.name), unit))
     ax.set_ylabel("rise of the misfit, −2 ln of the profile likelihood (1)")
-    ax.set_title("Gaussian" if result.gaussian else "not Gaussian", fontsize="medium")
+    ax.set_title("likelihood: " + ("Gaussian" if result.gaussian else "not Gaussian"), fontsize="medium")
     ax.legend(loc="upper center", fontsize="small")
     return ax
 

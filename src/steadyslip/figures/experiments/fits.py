@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.numerics.noise import autocorrelation
 from steadyslip.figures.experiments.panels import clock, file_name, grid, stacked, time_label
-from steadyslip.figures.experiments.records import rates
+from steadyslip.figures.experiments.records import rates, stresses
 from steadyslip.figures.style import BLACK, BLUE, GREY, SKY, VERMILION, display_unit, labelled
 
 if TYPE_CHECKING:
@@ -19,29 +19,37 @@ if TYPE_CHECKING:
 
 MOST_LAGS = 60
 MOST_STEPS = 12
+WANDERS = 0.01  # of the normal stress: a smooth change of less is not drawn
 AROUND = (0.15, 0.6)  # of the time to the neighbouring steps that a zoom shows before and after one
 
 
 def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.ndarray:
     """What drives the model, record and model, residuals, and their autocorrelation.
 
+    The normal stress has a panel of its own, the second, where it changes.
+
     Parameters
     ----------
     result : Fit
     ax : four matplotlib Axes, optional
+        Five with one for the normal stress.
     record : int, optional
         Which of several records to draw.
 
     Returns
     -------
-    ndarray of four matplotlib.axes.Axes
+    ndarray of four or five matplotlib.axes.Axes
     """
-    panels = stacked(ax, (1.1, 2.2, 1.1, 1.1), shared=3)
     data = result.plan.records[record]
+    pressed = result.plan.pressed and _is_pressed(data)
+    given = stacked(ax, (1.1, *[0.9] * pressed, 2.2, 1.1, 1.1), shared=3 + pressed)
+    panels = given if not pressed else given[[0, 2, 3, 4]]
     factor, unit, _ = clock(data)
     time = (data.time - clock(data)[2]) / factor
     panels[0].set_title(file_name(data), fontsize="medium", parse_math=False)
     rates(data, panels[0], time)
+    if pressed:
+        stresses(data, given[1], time)
     _beside(panels[1], time, data.friction, result.part(result.model, record))
     residuals = result.part(result.residuals, record)
     panels[2].plot(time, 1e3 * residuals, ".", color=SKY, markersize=2, rasterized=True)
@@ -51,10 +59,20 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
     panels[2].legend(loc="best", fontsize="small")
     panels[2].set_xlabel(time_label(data, unit))
     _memory(panels[3], result, residuals, record)
-    for panel in panels:
+    for panel in given:
         panel.grid(color=GREY, linewidth=0.3)
         panel.yaxis.label.set_size("small")
-    return panels
+    return given
+
+
+def _is_pressed(data: Record) -> bool:
+    """Whether the normal stress of a record changes, by more than it wanders."""
+    course = data.loading.stress
+    if course is None:
+        return False
+    return bool(course.changes) or (
+        course.curve is not None and float(np.ptp(course.at(data.time))) > WANDERS * course.first
+    )
 
 
 def _beside(ax: Axes, time: np.ndarray, data: np.ndarray, model: np.ndarray, named: bool = True) -> None:

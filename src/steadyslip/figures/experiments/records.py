@@ -36,19 +36,25 @@ def record(data: Record, ax: Sequence[Axes] | None = None) -> np.ndarray:
     panels[0].set_ylabel("friction τ/σ (1)")
     panels[0].set_title(file_name(data), fontsize="medium", parse_math=False)
     rates(data, panels[1], time)
-    if data.normal is not None:
-        size, name = display_unit("Pa", float(np.max(np.abs(data.normal))))
-        panels[2].plot(time, data.normal / size, color=SKY, linewidth=0.8)
-        if data.loading.stress is not None:
-            panels[2].plot(time, data.loading.stress.at(data.time) / size, color=BLACK, linewidth=1)
-        panels[2].set_ylabel(labelled("normal stress", name))
-        panels[2].ticklabel_format(axis="y", useOffset=False)
+    stresses(data, panels[2], time)
     panels[2].set_xlabel(time_label(data, unit))
     for panel in panels:
         panel.grid(color=GREY, linewidth=0.3)
         for step in data.steps:
             panel.axvline((step.time - origin) / factor, color=ORANGE, linewidth=1, linestyle="--")
     return panels
+
+
+def stresses(data: Record, ax: Axes, time: np.ndarray) -> None:
+    """Measured normal stress, and the one that was found to be commanded."""
+    if data.normal is None:
+        return
+    size, name = display_unit("Pa", float(np.max(np.abs(data.normal))))
+    ax.plot(time, data.normal / size, color=SKY, linewidth=0.8)
+    if data.loading.stress is not None:
+        ax.plot(time, data.loading.stress.at(data.time) / size, color=BLACK, linewidth=1)
+    ax.set_ylabel(labelled("normal\nstress", name))
+    ax.ticklabel_format(axis="y", useOffset=False)
 
 
 def rates(data: Record, ax: Axes, time: np.ndarray) -> None:

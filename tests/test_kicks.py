@@ -449,7 +449,7 @@ def test_beyond_an_edge_near_the_end_of_the_range_it_is_looked_at_the_end(monkey
     a_rig, tried = tilted(0.3, 1.2), []
 
     def made(runs, threads=None, advanced=None):
-        size = -runs.rest.pressure / runs.rest.sigma
+        size = -runs.rest.pressure / runs.rest.sigmas[0]
         tried.append(float(np.max(size)))
         return np.where(size < 0.995, RETURNS, BLOW_UP)
 

@@ -331,9 +331,12 @@ def threshold(
     kick: Annotated[
         list[str] | None,
         typer.Option(
-            "--kick", help="velocity, displacement, normal-stress or impulse; repeatable; the first two unless given"
+            "--kick",
+            help="velocity, displacement, normal-stress or impulse; repeatable; the first two unless given; of "
+            "a machine velocity, displacement, force, normal-force or impulse",
         ),
     ] = None,
+    at: Annotated[str | None, typer.Option(help="of a machine: the body or contact that is kicked")] = None,
     reverse: Annotated[bool, typer.Option("--reverse", help="slower, backward, pressed less")] = False,
     reference: Annotated[
         str, typer.Option(help="whether the rig's drive is the velocity 'before' or 'after' a velocity step")
@@ -348,7 +351,7 @@ def threshold(
     from steadyslip.nonlinear.commands import KICKED, thresholds_of_file, write_thresholds
 
     check_output(output or (), KICKED)
-    found = thresholds_of_file(rig, changes or (), kick or ("velocity", "displacement"), reverse, reference)
+    found = thresholds_of_file(rig, changes or (), kick or (), reverse, reference, at)
     wanted = [path for path in output or () if not found.interrupted or path.suffix == ".html"]
     if len(wanted) < len(output or ()):
         typer.secho("stopped: the basin is not drawn", err=True)

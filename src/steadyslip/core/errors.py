@@ -125,9 +125,7 @@ class NoSteadySliding(SteadyslipError, ValueError):
         super().__init__(message)
 
 
-MACHINES_CAN = (
-    "machines have analyze, simulate, hopf, cycles, maps, eigenvalues, modes, boundary, margins, stable_values"
-)
+MACHINES_CAN = "machines have analyze, simulate, hopf, cycles, threshold, maps, modes, boundary, margins, stable_values"
 
 
 class NotAvailable(SteadyslipError, ValueError):

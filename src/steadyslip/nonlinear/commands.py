@@ -10,12 +10,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
-from steadyslip.files.specifications import read_rig, read_slider
+from steadyslip.files.specifications import read_rig
 from steadyslip.files.standalone import write_page
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
@@ -60,7 +62,7 @@ def write_branch(branch: CycleBranch, path: Path) -> None:
 class Thresholds(Displayed):
     """Several kinds of kick of one rig."""
 
-    rig: Slider
+    rig: Slider | Machine
     found: tuple[Threshold, ...]
     interrupted: bool = False
 
@@ -73,20 +75,25 @@ class Thresholds(Displayed):
 
     @cached_property
     def basin(self) -> Basin:
-        """The basin of the same rig, computed once."""
+        """The basin of the same rig, computed once; NotAvailable for a machine."""
+        if isinstance(self.rig, Machine):
+            raise NotAvailable(
+                "a basin is offered for sliders, whose motion a plane shows; allowed for machines: .html"
+            )
         return basin(self.rig)
 
 
 def thresholds_of_file(
-    path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str
-) -> Thresholds:
-    """`thresholds_shown` for the rig of a file."""
-    return thresholds_shown(
-        read_slider(path, changes), tuple(kicks), direction=-1 if reverse else 1, reference=reference
-    )
+    path: str | os.PathLike[str], changes: Iterable[str], kicks: Iterable[str], reverse: bool, reference: str,
+    at: str | None = None,
+) -> Thresholds:  # fmt: skip
+    """`thresholds_shown` for the rig of a file; by usual kicks unless some are given."""
+    rig = read_rig(path, changes)
+    usual = ("velocity",) if isinstance(rig, Machine) else ("velocity", "displacement")
+    return thresholds_shown(rig, tuple(kicks) or usual, at=at, direction=-1 if reverse else 1, reference=reference)
 
 
-def thresholds_shown(rig: Slider, kicks: Sequence[str], **options: Any) -> Thresholds:
+def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any) -> Thresholds:
     """`steadyslip.threshold` for several kinds of kick; shows progress on a terminal, and ends with Ctrl-C."""
     found: list[Threshold] = []
     with progress_text("starting") as said:

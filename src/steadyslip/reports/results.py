@@ -76,10 +76,9 @@ def _threshold(result: Threshold) -> Parts:
 
 @parts_of.register
 def _thresholds(result: Thresholds) -> Parts:
-    area = result.rig.area
     rows = [str(one).split(": ", 1) for one in result.found]
     limits = [
-        f"a {one.kick} kick up to {shown(one.survived, one.unit, 4, area)}"
+        f"a {one.kick} kick up to {shown(one.survived, one.unit, 4, one.area)}"
         for one in result.found
         if one.bracket[0] > 0 and not np.isinf(one.size)
     ]

@@ -194,10 +194,10 @@ def _survived(kick: Threshold) -> str:
             "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
     edge = ", the edge of the sliding that it leads to" if kick.edge else ""
     after = f"{kick.outcome}{reason}" if kick.outcome == "undecided" else f"more leads to {kick.outcome}"
-    amount = shown(kick.amount, kick.unit, area=kick.rig.area)
+    amount = shown(kick.amount, kick.unit, area=kick.area)
     if kick.decided:
         return f"survives {what} {amount}{edge}; {after}"
-    survived = shown(kick.survived, kick.unit, area=kick.rig.area)
+    survived = shown(kick.survived, kick.unit, area=kick.area)
     return f"survives {what} {survived}; {why} from there to {amount}{edge}{reason}; {after}"
 
 

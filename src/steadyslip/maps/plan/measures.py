@@ -16,9 +16,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError
-from steadyslip.core.records import FrozenRecord, option, parameter
-from steadyslip.core.roles import Domain, below_one, positive, steps, tolerance
+from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, unknown_name
+from steadyslip.core.records import FrozenRecord, option, parameter, setting
+from steadyslip.core.roles import Domain, Text, below_one, positive, steps, tolerance
 from steadyslip.linear import growth_rate
 from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.spectrum import spectrum
@@ -31,7 +31,8 @@ from steadyslip.motion import simulate_many
 from steadyslip.motion.many import event_names, event_unit
 from steadyslip.motion.status import WORDS
 from steadyslip.nonlinear.kicks.brackets import BEYOND, threshold_brackets
-from steadyslip.nonlinear.kicks.kicks import KICKS
+from steadyslip.nonlinear.kicks.kicks import KICKS, OF_MACHINES, kicks_of
+from steadyslip.nonlinear.kicks.places import place_problems
 from steadyslip.protocol import Protocol
 
 Vary = Mapping[str, Any]
@@ -216,7 +217,8 @@ def _in_words(name: str) -> str:
 class KickThreshold(Measure, name="threshold"):
     """Smallest kick that steady sliding does not survive; see `steadyslip.threshold_map`."""
 
-    kick: str = option(*KICKS, doc="kind of kick", default="velocity")
+    kick: str = option(*dict.fromkeys([*KICKS, *OF_MACHINES]), doc="kind of kick", default="velocity")
+    at: str | None = setting(Text("of a machine: the body or contact that is kicked"), default=None)
     reverse: bool = option(False, True, doc="slower, backward, pressed less", default=False)
     reference: str = option(
         "before", "after", doc="whether the drive's velocity is that before or after a velocity step", default="before"
@@ -234,15 +236,19 @@ class KickThreshold(Measure, name="threshold"):
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         direction = -1 if self.reverse else 1
         found, _, _ = threshold_brackets(
-            block_of(rig), vary, self.kick, direction=direction, reference=self.reference, precision=self.precision,
+            rig, vary, self.kick, at=self.at, direction=direction, reference=self.reference, precision=self.precision,
             threads=1, progress=False,
         )  # fmt: skip
         return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high,
                 "threshold_limit": found.beyond}  # fmt: skip
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
-        if isinstance(rig, Machine):
-            yield Problem("", "is not offered for machines yet")
+        if self.kick not in (known := kicks_of(rig)):
+            yield Problem("kick", unknown_name("kick", self.kick, known))
+        else:
+            yield from place_problems(rig, self.kick, self.at)
+        if operating_point(rig).model.delays:
+            yield Problem("", "is not offered with a delay")
 
     def seconds(self, rig: Slider | Machine, protocol: Protocol, probes: Vary) -> float:
         return 5e-3

@@ -130,7 +130,7 @@ def basin(
     rest = rest_of(own, np.full(1, drive), np.zeros(1))
     if not rest.exists[0]:
         raise beyond_range(own.point)
-    length = float(rest.scales[0, own.reduction.names.index("x")])
+    length = float(rest.way[0])
     x = length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
     v = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else v  # type: ignore[assignment]
     across, up = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, v))

@@ -10,9 +10,10 @@ import numpy as np
 
 from steadyslip.core.options import BRANCH, NAME, SIGN, THREADS, checked, finite
 from steadyslip.core.progress import progress_bar
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
-from steadyslip.nonlinear.kicks.kicks import KICKS, Kicked
+from steadyslip.nonlinear.kicks.kicks import Kicked, kicks_of
 from steadyslip.nonlinear.kicks.spans import CERTAIN, DOUBTS, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
@@ -56,10 +57,11 @@ class Brackets:
     direction=SIGN,
 )
 def threshold_map(
-    rig: Slider,
+    rig: Slider | Machine,
     vary: Mapping[str, Any],
     kick: str = "velocity",
     *,
+    at: str | None = None,
     direction: int = 1,
     reference: str = "before",
     precision: float = 1e-4,
@@ -72,7 +74,7 @@ def threshold_map(
 
     Parameters
     ----------
-    rig, kick, direction, reference, precision, rtol, branch
+    rig, kick, at, direction, reference, precision, rtol, branch
         As for `threshold`.
     vary : mapping of str to array_like or xarray.DataArray
         Parameters by dotted name, SI units; arrays broadcast, DataArrays by dimension name.
@@ -92,14 +94,14 @@ def threshold_map(
         ``undecided`` with the reason; ``returns`` where none fails.
     """
     found, dims, coords = threshold_brackets(
-        rig, vary, kick, direction=direction, reference=reference, precision=precision, rtol=rtol, threads=threads,
-        progress=progress, branch=branch,
+        rig, vary, kick, at=at, direction=direction, reference=reference, precision=precision, rtol=rtol,
+        threads=threads, progress=progress, branch=branch,
     )  # fmt: skip
     if not dims:
         return found.size if found.size.ndim else float(found.size)
     import xarray as xr
 
-    about = {"units": "1", "long_name": f"{kick} kick that is survived, {KICKS[kick].size}"}
+    about = {"units": "1", "long_name": f"{kick} kick that is survived, {kicks_of(rig)[kick].size}"}
     limit = np.array(BEYOND)[found.beyond]
     return xr.DataArray(
         found.size, dims=dims, coords={**coords, "limit": (dims, limit)}, name=f"{kick}_threshold", attrs=about
@@ -107,10 +109,11 @@ def threshold_map(
 
 
 def threshold_brackets(
-    rig: Slider,
+    rig: Slider | Machine,
     vary: Mapping[str, Any],
     kick: str = "velocity",
     *,
+    at: str | None = None,
     direction: int = 1,
     reference: str = "before",
     precision: float = 1e-4,
@@ -129,7 +132,7 @@ def threshold_brackets(
         for group_rig, chosen, index in regimes(rig, flat, size):
             part = {name: np.broadcast_to(np.asarray(a, dtype=float), (size,)) for name, a in chosen.items()}
             part = {name: a if index is None else a[index] for name, a in part.items()}
-            kicked = Kicked(group_rig, kick, direction, reference, part, branch, rtol)
+            kicked = Kicked(group_rig, kick, direction, reference, part, branch, rtol, at)
             where = slice(None) if index is None else index
             search = _Search(kicked, size if index is None else len(index), threads, advanced)
             search.run(precision)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steadyslip.kernels.runner import STATUSES
-from steadyslip.nonlinear.kicks.neighbourhood import rates_at
+from steadyslip.nonlinear.kicks.rest import rates_at
 from steadyslip.nonlinear.kicks.spans import Judged, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.flow import Runs as ConstantInputs
 from steadyslip.nonlinear.orbits.verify import cycle_near
@@ -40,9 +40,11 @@ def on_long_cycle(runs: Judged, one: int, state: Array, unknown: float) -> bool:
     `unknown` is that of the balance there, NaN where it is not known.
     """
     which, rest = np.array([one]), runs.rest
-    inputs = constant_inputs(np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which])
+    inputs = constant_inputs(
+        np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which], rest.force[which]
+    )  # fmt: skip
     jobs = replace(runs.repeated(one, 1).jobs, segments=inputs)
-    cycle = cycle_near(ConstantInputs(jobs), state, unknown=unknown) if jobs.posed[0] else None
+    cycle = cycle_near(ConstantInputs(jobs, contact=rest.contact), state, unknown=unknown) if jobs.posed[0] else None
     return cycle is not None and cycle.growth < 1 - ATTRACTS
 
 

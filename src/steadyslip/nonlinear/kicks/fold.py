@@ -24,7 +24,7 @@ def at_fold(rest: Rest, states: Array, unknown: Array | None = None) -> Array:
     `unknown` (m,) is that of the balance at the states, NaN where it is lost: next to a fold forces may balance at a
     velocity that is not at it.
     """
-    if rest.reduction.unknown is None or rest.reduction.model.inertial:
+    if rest.reduction.unknown is None or rest.reduction.model.inertial or not rest.reduction.model.is_single:
         return np.zeros(len(states), dtype=bool)
     turns = np.linspace(-REACH, REACH, COUNT)
     with np.errstate(all="ignore"):
@@ -40,14 +40,13 @@ def at_fold(rest: Rest, states: Array, unknown: Array | None = None) -> Array:
         own = np.full(len(states), np.nan) if unknown is None else unknown
         own = np.arcsinh(own / rest.velocity) if rest.reduction.velocity == "linear" else own
     found = np.zeros(len(states), dtype=bool)
-    found[which[(missing < NEAR * part.sigma) & ~(np.abs(own[which] - low) > CLOSE)]] = True
+    found[which[(missing < NEAR * part.sigmas[0]) & ~(np.abs(own[which] - low) > CLOSE)]] = True
     return found
 
 
 def _balance(rest: Rest, states: Array, turns: Array) -> tuple[Array, Array]:
     """Force that is missing at velocities (m, k), and how it changes with them; given as asinh or ln."""
-    numbers = (*rest.point.arguments, rest.sigma, rest.velocity, rest.pressure)
-    given = [rest.column(np.asarray(number)) for number in numbers]
+    given = [rest.column(np.asarray(number)) for number in rest.given()]
     unknown = turns
     if rest.reduction.velocity == "linear":
         unknown = rest.velocity[:, None] * np.sinh(turns)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
@@ -21,6 +22,7 @@ from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
+from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, steady_speeds
 from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, Judged, StepBudget, continuous_at
 
@@ -61,6 +63,22 @@ KICKS = {
         Kick("impulse", "Pa s", 1e-4, 1e10, "change of velocity over the drive's", "blow on a block with mass"),
     )
 }
+OF_MACHINES = {
+    kick.name: kick
+    for kick in (
+        replace(KICKS["velocity"], doc="step of the drive's velocity, or of that of the body at which it is"),
+        replace(KICKS["displacement"], doc="step of the load point, or of the body at which it is"),
+        Kick("force", "N", 1e-6, 1e2, "share of the largest steady normal force", "step of a force on a body"),
+        Kick("normal-force", "N", 1e-6, 1e2, "share of the steady one", "step of the normal force at a contact"),
+        replace(KICKS["impulse"], unit="N s", size="change of velocity over its own", doc="blow on a body with mass"),
+    )
+}
+"""Kicks of machines; those at a body or contact name it."""
+
+
+def kicks_of(rig: Slider | Machine) -> dict[str, Kick]:
+    """What a rig can be kicked by."""
+    return KICKS if isinstance(rig, Slider) else OF_MACHINES
 
 
 def options_for(model: Model, rtol: float | None) -> Options:
@@ -77,9 +95,11 @@ class Kicked:
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     kick : str
-        A name in `KICKS`.
+        A name in `kicks_of` the rig.
+    at : str or None
+        Of a machine: the body or contact that is kicked; None for its drive.
     direction : int
         1 or -1: faster, forward, pressed harder; or the reverse.
     reference : str
@@ -102,22 +122,25 @@ class Kicked:
     """
 
     def __init__(
-        self, rig: Slider, kick: str, direction: int, reference: str, vary: Mapping[str, Any], branch: int,
-        rtol: float | None,
+        self, rig: Slider | Machine, kick: str, direction: int, reference: str, vary: Mapping[str, Any], branch: int,
+        rtol: float | None, at: str | None = None,
     ) -> None:  # fmt: skip
-        problems = []
-        if kick not in KICKS:
-            problems.append(Problem("kick", unknown_name("kick", kick, KICKS)))
+        problems, known = [], kicks_of(rig)
+        if kick not in known:
+            problems.append(Problem("kick", unknown_name("kick", kick, known)))
         if direction not in (1, -1):
             problems.append(Problem("direction", f"got {direction!r}; allowed: 1 or -1"))
         if reference not in ("before", "after"):
             problems.append(Problem("reference", f"got {reference!r}; allowed: 'before' or 'after'"))
+        if not problems:
+            problems += place_problems(rig, kick, at)
         if problems:
             raise ParameterError(problems)
-        self.kick, self.sign, self.budget = KICKS[kick], float(direction), StepBudget()
-        self.from_other = kick == "velocity" and reference == "after"
+        self.kick, self.sign, self.budget, self.at = known[kick], float(direction), StepBudget(), at or ""
+        self.of_drive = not at and kick in ("velocity", "displacement")
+        self.from_other = kick == "velocity" and reference == "after" and self.of_drive
         values = operating_point(rig, vary, branch=branch)
-        if kick == "impulse" and "slider.mass" not in values.named():
+        if kick == "impulse" and isinstance(rig, Slider) and "slider.mass" not in values.named():
             raise NotAvailable(
                 "an impulse needs a mass: without it the block takes any velocity at once; use a displacement or "
                 "normal-stress kick, or give the slider a mass"
@@ -125,62 +148,71 @@ class Kicked:
         if values.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no steady sliding to return to")
         self.size = max(values.size, 1)
-        self.jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model, rtol), branch)
-        named = values.named()
-        self.drive = np.broadcast_to(np.asarray(named["drive.velocity"], dtype=float), (self.size,))
-        self.mass = np.broadcast_to(np.asarray(named.get("slider.mass", 0.0), dtype=float), (self.size,))
-        self.sigma = np.broadcast_to(self.jobs.point.stresses, (self.size,))
+        jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model, rtol), branch)
+        if kick in ("force", "normal-force"):
+            push, press = (self.at, "") if kick == "force" else ("", self.at)
+            reduction = reduce_model(jobs.point.model, jobs.eliminate, push, press)
+            jobs = replace(jobs, push=push, press=press, reduction=reduction)
+        if kick == "displacement" and self.of_drive:
+            refuse_jump(rig)
+        self.jobs = jobs
+        self.drive = np.broadcast_to(np.asarray(values.drive, dtype=float), (self.size,))
         self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))
         self.near = Neighbourhood(self.rest)
         self.exists = self.rest.exists & self.jobs.in_range
         self.neutral = self.exists & self.rest.neutral
         self.stable = (self.rest.stable | self.neutral) & np.broadcast_to(self.jobs.posed, (self.size,))
-        self.length = self.rest.scales[:, self.jobs.reduction.names.index("x")]
+        self.unit_name, units, speeds = size_units(self.jobs, self.rest, kick, self.at)
+        self.units, self.body_speed = (np.broadcast_to(one, (self.size,)) for one in (units, speeds))
 
     # -- sizes
 
     @property
     def highest(self) -> float:
         """Largest size that makes sense."""
-        if self.sign < 0 and self.kick.name in ("normal-stress", "impulse"):
+        if self.sign < 0 and (self.kick.name in ("normal-stress", "normal-force", "impulse") or self._is_blow):
             return 0.999
-        return self.kick.high
+        return 1e10 if self._is_blow else self.kick.high
+
+    @property
+    def _is_blow(self) -> bool:
+        """Whether a body gets another velocity at once."""
+        return self.kick.name == "impulse" or (self.kick.name == "velocity" and not self.of_drive)
 
     def amount(self, size: Any, which: Any = slice(None)) -> Array:
-        """The kick in SI units: velocity beside the rig's own drive, displacement, stress, or impulse; signed."""
+        """The kick in SI units: velocity beside the rig's own drive, change of anything else; signed."""
         size = np.asarray(size, dtype=float)
         with np.errstate(over="ignore"):
-            if self.kick.name == "velocity":
+            if self.kick.name == "velocity" and self.of_drive:
                 sign = -self.sign if self.from_other else self.sign
                 return np.asarray(self.drive[which] * np.exp(sign * size))
-            if self.kick.name == "displacement":
-                return np.asarray(self.sign * size * self.length[which])
-            if self.kick.name == "normal-stress":
-                return np.asarray(self.sign * size * self.sigma[which])
-            return np.asarray(self.sign * size * self.mass[which] * self.drive[which])
+            return np.asarray(self.sign * size * self.units[which])
 
     def size_of(self, amount: float) -> float:
         """The size of a kick given in SI units (of the first rig); negative if against `direction`."""
-        if self.kick.name == "velocity":
+        if self.kick.name == "velocity" and self.of_drive:
             sign = -self.sign if self.from_other else self.sign
             return float(sign * np.log(amount / self.drive[0]))
-        unit = {"displacement": self.length, "normal-stress": self.sigma, "impulse": self.mass * self.drive}
-        return float(self.sign * amount / unit[self.kick.name][0])
+        return float(self.sign * amount / self.units[0])
 
     # -- where kicks lead
 
     @property
     def moves_rest(self) -> bool:
         """Whether the steady sliding after the kick is another than the rig's own."""
-        return self.kick.name == "normal-stress" or (self.kick.name == "velocity" and not self.from_other)
+        if self.kick.name == "velocity":
+            return self.of_drive and not self.from_other
+        return self.kick.name in ("normal-stress", "normal-force", "force")
 
-    def inputs(self, which: Array, sizes: Array) -> tuple[Array, Array]:
-        """Load-point velocity and added normal stress after kicks (n,)."""
+    def inputs(self, which: Array, sizes: Array) -> tuple[Array, Array, Array]:
+        """Load-point velocity, added normal stress and force after kicks (n,)."""
         velocity, nothing = self.drive[which], np.zeros(len(which))
         if not self.moves_rest:
-            return velocity, nothing
+            return velocity, nothing, nothing
         amount = self.amount(sizes, which)
-        return (amount, nothing) if self.kick.name == "velocity" else (velocity, amount)
+        if self.kick.name == "velocity":
+            return amount, nothing, nothing
+        return (velocity, nothing, amount) if self.kick.name == "force" else (velocity, amount, nothing)
 
     def rest_after(self, which: Array, sizes: Array) -> Rest:
         """The steady sliding that kicks of `sizes` (n,) of rigs `which` (n,) lead to."""
@@ -206,9 +238,12 @@ class Kicked:
             group = one[back]
         if self.from_other:
             jobs = self._started_at(jobs, amount)
-        if self.kick.name == "impulse":
-            jobs = self._struck(jobs, amount / self.mass[which], which)
-        jump = amount if self.kick.name == "displacement" else np.zeros(len(which))
+        if self._is_blow:
+            jobs = self._struck(jobs, self.sign * np.asarray(sizes) * self.body_speed[which], which)
+        if self.kick.name == "displacement" and not self.of_drive:
+            jobs = self._started(jobs, {f"{self.at}.x": amount})
+        jumps = self.kick.name == "displacement" and self.of_drive
+        jump = amount if jumps else np.zeros(len(which))
         return Judged(jobs, rest, near, jump, group, effort, self.budget)
 
     def outcomes(
@@ -229,11 +264,17 @@ class Kicked:
         """The same rigs in steady sliding at another velocity of the load point."""
         nothing = np.zeros(len(velocity))
         before = rest_of(jobs, velocity, nothing)
-        initial, speed = continuous_at(jobs.reduction, jobs.point, before.state, velocity, nothing)
+        initial, speed = continuous_at(jobs.reduction, jobs.point, before.state, (velocity, nothing, nothing))
         return replace(jobs, initial=initial, velocity=speed)
 
     def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
-        """The same rigs with another velocity of the block."""
-        given = {"v": self.drive[which] + change}
+        """The same rigs with another velocity of the block, or of a body."""
+        if not self.at:
+            return self._started(jobs, {"v": self.drive[which] + change})
+        own = np.asarray(steady_speeds(jobs.point, self.at), dtype=float)
+        return self._started(jobs, {f"{self.at}.v": own + change})
+
+    def _started(self, jobs: Jobs, given: Mapping[str, Any]) -> Jobs:
+        """The same rigs from other starting values."""
         initial, speed = initial_values(jobs.reduction, jobs.point, given)
         return replace(jobs, initial=initial, velocity=speed)

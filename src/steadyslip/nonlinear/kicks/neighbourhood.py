@@ -20,7 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from steadyslip.nonlinear.kicks.rest import Rest, field_of
+from steadyslip.nonlinear.kicks.rest import Rest, motion_at
 
 Array = np.ndarray
 LARGEST, SMALLEST = 4.0, 1e-12  # radius, in natural sizes of the weakest mode
@@ -29,8 +29,6 @@ LONG = 30.0  # natural sizes of slip per natural size of all else, beyond which 
 SPREAD = (0.0, 0.25, 0.5)  # powers of the decay times' ratio by which fast modes are lessened in a third of directions
 INNER = (0.75, 0.5, 0.25, 0.1)  # shells inside the ball that are looked at too
 MARGIN = 0.5  # share of the linear decay of V that is asked for
-ROUNDING = 1e-14  # of stresses, in the normal stress
-ROUNDS = 12  # of Newton's method for the balance of forces
 
 
 class Neighbourhood:
@@ -147,9 +145,10 @@ def modes(rest: Rest) -> tuple[Array, Array, Array, Array]:
     roots, vectors = np.linalg.eig(rest.matrix)
     order = np.lexsort((-roots.imag, -roots.real))  # the slowest first
     roots, vectors = np.take_along_axis(roots, order, axis=1), np.take_along_axis(vectors, order[:, None, :], axis=2)
-    slip = rest.reduction.names.index("x")
-    velocity = np.abs(roots * vectors[:, slip]) * (rest.scales[:, slip] / np.abs(rest.velocity))[:, None]
-    others = np.maximum(np.max(np.abs(np.delete(vectors, slip, axis=1)), axis=1, initial=0.0), velocity)
+    slips = list(rest.places)
+    moving = np.abs(roots[:, None, :] * vectors[:, slips]) * (rest.scales[:, slips] / rest.speeds)[:, :, None]
+    velocity = np.max(moving, axis=1)
+    others = np.maximum(np.max(np.abs(np.delete(vectors, slips, axis=1)), axis=1, initial=0.0), velocity)
     size = np.max(np.abs(vectors), axis=1)
     size = np.where(size > LONG * others, others, size)
     imaginary = np.abs(roots.imag) > 1e-12 * np.abs(roots)
@@ -181,37 +180,3 @@ def directions(n: int) -> Array:
     normal = ndtri(qmc.Sobol(n, seed=1).random_base2(power) * (1 - 2e-9) + 1e-9)
     found = np.vstack([normal, np.eye(n), -np.eye(n)])
     return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
-
-
-def rates_at(rest: Rest, states: Array) -> Array:
-    """Rates (m, d, n) at states (m, d, n), d of them for each rig; NaN where the balance of forces has no solution."""
-    return motion_at(rest, states)[0]
-
-
-def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
-    """Rates (m, d, n) and velocity of the block (m, d) at states (m, d, n); NaN where forces cannot balance."""
-    numbers = (*rest.point.arguments, rest.sigma, rest.velocity, rest.pressure)
-    given = [rest.column(np.asarray(a)) for a in numbers]
-    function, split = field_of(rest.reduction), np.moveaxis(states, 2, 0)
-    shape = states.shape[:2]
-    with np.errstate(all="ignore"):
-        if rest.reduction.unknown is None:
-            found = function(*given, *split)
-        else:
-            unknown = np.broadcast_to(rest.unknown[:, None], shape).copy()
-            for _ in range(ROUNDS):
-                *found, residual, slope = function(*given, *split, unknown)
-                change = residual / slope
-                unknown = unknown - change
-            rounding = ROUNDING * rest.sigma[:, None] / np.abs(slope)  # much where mass is small
-            settled = np.abs(change) <= 1e-10 * (np.abs(unknown) + _size(rest)[:, None]) + rounding
-            found = [np.where(settled, rate, np.nan) for rate in found]
-    *rates, velocity = (np.broadcast_to(np.asarray(number, dtype=float), shape) for number in found)
-    return np.stack(rates, axis=2), velocity
-
-
-def _size(rest: Rest) -> Array:
-    """Natural size of the unknown: of the velocity variable, or an acceleration."""
-    if not rest.reduction.model.inertial:
-        return np.ones(len(rest.velocity)) if rest.reduction.velocity != "linear" else rest.velocity
-    return np.asarray(rest.velocity**2 / rest.scales[:, rest.reduction.names.index("x")])

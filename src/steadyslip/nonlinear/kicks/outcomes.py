@@ -186,7 +186,8 @@ class _Course:
         rest = self.runs.rest.part(which)
         count, peak = (tally[:, TALLY.index(name)] for name in ("velocity_peaks", "peak_velocity"))
         with np.errstate(invalid="ignore", divide="ignore"):
-            before, now = (np.log(np.abs(v / rest.velocity)) for v in (self.peak[which], peak))
+            slip = rest.slip_rate(self.runs.rest.contact)
+            before, now = (np.log(np.abs(v / slip)) for v in (self.peak[which], peak))
             left = rest.leading.real * self.elapsed[which] > LEFT
             return np.asarray(left & (count > PEAKS) & (now <= before + HIGHER * np.abs(before)))
 

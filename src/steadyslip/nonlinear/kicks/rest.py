@@ -16,7 +16,7 @@ import sympy as sp
 
 from steadyslip.core.questions import question
 from steadyslip.model import OperatingPoint
-from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W
+from steadyslip.model.reduction import SLOPES, TIME, V_LP, P, Q, Reduction, W
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.jobs import Jobs
 
@@ -26,6 +26,9 @@ S = sp.Symbol("s", positive=True)
 NEUTRAL = 1e-8  # growth per radian below which small motions neither grow nor decay
 STEPS = 8  # from the rig's own inputs to the new ones, where the normal stress has no closed form
 ROUNDS = 40  # of Newton's method at most
+ROUNDING = 1e-14  # of stresses, in the normal stress
+BALANCED = 12  # rounds of Newton's method for the balance of forces
+SETTLED = 1e-9  # change of the state, in natural sizes, at the end of the search for steady sliding of a machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,12 +78,12 @@ def _balance(reduction: Reduction) -> _Balance:
 
 @question
 def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
-    """Rates and the block's velocity, then the residual of the balance and its slope where there is an unknown left.
+    """Rates and slip rates, then the residual of the balance and its slope where there is an unknown left.
 
-    A function of the parameters, σss, v_lp, p, the state and the unknown if there is one.
+    A function of the parameters, σss, v_lp, q, p, the state and the unknown if there is one.
     """
     left = [] if reduction.unknown is None else [reduction.residual, sp.diff(reduction.residual, reduction.unknown)]
-    return _at_constant_inputs(reduction, [*reduction.rates, reduction.outputs["v"], *left])
+    return _at_constant_inputs(reduction, [*reduction.rates, *(one.outputs["v"] for one in reduction.slidings), *left])
 
 
 @question
@@ -90,10 +93,10 @@ def _jacobian_of(reduction: Reduction) -> Callable[..., list[Any]]:
 
 def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> Callable[..., list[Any]]:
     unknown = () if reduction.unknown is None else (reduction.unknown,)
-    still = {Q: sp.Integer(0), TIME: sp.Integer(0)}
+    still = {TIME: sp.Integer(0)}
     still |= {s: sp.Integer(0) for s in sp.symbols("v_lp_dot q_dot p_dot", real=True)}
     at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
-    return reduction.model.function(at_rest, V_LP, P, *reduction.state, *unknown)
+    return reduction.model.function(at_rest, V_LP, Q, P, *reduction.state, *unknown)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +108,8 @@ class Rest:
     reduction : Reduction
     point : OperatingPoint
         The rigs; numbers or (m,).
-    velocity, pressure : ndarray (m,)
-        Of the load point, m/s; added normal stress, Pa.
+    velocity, force, pressure : ndarray (m,)
+        Of the load point, m/s; force on a body, N, and added normal stress, Pa, of machines N.
     state : ndarray (m, n)
         NaN where there is none.
     unknown : ndarray (m,)
@@ -122,6 +125,7 @@ class Rest:
     reduction: Reduction
     point: OperatingPoint
     velocity: Array
+    force: Array
     pressure: Array
     state: Array
     unknown: Array
@@ -130,9 +134,65 @@ class Rest:
     roots: Array
 
     @property
-    def sigma(self) -> Array:
-        """The rigs' own steady normal stress, which the equations refer to, (m,)."""
-        return np.broadcast_to(self.point.stresses, self.velocity.shape)
+    def sigmas(self) -> tuple[Array, ...]:
+        """The rigs' own steady normal stresses, which the equations refer to, (m,) for each contact."""
+        own = (np.asarray(sigma, dtype=float) for sigma in self.point.sigmas)
+        return tuple(np.broadcast_to(sigma, self.velocity.shape) for sigma in own)
+
+    def given(self) -> tuple[Any, ...]:
+        """What functions of `field_of` take before the state."""
+        return (*self.point.arguments, *self.sigmas, self.velocity, self.force, self.pressure)
+
+    @property
+    def is_machine(self) -> bool:
+        """Whether bodies and contacts have names."""
+        return bool(self.reduction.model.contacts[0].name)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Where displacements stand in the state."""
+        own = {one.displacement for one in self.reduction.model.coordinates}
+        return tuple(i for i, symbol in enumerate(self.reduction.state) if symbol in own)
+
+    @property
+    def speeds(self) -> Array:
+        """Natural velocities of these, (m, places)."""
+        if not self.is_machine:
+            return np.asarray(np.abs(self.velocity)[:, None])
+        own, _ = natural_scales(self.point, self.reduction)
+        names = [self.reduction.names[i].removesuffix("x") + "v" for i in self.places]
+        faster = np.abs(self.velocity / np.asarray(self.point.drive, dtype=float))
+        return np.asarray(faster[:, None] * _columns([own[name] for name in names], len(self.velocity)))
+
+    @property
+    def way(self) -> Array:
+        """Natural length of a step of the load point, (m,)."""
+        shifts = np.abs(_columns(self.point.evaluate(_shifts(self.reduction)), len(self.velocity)))
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.min(self.scales[:, list(self.places)] / shifts, axis=1))
+
+    @property
+    def time(self) -> Array:
+        """Natural time, s, (m,)."""
+        return np.asarray(self.way / np.abs(self.velocity))
+
+    @property
+    def contact(self) -> int:
+        """The contact that moves most in the leading mode of the first rig, by whose slip motions are watched."""
+        slidings = self.reduction.slidings
+        if len(slidings) == 1 or not np.all(np.isfinite(self.matrix[0])):
+            return 0
+        roots, vectors = np.linalg.eig(self.matrix[0])
+        mode = vectors[:, np.argmax(roots.real)] * self.scales[0]
+        first = self.point.part(np.array([0]))
+        rows = _columns(first.evaluate(_slip_gradients(self.reduction)), 1).reshape(len(slidings), -1)
+        ratios = _columns(first.evaluate(_ratios(self.reduction)), 1)[0]
+        return int(np.argmax(np.abs(rows @ mode) / np.abs(ratios)))
+
+    def slip_rate(self, contact: int) -> Array:
+        """At a contact as fast as the load point, m/s, (m,)."""
+        ratios = _columns(self.point.evaluate(_ratios(self.reduction)), len(self.velocity))
+        return np.asarray(self.velocity * ratios[:, contact])
 
     @property
     def exists(self) -> Array:
@@ -161,7 +221,7 @@ class Rest:
     def part(self, which: Array) -> Rest:
         """Some of the rigs."""
         own = (getattr(self, name)[which] for name in (
-            "velocity", "pressure", "state", "unknown", "scales", "matrix", "roots"))  # fmt: skip
+            "velocity", "force", "pressure", "state", "unknown", "scales", "matrix", "roots"))  # fmt: skip
         return Rest(self.reduction, self.point.part(which), *own)
 
     def column(self, number: Any) -> Any:
@@ -174,11 +234,29 @@ def picked(array: Any, which: Array) -> Any:
     return array[which] if np.ndim(array) and len(array) > 1 else array
 
 
-def rest_of(jobs: Jobs, velocity: Array, pressure: Array) -> Rest:
-    """Steady sliding of the rigs of `jobs` at load-point velocities and added normal stresses (m,).
+@question
+def _shifts(reduction: Reduction) -> Callable[..., list[Any]]:
+    return reduction.model.function(reduction.shifts)
+
+
+@question
+def _ratios(reduction: Reduction) -> Callable[..., list[Any]]:
+    return reduction.model.function(one.ratio for one in reduction.slidings)
+
+
+@question
+def _slip_gradients(reduction: Reduction) -> Callable[..., list[Any]]:
+    return reduction.model.function(sp.diff(one.slip, s) for one in reduction.slidings for s in reduction.state)
+
+
+def rest_of(jobs: Jobs, velocity: Array, pressure: Array, force: Array | None = None) -> Rest:
+    """Steady sliding of the rigs of `jobs` at load-point velocities, added normal stresses and forces (m,).
 
     Where there are several it is the one that the rig's own leads to as the inputs change.
     """
+    force = np.zeros(len(velocity)) if force is None else force
+    if jobs.point.model.contacts[0].name:
+        return _machine_rest(jobs, velocity, force, pressure)
     reduction, point, count = jobs.reduction, jobs.point, len(velocity)
     with np.errstate(all="ignore"):
         stress = _stress(reduction, point, velocity, pressure)
@@ -191,14 +269,32 @@ def rest_of(jobs: Jobs, velocity: Array, pressure: Array) -> Rest:
         if reduction.velocity == "linear":
             own = {**own, "w": velocity}
         scales = _columns([own[name] for name in reduction.names], count)
-        left = () if reduction.unknown is None else (unknown,)
-        entries = point.evaluate(_jacobian_of(reduction), velocity, pressure, *state.T, *left)
-        matrix = _columns(entries, count).reshape(count, n, n) * scales[:, None, :] / scales[:, :, None]
+    return _linearised(reduction, point, velocity, force, pressure, state, unknown, scales)
+
+
+def _linearised(
+    reduction: Reduction, point: OperatingPoint, velocity: Array, force: Array, pressure: Array, state: Array,
+    unknown: Array, scales: Array,
+) -> Rest:  # fmt: skip
+    """Steady sliding that is known, with the matrix there."""
+    count, n = state.shape
+    with np.errstate(all="ignore"):
+        matrix = _slopes(reduction, point, (velocity, force, pressure), state, unknown, scales)
     good = np.all(np.isfinite(matrix), axis=(1, 2))
     roots = np.full((count, n), np.nan + 0j)
     if good.any():
         roots[good] = np.linalg.eigvals(matrix[good])
-    return Rest(reduction, point, velocity, pressure, state, unknown, scales, matrix, roots)
+    return Rest(reduction, point, velocity, force, pressure, state, unknown, scales, matrix, roots)
+
+
+def _slopes(
+    reduction: Reduction, point: OperatingPoint, inputs: tuple[Array, ...], state: Array, unknown: Array, scales: Array
+) -> Array:
+    """Jacobian of the rates in natural sizes, (m, n, n)."""
+    count, n = state.shape
+    left = () if reduction.unknown is None else (unknown,)
+    entries = point.evaluate(_jacobian_of(reduction), *inputs, *state.T, *left)
+    return np.asarray(_columns(entries, count).reshape(count, n, n) * scales[:, None, :] / scales[:, :, None])
 
 
 def _columns(numbers: Any, count: int) -> Array:
@@ -223,3 +319,144 @@ def _stress(reduction: Reduction, point: OperatingPoint, velocity: Array, pressu
                 break
     lost = np.abs(change) > 1e-9 * stress
     return np.where(lost, np.nan, stress)
+
+
+# --- of machines: numerically, from where the rig itself slides ---------------------------------------------
+
+
+def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) -> Rest:
+    """Newton's method on the rates: from velocities and memory as they are there, else step by step."""
+    reduction, point, count = jobs.reduction, jobs.point, len(velocity)
+    own, _ = natural_scales(point, reduction)
+    drive = np.broadcast_to(np.asarray(point.drive, dtype=float), (count,))
+    faster = velocity / drive
+    columns = dict(own)
+    for one, contact in zip(reduction.slidings, reduction.model.contacts, strict=True):
+        if one.variable is not None and one.variable.kind == "linear":
+            columns[f"{contact.name}.w"] = columns[f"{contact.name}.w"] * faster
+    scales = _columns([columns[name] for name in reduction.names], count)
+    with np.errstate(all="ignore"):
+        guess = _columns(_as_fast(reduction, point, faster), count)
+        state, unknown = _settled(reduction, point, (velocity, force, pressure), guess, scales)
+        lost = np.flatnonzero(~np.all(np.isfinite(state), axis=1))
+        if len(lost) and np.any((faster != 1) | (force != 0) | (pressure != 0)):
+            part, here = point.part(lost), _columns(_as_fast(reduction, point, np.ones(count)), count)[lost]
+            for share in np.linspace(0, 1, STEPS + 1)[1:]:
+                inputs = drive[lost] * faster[lost] ** share, share * force[lost], share * pressure[lost]
+                here = np.column_stack(_settled(reduction, part, inputs, here, scales[lost]))
+            state[lost], unknown[lost] = here[:, :-1], here[:, -1]
+    return _linearised(reduction, point, velocity, force, pressure, state, unknown, scales)
+
+
+def _as_fast(reduction: Reduction, point: OperatingPoint, faster: Array) -> list[Any]:
+    """The state in steady sliding so many times as fast, and the unknown; displacements and integrals are the rig's."""
+    return point.evaluate(_steady_state_of(reduction), faster)
+
+
+FASTER = sp.Symbol("faster", positive=True)
+
+
+@question
+def _steady_state_of(reduction: Reduction) -> Callable[..., list[Any]]:
+    """That of a rig's parameters and normal stresses, and of how many times as fast it slides."""
+    model = reduction.model
+    drive = model.parameters["drive.velocity"]
+
+    def moved(expression: Any) -> sp.Expr:
+        return sp.sympify(expression).xreplace({drive: drive * FASTER})
+
+    steady = {item.symbol: moved(model.steady[item.symbol]) for item in (*model.memory, *model.states)}
+    for one in model.coordinates:
+        steady |= {one.displacement: sp.Integer(0), one.velocity: moved(one.speed), one.acceleration: sp.Integer(0)}
+    steady |= {item.symbol: sp.Integer(0) for item in model.integrals}
+    speeds = {contact.velocity: moved(model.steady[contact.velocity]) for contact in model.contacts}
+    steady |= {contact.friction: moved(model.steady[contact.friction]) for contact in model.contacts}
+    for sliding in reduction.slidings:
+        if sliding.variable is not None:  # whose scale is the rig's own velocity, whatever the load point's is
+            steady[sliding.variable.w] = sliding.variable.w_of_v.xreplace(steady | speeds)
+    left = sp.Integer(0) if reduction.unknown is None else steady[reduction.unknown]
+    return model.function([*(steady[symbol] for symbol in reduction.state), left], FASTER)
+
+
+def _settled(
+    reduction: Reduction, point: OperatingPoint, inputs: tuple[Array, ...], guess: Array, scales: Array
+) -> tuple[Array, Array]:
+    """State (m, n) and unknown (m,) at which nothing changes, near a guess (m, n + 1); NaN where there is none."""
+    count, n = scales.shape
+    state, unknown = guess[:, :n].copy(), guess[:, n].copy()
+    nothing = np.full((count, n, n), np.nan)
+    change = np.full((count, n), np.inf)
+    for _ in range(ROUNDS):
+        velocity, force, pressure = inputs
+        here = Rest(reduction, point, velocity, force, pressure, state, unknown, scales, nothing, nothing[:, 0])
+        rates, slowest, solved = solved_at(here, state[:, None, :])
+        unknown = np.where(np.isfinite(solved[:, 0]), solved[:, 0], unknown)
+        matrix = _slopes(reduction, point, inputs, state, unknown, scales)
+        good = np.all(np.isfinite(matrix), axis=(1, 2)) & np.all(np.isfinite(rates[:, 0]), axis=1)
+        change = np.full((count, n), np.nan)
+        for i in np.flatnonzero(good):
+            try:
+                change[i] = -np.linalg.solve(matrix[i], rates[i, 0] / scales[i])
+            except np.linalg.LinAlgError:
+                continue
+        state = state + np.where(np.isfinite(change), change, 0.0) * scales
+        size = np.max(np.abs(change) / (1 + np.abs(state / scales)), axis=1)
+        if not np.any(size > SETTLED):
+            break
+    slides = good & (size <= SETTLED) & (slowest[:, 0] > 0)
+    pressed = np.all(_columns(point.evaluate(_normal_of(reduction), *inputs, *state.T, unknown), count) > 0, axis=1)
+    return np.where((slides & pressed)[:, None], state, np.nan), unknown
+
+
+@question
+def _normal_of(reduction: Reduction) -> Callable[..., list[Any]]:
+    """Normal stresses."""
+    still = {TIME: sp.Integer(0)} | dict.fromkeys(SLOPES[:3], sp.Integer(0))
+    unknown = sp.Dummy() if reduction.unknown is None else reduction.unknown
+    wanted = (one.outputs["sigma"].xreplace(still) for one in reduction.slidings)
+    return reduction.model.function(wanted, V_LP, Q, P, *reduction.state, unknown)
+
+
+# --- motion at constant inputs ------------------------------------------------------------------------------
+
+
+def rates_at(rest: Rest, states: Array) -> Array:
+    """Rates (m, d, n) at states (m, d, n), d of them for each rig; NaN where the balance of forces has no solution."""
+    return motion_at(rest, states)[0]
+
+
+def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
+    """Rates (m, d, n) and the slowest slip rate (m, d) at states (m, d, n); NaN where forces cannot balance."""
+    rates, velocity, _ = solved_at(rest, states)
+    return rates, velocity
+
+
+def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
+    """The same, and the unknown of the balance (m, d)."""
+    given = [rest.column(np.asarray(a)) for a in rest.given()]
+    function, split = field_of(rest.reduction), np.moveaxis(states, 2, 0)
+    shape, unknown = states.shape[:2], np.zeros(states.shape[:2])
+    with np.errstate(all="ignore"):
+        if rest.reduction.unknown is None:
+            found = function(*given, *split)
+        else:
+            unknown = np.broadcast_to(rest.unknown[:, None], shape).copy()
+            for _ in range(BALANCED):
+                *found, residual, slope = function(*given, *split, unknown)
+                change = residual / slope
+                unknown = unknown - change
+            rounding = ROUNDING * rest.sigmas[0][:, None] / np.abs(slope)  # much where mass is small
+            settled = np.abs(change) <= 1e-10 * (np.abs(unknown) + _size(rest)[:, None]) + rounding
+            found = [np.where(settled, rate, np.nan) for rate in found]
+    numbers = [np.broadcast_to(np.asarray(number, dtype=float), shape) for number in found]
+    n = states.shape[2]
+    return np.stack(numbers[:n], axis=2), np.minimum.reduce(numbers[n:]), unknown
+
+
+def _size(rest: Rest) -> Array:
+    """Natural size of the unknown: of the velocity variable, an acceleration, or a friction."""
+    if rest.is_machine:
+        return np.broadcast_to(natural_scales(rest.point, rest.reduction)[1][0], rest.velocity.shape)
+    if not rest.reduction.model.inertial:
+        return np.ones(len(rest.velocity)) if rest.reduction.velocity != "linear" else rest.velocity
+    return np.asarray(rest.velocity**2 / rest.scales[:, rest.places[0]])

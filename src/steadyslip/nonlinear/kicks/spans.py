@@ -10,7 +10,8 @@ import numpy as np
 from steadyslip.kernels.layout import Final
 from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import Reduction
+from steadyslip.model.reduction import Reduction, W
+from steadyslip.model.scales import slip_rates
 from steadyslip.model.start import restored_of, velocity_at
 from steadyslip.motion.engine import LANES, run_chunk, run_many
 from steadyslip.motion.jobs import Jobs, Options
@@ -99,7 +100,7 @@ class Judged:
     def times(self) -> tuple[Array, Array]:
         """Length of the first span, and the time after which a motion is undecided, s."""
         rest, leading = self.rest, self.rest.leading
-        unit = rest.scales[:, rest.reduction.names.index("x")] / np.abs(rest.velocity)
+        unit = rest.time
         reload = RELOAD * np.abs(self.jump) / np.abs(rest.velocity)
         with np.errstate(all="ignore"):
             turn = 2 * np.pi / np.abs(leading)
@@ -113,16 +114,16 @@ class Judged:
 
     def reload(self, which: Array, states: Array) -> Array:
         """Time, s, that the load point needs to catch up with blocks far from where they would slide, (k,)."""
-        x = self.rest.reduction.names.index("x")
-        away = np.abs(states[:, x] - self.rest.state[which, x])
-        return np.asarray(np.nan_to_num(RELOAD * away / np.abs(self.rest.velocity[which])))
+        slips = list(self.rest.places)
+        away = np.abs(states[:, slips] - self.rest.state[which][:, slips]) / self.rest.speeds[which]
+        return np.asarray(np.nan_to_num(RELOAD * np.max(away, axis=1)))
 
 
-def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array) -> Segments:
+def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array, force: Array) -> Segments:
     """One segment for each run, with the load point moved at its start; arguments (m,)."""
     count = len(span)
     value = np.zeros((count, 1, 3))
-    value[:, 0, 0], value[:, 0, 2] = velocity, pressure
+    value[:, 0, 0], value[:, 0, 1], value[:, 0, 2] = velocity, force, pressure
     waves = np.zeros((count, 1, 3, 0))
     return Segments(
         np.zeros((count, 1)), span[:, None], jump[:, None], value, np.zeros_like(value), waves, waves, waves
@@ -173,25 +174,25 @@ def advanced_runs(
     `unknown` (k,) is that of the balance at `start`, NaN where it is not known.
     """
     jobs, rest = replace(runs.jobs, options=options or runs.jobs.options), runs.rest
-    velocity, pressure = rest.velocity[which], rest.pressure[which]
+    velocity, force, pressure = rest.velocity[which], rest.force[which], rest.pressure[which]
     jump = runs.jump[which] if start is None else np.zeros(len(which))
     point = jobs.point.part(which)
     if start is None:
         initial, speed = picked(jobs.initial, which), picked(jobs.velocity, which)
     else:
-        initial, speed = continuous_at(jobs.reduction, point, start, velocity, pressure, unknown)
+        initial, speed = continuous_at(jobs.reduction, point, start, (velocity, force, pressure), unknown)
     part = replace(
         jobs, point=point, initial=initial, velocity=speed,
-        segments=constant_inputs(span, velocity, jump, pressure), size=len(which),
+        segments=constant_inputs(span, velocity, jump, pressure, force), size=len(which),
     )  # fmt: skip
     machine: Runner = jobs.runner(LANES, dense=True)
     _ = machine.code.advance  # compile before the threads start
-    count = len(which)
+    count, own = len(which), rest.contact * len(TALLY)
     found = Spans.empty(count, rest.state.shape[1])
 
     def work(begin: int, end: int, stopped: threading.Event) -> None:
         outcome = run_chunk(part, machine, begin, end, np.empty(0), watch, stopped)
-        found.status[begin:end], found.tally[begin:end] = outcome.status, outcome.tally
+        found.status[begin:end], found.tally[begin:end] = outcome.status, outcome.tally[:, own : own + len(TALLY)]
         found.time[begin:end], found.steps[begin:end] = outcome.final[:, Final.TIME], outcome.steps.sum(axis=1)
         found.state[begin:end], found.unknown[begin:end] = outcome.state, outcome.unknown
 
@@ -201,16 +202,21 @@ def advanced_runs(
 
 
 def continuous_at(
-    reduction: Reduction, point: OperatingPoint, state: Array, velocity: Array, pressure: Array,
-    unknown: Array | None = None,
-) -> tuple[Array, Array]:  # fmt: skip
-    """What a kernel starts from: the continuous variables, and a velocity near which to look for its own."""
+    reduction: Reduction, point: OperatingPoint, state: Array, inputs: tuple[Array, ...], unknown: Array | None = None
+) -> tuple[Array, Array]:
+    """What a kernel starts from: the continuous variables, and a slip rate near which to look for its own.
+
+    `inputs` are the velocity of the load point, the force on a body and the added normal stress, each (m,).
+    """
     with np.errstate(all="ignore"):
-        found = point.evaluate(restored_of(reduction), *state.T, velocity, 0.0, pressure, 0.0)
+        found = point.evaluate(restored_of(reduction), *state.T, *inputs, 0.0)
         initial = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), (len(state),)) for c in found])
-        speed = np.array(velocity)
+        slip = slip_rates(point)[0]
+        speed = np.array(inputs[0] / np.asarray(point.drive) * slip)
+        if not reduction.model.is_single:  # each contact has its own, which the kernel begins with
+            return np.ascontiguousarray(initial), speed
         if reduction.form == "eliminated":
-            speed = np.asarray(point.drive) * np.exp(state[:, reduction.names.index("w")])
+            speed = np.asarray(slip * np.exp(state[:, reduction.state.index(W)]))
         elif unknown is not None and reduction.unknown is not None and not reduction.model.inertial:
             known = np.broadcast_to(velocity_at(reduction, point, state, unknown), speed.shape)
             speed = np.where(np.isfinite(known), known, speed)

@@ -12,9 +12,10 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, total
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import beyond_range
-from steadyslip.model.sliding import steady_states
+from steadyslip.model.sliding import steady_state, steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.spans import (
     CERTAIN,
@@ -26,7 +27,7 @@ from steadyslip.nonlinear.kicks.spans import (
     StepBudget,
     doubt_of,
 )
-from steadyslip.protocol import DisplacementStep, NormalStressStep, VelocityStep
+from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
 
 Array = np.ndarray
 COARSE = 240  # sizes of the first scan of a single rig,
@@ -42,7 +43,7 @@ class Threshold(Displayed):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     kick : str
     direction : int
     size : float
@@ -72,9 +73,11 @@ class Threshold(Displayed):
         Why kicks inside the bracket, or beyond it, are undecided; empty where none of them is.
     survived : float
         The lower end of the bracket in SI units, as `amount`: all smaller kicks that were tried return.
+    at : str
+        Of a machine: the body or contact that is kicked; empty for its drive.
     """
 
-    rig: Slider = field(repr=False)
+    rig: Slider | Machine = field(repr=False)
     kick: str
     direction: int
     size: float
@@ -88,9 +91,15 @@ class Threshold(Displayed):
     interrupted: bool = False
     doubt: str = ""
     survived: float = np.nan
+    at: str = ""
+
+    @property
+    def area(self) -> float | None:
+        """Over which the amount is a stress, for whoever speaks of the whole of it."""
+        return self.rig.area if isinstance(self.rig, Slider) else None
 
     def __str__(self) -> str:
-        what = f"{self.kick} kick"
+        what = f"{self.kick} kick" + (f" at {self.at}" if self.at else "")
         low, high = self.bracket
         if self.size == 0:
             return f"{what}: none survived, steady sliding is unstable"
@@ -103,7 +112,7 @@ class Threshold(Displayed):
             return f"{what}: all that were tried are survived up to size {low:.4g}; {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
         after = self.outcome if self.outcome != "undecided" else f"undecided ({self.doubt})"
-        amount = shown(self.amount, self.unit, 7, self.rig.area)
+        amount = shown(self.amount, self.unit, 7, self.area)
         if self.decided:
             return (
                 f"{what}: survives up to {amount} (size {self.size:.7g}, bracket {low:.9g} to {high:.9g}){edge}; "
@@ -111,7 +120,7 @@ class Threshold(Displayed):
             )
         why = "stopped when it was between" if self.interrupted else f"undecided ({self.doubt}) between"
         return (
-            f"{what}: survives up to {shown(self.survived, self.unit, 7, self.rig.area)} (size {low:.7g}); "
+            f"{what}: survives up to {shown(self.survived, self.unit, 7, self.area)} (size {low:.7g}); "
             f"{why} that and size {high:.7g}{edge}; beyond: {after}"
         )
 
@@ -123,6 +132,7 @@ class Threshold(Displayed):
 
         return {
             "kick": self.kick,
+            **({"at": self.at} if self.at else {}),
             "direction": self.direction,
             "size": plain(self.size),
             "bracket": [plain(x) for x in self.bracket],
@@ -135,7 +145,7 @@ class Threshold(Displayed):
             "decided": self.decided,
             "doubt": self.doubt,
             "interrupted": self.interrupted,
-        } | total(plain(self.amount), self.unit, self.rig.area)
+        } | total(plain(self.amount), self.unit, self.area)
 
 
 @checked(
@@ -146,9 +156,10 @@ class Threshold(Displayed):
     direction=SIGN,
 )
 def threshold(
-    rig: Slider,
+    rig: Slider | Machine,
     kick: str = "velocity",
     *,
+    at: str | None = None,
     direction: int = 1,
     reference: str = "before",
     precision: float = 1e-8,
@@ -160,10 +171,14 @@ def threshold(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     kick : str, optional
         ``velocity`` (step of the load-point velocity), ``displacement`` (step of the load point), ``normal-stress``
-        (step of the normal stress) or ``impulse`` (blow on a block with mass).
+        (step of the normal stress) or ``impulse`` (blow on a block with mass). Of machines: ``velocity`` and
+        ``displacement`` of the drive, or with `at` of a body; ``force`` (a step) and ``impulse`` on a body;
+        ``normal-force`` (a step) at a contact.
+    at : str, optional
+        Of machines: the body or contact.
     direction : int, optional
         1: faster, forward, pressed harder; -1: the reverse.
     reference : str, optional
@@ -204,20 +219,28 @@ def threshold(
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
-    steady_states(rig)  # raises, and says why
-    kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol)
+    require_steady(rig)
+    kicked = Kicked(rig, kick, direction, reference, {}, branch, rtol, at)
     if not kicked.exists[0]:
         raise beyond_range(kicked.jobs.point)
     if not kicked.stable[0]:
         nothing = float(kicked.amount(0.0)[0])
-        return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), nothing, kicked.kick.unit, "unstable", kicked.highest,
-                         survived=nothing)  # fmt: skip
+        return Threshold(rig, kick, direction, 0.0, (0.0, 0.0), nothing, kicked.unit_name, "unstable", kicked.highest,
+                         survived=nothing, at=kicked.at)  # fmt: skip
     search = _Search(kicked, progress)
     try:
         search.run(precision)
     except KeyboardInterrupt:
         search.interrupted = True
     return search.result(rig, precision)
+
+
+def require_steady(rig: Slider | Machine) -> None:
+    """NoSteadySliding, saying why, where there is none."""
+    if isinstance(rig, Machine):
+        steady_state(rig)
+    else:
+        steady_states(rig)
 
 
 class _Search:
@@ -301,7 +324,7 @@ class _Search:
 
         return self.kicked.outcomes(np.zeros(len(sizes), dtype=int), sizes, None, advanced, effort)
 
-    def result(self, rig: Slider, precision: float) -> Threshold:
+    def result(self, rig: Slider | Machine, precision: float) -> Threshold:
         """What is known."""
         kicked, low, high = self.kicked, self.low, self.high
         decided = bool(high - low <= precision * high) if np.isfinite(high) else self.outcome == RETURNS
@@ -312,8 +335,8 @@ class _Search:
         doubt = doubt_of(self.doubt) or doubt_of(self.outcome)
         word = "" if self.outcome == RETURNS else OUTCOMES[self.outcome]
         return Threshold(
-            rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.kick.unit, word, kicked.highest,
-            self.at_edge, decided and not self.interrupted, self.interrupted, doubt, survived,
+            rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.unit_name, word, kicked.highest,
+            self.at_edge, decided and not self.interrupted, self.interrupted, doubt, survived, kicked.at,
         )  # fmt: skip
 
 
@@ -385,13 +408,13 @@ class KickMargin(Displayed):
 
 
 @checked(precision=finite(0, 0.1), branch=BRANCH)
-def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
+def margin_to_kick(rig: Slider | Machine, step: Any, *, precision: float = 1e-6, branch: int = 0) -> KickMargin:
     """Distance of an expected disturbance from the smallest that is not survived, and what comes of itself.
 
     Parameters
     ----------
-    rig : Slider
-    step : VelocityStep, DisplacementStep or NormalStressStep
+    rig : Slider or Machine
+    step : VelocityStep, DisplacementStep, NormalStressStep, or of a machine DisturbanceStep
         Its time does not matter.
     precision, branch
         As for `threshold`.
@@ -406,6 +429,8 @@ def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: i
         DisplacementStep: ("displacement", "by"),
         NormalStressStep: ("normal-stress", "by"),
     }
+    if isinstance(rig, Machine):
+        kinds |= {NormalStressStep: ("normal-force", "by"), DisturbanceStep: ("force", "by")}
     if type(step) not in kinds:
         names = ", ".join(kind.__name__ for kind in kinds)
         raise NotAvailable(f"a margin is known for {names}, not for {step!r}; simulate it instead")
@@ -414,8 +439,12 @@ def margin_to_kick(rig: Slider, step: Any, *, precision: float = 1e-6, branch: i
     if kick == "velocity" and not amount > 0:
         raise NotAvailable("a stop or reversal of the drive is no step from one steady sliding to another; simulate it")
     up = amount >= (rig.drive.velocity if kick == "velocity" else 0)
-    found = threshold(rig, kick, direction=1 if up else -1, precision=precision, branch=branch)
-    kicked = Kicked(rig, kick, found.direction, "before", {}, branch, None)
+    at = getattr(step, "on", None)
+    if isinstance(rig, Machine) and at is None and kick in ("force", "normal-force"):
+        places = list(rig.bodies if kick == "force" else rig.contacts)
+        at = places[0] if len(places) == 1 else None
+    found = threshold(rig, kick, at=at, direction=1 if up else -1, precision=precision, branch=branch)
+    kicked = Kicked(rig, kick, found.direction, "before", {}, branch, None, at)
     size = kicked.size_of(amount)
     outcome = int(kicked.outcomes(np.zeros(1, dtype=int), np.array([size]))[0])
     if outcome == INTERRUPTED:

@@ -1,0 +1,137 @@
+"""Where a kick acts, and what one of size one is there: in the units of the body, contact or drive that it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.errors import NotAvailable, Problem, unknown_name
+from steadyslip.core.expressions import derivative
+from steadyslip.core.questions import question
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import LOAD_POINT
+from steadyslip.machine.slider import Slider
+from steadyslip.model.equations import Model
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.scales import natural_scales
+from steadyslip.motion.jobs import Jobs
+from steadyslip.nonlinear.kicks.rest import Rest
+
+Array = np.ndarray
+
+
+def place_problems(rig: Slider | Machine, kick: str, at: str | None) -> list[Problem]:
+    """What is wrong with where a kick is to act."""
+    if isinstance(rig, Slider):
+        if at is None:
+            return []
+        return [Problem("at", f"got {at!r}; a slider is one block, leave it out")]
+    known = list(rig.contacts) if kick == "normal-force" else list(rig.bodies)
+    what = "contact" if kick == "normal-force" else "body"
+    if at is None:
+        if kick in ("velocity", "displacement"):
+            return []
+        return [Problem("at", f"missing; name the {what} that a {kick} kick acts at: {', '.join(known)}")]
+    if at not in known:
+        return [Problem("at", unknown_name(what, at, known))]
+    if kick == "impulse" and not rig.bodies[at].inertia_of():
+        return [Problem("at", f"an impulse needs a mass, and {at!r} has none; allowed: a displacement or force kick")]
+    if kick == "velocity" and not rig.bodies[at].inertia_of():
+        return [Problem("at", f"{at!r} has no mass, and its velocity follows from the forces; give it another kick")]
+    return []
+
+
+def refuse_jump(rig: Slider | Machine) -> None:
+    """A step of the load point through a dashpot is an infinite force; NotAvailable."""
+    if isinstance(rig, Machine) and any(e.damping and LOAD_POINT in e.senses for e in rig.mechanism().elements):
+        raise NotAvailable(
+            "a displacement step of the drive acts through a dashpot (of a link, a kd) as an infinite force; kick a "
+            "body instead, with at='NAME', or by another kick"
+        )
+
+
+def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, Array]:
+    """The unit of a kind of kick, what size one is in it, and the change of velocity that a blow of size one makes."""
+    model, point, none = jobs.point.model, jobs.point, np.zeros(1)
+    if not rest.is_machine:
+        drive = np.abs(np.asarray(point.drive, dtype=float))
+        found = {
+            "velocity": ("m/s", drive), "displacement": ("m", rest.way), "normal-stress": ("Pa", point.stresses),
+            "impulse": ("Pa s", np.asarray(point.named().get("slider.mass", 0.0)) * drive),
+        }  # fmt: skip
+        return *found[kick], drive
+    if kick == "normal-force":
+        index = [one.name for one in model.contacts].index(at)
+        area = np.asarray(point.evaluate(_areas(model))[index], dtype=float)
+        return "N", area * np.asarray(point.sigmas[index], dtype=float), none
+    if not at:
+        unit = model.roles["drive.velocity"].unit
+        if kick == "velocity":
+            return unit, np.abs(np.asarray(point.drive, dtype=float)), none
+        return unit.removesuffix("/s"), rest.way, none
+    body = next(one for one in model.coordinates if one.name == at)
+    scales, _ = natural_scales(point, jobs.reduction)
+    turns = body.unit == "rad"
+    speed = np.abs(np.asarray(scales[f"{at}.v"], dtype=float))
+    if kick == "displacement":
+        return body.unit, np.asarray(scales[f"{at}.x"], dtype=float), none
+    if kick == "velocity":
+        return f"{body.unit}/s", speed, speed
+    if kick == "impulse":
+        return (
+            "N m s" if turns else "N s",
+            np.asarray(point.evaluate(_inertias(model))[_place(model, at)]) * speed,
+            speed,
+        )
+    return "N m" if turns else "N", _force(point, model, at), none
+
+
+def _force(point: OperatingPoint, model: Model, at: str) -> Array:
+    """The largest steady normal force, as it would be felt at a body: through the lever at which contacts rub."""
+    numbers = [np.asarray(one, dtype=float) for one in point.evaluate(_levers(model, at))]
+    areas = point.evaluate(_areas(model))
+    normal = [area * np.asarray(sigma, dtype=float) for area, sigma in zip(areas, point.sigmas, strict=True)]
+    felt = [np.abs(lever) * force for lever, force in zip(numbers, normal, strict=True)]
+    largest: Array = np.maximum.reduce(np.broadcast_arrays(*felt))
+    whole: Array = np.maximum.reduce(np.broadcast_arrays(*normal))
+    return np.asarray(np.where(largest > 0, largest, whole))
+
+
+def steady_speeds(point: OperatingPoint, at: str) -> Any:
+    """Velocity of a body in steady sliding."""
+    return point.evaluate(_speeds(point.model))[_place(point.model, at)]
+
+
+def _place(model: Model, at: str) -> int:
+    return [one.name for one in model.coordinates].index(at)
+
+
+@question
+def _speeds(model: Model) -> Callable[..., list[Any]]:
+    return model.function(one.speed for one in model.coordinates)
+
+
+@question
+def _inertias(model: Model) -> Callable[..., list[Any]]:
+    return model.function(one.inertia for one in model.coordinates)
+
+
+@question
+def _areas(model: Model) -> Callable[..., list[Any]]:
+    return model.function(contact.area for contact in model.contacts)
+
+
+@question
+def _levers(model: Model, at: str) -> Callable[..., list[Any]]:
+    """Slip rate of each contact over the velocity of a body: as it moves alone, or else as all move in sliding."""
+    body = model.coordinates[_place(model, at)]
+    found = []
+    for contact in model.contacts:
+        slip = sp.sympify(model.definitions.get(contact.velocity, contact.velocity))
+        alone = derivative(slip, body.velocity)
+        together = sp.sympify(model.steady[contact.velocity]) / body.speed if body.speed != 0 else sp.Integer(0)
+        found.append(alone if alone != 0 else together)
+    return model.function(found)

@@ -13,6 +13,7 @@ from steadyslip.kernels.driver.places import further_at, guess_at, marks_at, out
 from steadyslip.kernels.events import faster
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Out, Row
+from steadyslip.kernels.newton import eliminated
 from steadyslip.kernels.nodes import Program, Value
 from steadyslip.kernels.record import Evaluator, horner, slope_of, times
 from steadyslip.kernels.step import Step
@@ -106,15 +107,23 @@ class Kernel(Formulation):
         return record.program
 
     def _balance_program(self) -> Program:
-        """Balances as functions of their w, after a jump or now; without one, velocity simply continues."""
+        """Balances as functions of their w, after a jump or now; without one, velocity simply continues.
+
+        Their values, the slope of each in its own w, and what Newton's method for all takes off each w.
+        """
         record = Evaluator(self, Program("balance"))
         program = record.program
         found: list[Value] = [0.0, 1.0]
         if self.restart is not None:
+            n = self.layout.massless
             point = record.inputs(program.load(Row.TAU))
-            point |= {f"w{k}": program.load(guess_at(self.layout, k)) for k in range(self.layout.massless)}
+            point |= {f"w{k}": program.load(guess_at(self.layout, k)) for k in range(n)}
             point |= {f"k{i}": program.load(self.layout.continuous + i) for i in range(self.layout.kept)}
-            found = self.restart(record.constants | point)
+            values = self.restart(record.constants | point)
+            matrix = {(i, k): values[n + n * i + k] for i in range(n) for k in range(n)
+                      if self.restart.expressions[n + n * i + k] != 0}  # fmt: skip
+            slopes = [values[n + n * k + k] for k in range(n)]
+            found = [*values[:n], *slopes, *(eliminated(matrix, values[:n]) if n > 1 else ())]
         for i, value in enumerate(found):
             program.store(i, value, "y")
         return program

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from steadyslip.kernels.driver.places import guess_at, scale_at
 from steadyslip.kernels.layout import Array, Layout, Routines, call
 
@@ -42,55 +40,25 @@ def solve_together(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
     guesses are as they were.
     """
     n = layout.massless
-    near, last = np.zeros(n), 2.0
+    last, size, changes, kept = 2.0, 0.0, 2 * n, 3 * n
     for k in range(n):
-        near[k] = R[guess_at(layout, k)]
+        y[kept + k] = R[guess_at(layout, k)]
     for _ in range(NEWTON_STEPS):
         call(routines.balance, R, 0.0, y)
-        eliminate(y, n)
         size = 0.0
         for k in range(n):
-            own = abs(y[k]) / (R[scale_at(layout, k)] + abs(R[guess_at(layout, k)]))
+            own = abs(y[changes + k]) / (R[scale_at(layout, k)] + abs(R[guess_at(layout, k)]))
             size = own if not own <= size else size
-        if size <= ROUNDED and not size <= 0.5 * last:
-            return True
-        if not size <= 0.5 * last:
+        if not 0.0 < size <= 0.5 * last:
             break
         for k in range(n):
-            R[guess_at(layout, k)] -= y[k]
-        if size <= 1e-15:
-            return True
+            R[guess_at(layout, k)] -= y[changes + k]
         last = size
+    if size <= ROUNDED:
+        return True
     for k in range(n):
-        R[guess_at(layout, k)] = near[k]
+        R[guess_at(layout, k)] = y[kept + k]
     return False
-
-
-def eliminate(y: Array, n: int) -> None:
-    """The solution of n linear equations in place of their right side, the first n numbers; the matrix follows."""
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(y[n + i * n + k]) > abs(y[n + best * n + k]):
-                best = i
-        if best != k:
-            for c in range(n):
-                kept = y[n + k * n + c]
-                y[n + k * n + c] = y[n + best * n + c]
-                y[n + best * n + c] = kept
-            kept = y[k]
-            y[k] = y[best]
-            y[best] = kept
-        for i in range(k + 1, n):
-            share = y[n + i * n + k] / y[n + k * n + k] if y[n + k * n + k] != 0.0 else math.nan
-            for c in range(k, n):
-                y[n + i * n + c] -= share * y[n + k * n + c]
-            y[i] -= share * y[k]
-    for j in range(n):
-        k = n - 1 - j
-        for c in range(k + 1, n):
-            y[k] -= y[n + k * n + c] * y[c]
-        y[k] = y[k] / y[n + k * n + k] if y[n + k * n + k] != 0.0 else math.nan
 
 
 def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array) -> float:
@@ -100,7 +68,7 @@ def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array
     the search begins with steps much smaller than the natural size of w.
     """
     place, scale = guess_at(layout, k), R[scale_at(layout, k)]
-    own = layout.massless * (1 + k) + k
+    own = layout.massless + k
     w = float(R[place])
     call(routines.balance, R, 0.0, y)
     value = y[k]

@@ -28,9 +28,9 @@ def unknown_at(layout: Layout, index: int) -> int:
 def width(layout: Layout) -> int:
     """How many numbers there are: state, outputs, functions of events, what else is observed, further unknowns.
 
-    Balances to be solved leave their residuals and derivatives in the same array.
+    Balances to be solved leave residuals, derivatives and Newton's changes in the same array, and the guesses before.
     """
-    return max(further_at(layout) + layout.further + layout.unknowns, layout.massless * (layout.massless + 1))
+    return max(further_at(layout) + layout.further + layout.unknowns, 4 * layout.massless)
 
 
 def breadth(layout: Layout) -> int:

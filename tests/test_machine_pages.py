@@ -11,6 +11,7 @@ from explored import ExploredMachine, MovedOnAPage, differences, same_motion
 from machines import at_random, two_mass
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.motion import OPTIONS
 from steadyslip.files.specifications.read import rig_from_text
 from steadyslip.kernels.layout import Setting
@@ -132,3 +133,22 @@ def test_the_file_of_a_page_is_the_machine_to_the_last_digit():
     assert "{{" not in filled
     changes = {one["name"]: value for one, value in zip(known["parameters"], values, strict=True)}
     assert rig_from_text(filled) == machine.with_values(changes)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "inclined-spring", "stick-slip", "two-states", "slow-axis"])
+def test_a_page_is_below_200_kilobytes(name):
+    own = example(name) if name in NAMES else ss.read_rig(MACHINES.parent / f"{name}.toml")
+    assert len(ss.explore(own, title=name).html.encode()) < 200_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_sketch_of_a_page_has_everything_that_moves(name):
+    machine = example(name)
+    text = machine_sketch(machine)
+    assert set(re.findall(r'data-body="([^"]+)"', text)) == set(machine.bodies)
+    ends = [tuple(sorted(one.split())) for one in re.findall(r'data-bodies="([^"]*)"', text)]
+    held = [tuple(sorted(end for end in link.between if end in machine.bodies)) for link in machine.links.values()]
+    assert sorted(ends) == sorted(held)
+    assert "nan" not in text
+    for one in (*machine.bodies, *machine.links, *machine.contacts):
+        assert one in text

@@ -62,7 +62,7 @@ def test_tracks_are_painted_as_python_judges(browser, file):
 
 def test_a_browser_that_computes_otherwise_says_so(browser, file, tmp_path):
     text = file.read_text(encoding="utf-8")
-    wrong = re.sub(r'("critical": )(\d+\.\d+)', lambda m: f"{m[1]}{float(m[2]) * (1 + 1e-9)!r}", text, count=1)
+    wrong = re.sub(r'("critical":)(\d+\.\d+)', lambda m: f"{m[1]}{float(m[2]) * (1 + 1e-9)!r}", text, count=1)
     assert wrong != text
     (tmp_path / "wrong.html").write_text(wrong, encoding="utf-8")
     with Visit(browser, tmp_path / "wrong.html") as visit:

@@ -433,3 +433,8 @@ def percent(share: float) -> str:
     """
     text = f"{100 * share:.3g}"
     return f"{100 * share:.8g} %" if 0 < share < 1 and float(text) in (0, 100) else f"{text} %"
+
+
+def printed(text: str) -> str:
+    """Words with units as they are set in print: µm, m²."""
+    return re.sub(r"(?<![A-Za-z])um(?![A-Za-z])", "µm", text.replace("^2", "²").replace("^3", "³"))

@@ -15,6 +15,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.quantities import outside
 from steadyslip.core.records import Address, twin
 from steadyslip.explorer.equations import linear_part
+from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.motion import driver, motion_part
 from steadyslip.explorer.narrow import dense, narrow, narrow_style
 from steadyslip.explorer.sketch import sketch
@@ -38,6 +39,8 @@ MODULES = (
     "locus", "facts", "mover", "sketch", "disturbances", "course", "leaving", "page",
 )  # fmt: skip
 """Modules of the page, each after those that it imports."""
+USUAL = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
+"""What parameters are unless they say otherwise; `web/rig.js` has the same."""
 LIBRARY = ("motion",)
 """Modules that a worker needs too, with the runtime and the driver: the page hands it their text."""
 POLICY = (
@@ -90,7 +93,7 @@ def fragment(rig: Slider | Machine, title: str, branch: int) -> str:
 
 def safe(known: Mapping[str, Any]) -> str:
     """Data as JSON that may stand in a document: nothing in a rig can end the element that its data are in."""
-    data = json.dumps(known, ensure_ascii=False, allow_nan=False)
+    data = json.dumps(known, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for letter in "<>&\u2028\u2029":
         data = data.replace(letter, f"\\u{ord(letter):04x}")
     return data
@@ -103,6 +106,8 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
     try:
         machine, moving = motion_part(rig, branch)
         driven = driver()
+        if moving["parameters"] == facts["parameters"]:
+            del moving["parameters"]  # said once
     except NotAvailable as refused:  # the verdict can be shown all the same
         still = str(refused)
     modules = [_web(f"{name}.js") for name in MODULES]
@@ -112,7 +117,7 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
     known = _data(rig, title, branch, facts) | {
         "motion": moving,
         "still": still,
-        "sketch": sketch(rig) if isinstance(rig, Slider) else "",
+        "sketch": sketch(rig) if isinstance(rig, Slider) else machine_sketch(rig),
     }
     code = (
         f"{script}\nconst programs = {dense(text)};\n"
@@ -212,7 +217,7 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     factor, unit = _outside(rig, one.role.unit)
     natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
     group, label = _group(rig, name)
-    return {
+    told = {
         "name": name,
         "group": group,
         "label": label,
@@ -228,6 +233,7 @@ def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
         "whole": domain.whole,
         "allowed": domain.text,
     }
+    return {key: value for key, value in told.items() if key not in USUAL or value != USUAL[key]}
 
 
 _MEMBERS = {"bodies": "body", "links": "link", "contacts": "contact"}

@@ -11,7 +11,7 @@ _OTHER = re.compile(
     r"|(?<=[(,=:?&|!]) ?/(?![/*])(?:\\.|\[(?:\\.|[^\]\\\n])*\]|[^/\\\n\[])+/[a-z]*"  # regular expressions
 )
 _PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
-_SUM = re.compile(r"(?<=[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
+_SUM = re.compile(r"(?<=[\[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|\]])")
 """Products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order."""
 _SPACE = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
@@ -67,11 +67,30 @@ def dense(text: str) -> str:
     before = ""
     while before != bare:
         before, bare = bare, _SUM.sub(r"\1", _PRODUCT.sub(r"\1", bare))
+    bare = _once(bare)
     rows: list[str] = []
     for declared, lines in groupby(bare.split("\n"), lambda line: line.startswith("var ") and line.endswith(";")):
         own = list(lines)
         rows += ["var " + ",".join(line[4:-1] for line in own) + ";"] if declared else own
     return "\n".join(rows)
+
+
+def _once(text: str) -> str:
+    """Brackets in brackets, and brackets around all that is assigned, left out."""
+    opened: list[int] = []
+    closed: dict[int, int] = {}
+    for at, sign in enumerate(text):
+        if sign == "(":
+            opened.append(at)
+        elif sign == ")":
+            closed[opened.pop()] = at
+    spare: set[int] = set()
+    for at, end in closed.items():
+        within = text[at - 1] == "(" and closed[at - 1] == end + 1
+        assigned = text[at - 1] == "=" and text[at - 2] not in "=<>!" and text[end + 1] in ";,"
+        if within or assigned:
+            spare |= {at, end}
+    return "".join(sign for at, sign in enumerate(text) if at not in spare)
 
 
 def narrow_style(text: str) -> str:

@@ -1,48 +1,21 @@
-"""A machine as a sketch, drawn from its description: bodies, links, contacts, drive, with their names and numbers.
-
-Bodies stand in columns, in the order in which links lead away from the drive; those that another slides on stand above
-or below it. Only names, kinds and numbers are looked at: no machine has a drawing of its own.
-"""
+"""A machine as a sketch on paper; `steadyslip.machine.drawing` says what is drawn."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Rectangle
+from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Polygon, Rectangle
 
-from steadyslip.core.quantities import shown
-from steadyslip.figures.pencil import PALE, SMALL, Pencil
 from steadyslip.figures.style import BLACK, BLUE, VERMILION, axes_or_new, printed
-from steadyslip.machine.links import Link
+from steadyslip.machine.drawing import DRIVEN, FORCED, INK, LONG, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
-from steadyslip.machine.mechanism import GROUND, LOAD_POINT
-from steadyslip.machine.surfaces import Surface
 
-_WIDE, _HIGH = 1.7, 1.15  # of a body
-_ACROSS, _UP = 3.7, 1.85  # from column to column, and from row to row where bodies slide on each other
+COLORS = {INK: BLACK, PALE: "#777777", DRIVEN: BLUE, FORCED: VERMILION}
+BODY = "#DDE3EA"
+LARGE, SMALL = 9.0, 7.5
 _INCH = 0.78  # of the picture for one unit
-_BODY = "#DDE3EA"
-_HOLD = 1.5  # length of links to a wall
-_TEXT = 9.0
-
-
-@dataclass
-class _Place:
-    """Where a body stands, and which of its sides are taken."""
-
-    x: float
-    y: float
-    taken: dict[str, int] = field(default_factory=dict)
-
-    def side(self, way: str) -> tuple[float, float]:
-        """Where the next link is hooked, on the left or on the right; several share the height of the side."""
-        count = self.taken.get(way, 0)
-        self.taken[way] = count + 1
-        step = (0.0, 0.3, -0.3, 0.45, -0.45)[min(count, 4)]
-        return self.x + (_WIDE / 2 if way == "right" else -_WIDE / 2), self.y + step
 
 
 def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
@@ -60,309 +33,72 @@ def machine_sketch(machine: Machine, ax: Axes | None = None) -> Axes:
         Motion is to the right. Boxes slide, circles turn; zigzags are springs, pistons dashpots; hatched is the ground.
         Solid blue is what the drive does, dashed blue what it measures, red are constant forces.
     """
-    return _Drawing(machine, ax).drawn()
+    pencil = AxesPencil(axes_or_new(ax))
+    Drawing(machine, pencil).draw()
+    own = pencil.ax
+    own.set_aspect("equal")
+    own.axis("off")
+    own.autoscale_view()
+    own.margins(0.03)
+    if ax is None:
+        (left, right), (low, high) = own.get_xlim(), own.get_ylim()
+        figure = own.get_figure(root=True)
+        if figure is not None:
+            figure.set_size_inches(_INCH * (right - left), _INCH * (high - low))
+            figure.set_layout_engine(None)
+            own.set_position((0, 0, 1, 1))
+    return own
 
 
-class _Drawing(Pencil):
-    def __init__(self, machine: Machine, ax: Axes | None) -> None:
-        self.machine = machine
-        self.places = _places(machine)
-        self.own, self.pulled, self.around, self.storeys = ax is None, False, 0, 0
-        super().__init__(axes_or_new(ax))
+class AxesPencil(Pencil):
+    """Draws on Axes whose limits grow with what is drawn."""
 
-    def drawn(self) -> Axes:
-        for name in self.machine.bodies:
-            self._body(name)
-        for name, link in self.machine.links.items():
-            self._link(name, link)
-        for name in self.machine.bodies:
-            self._contacts(name)
-        self._drive()
-        ax = self.ax
-        ax.set_aspect("equal")
-        ax.axis("off")
-        ax.autoscale_view()
-        ax.margins(0.03)
-        if self.own:
-            (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-            figure = ax.get_figure(root=True)
-            if figure is not None:
-                figure.set_size_inches(_INCH * (right - left), _INCH * (high - low))
-                figure.set_layout_engine(None)
-                ax.set_position((0, 0, 1, 1))
-        return ax
+    def __init__(self, ax: Axes) -> None:
+        self.ax = ax
 
-    # -- bodies and contacts
+    def line(self, *points: Point, color: str = INK, linewidth: float = 1.2, dashed: bool = False) -> None:
+        style = "--" if dashed else "-"
+        x, y = np.transpose(points)
+        self.ax.plot(x, y, color=COLORS[color], linewidth=linewidth, linestyle=style, solid_capstyle="butt")
 
-    def _body(self, name: str) -> None:
-        body, place = self.machine.bodies[name], self.places[name]
-        if body.turns:
-            self.ax.add_patch(Circle((place.x, place.y), _HIGH / 1.7, facecolor=_BODY, edgecolor=BLACK, linewidth=1.4))
-            self.line((place.x - _WIDE / 2, place.y), (place.x - _HIGH / 1.7, place.y), linewidth=3)
-            self.line((place.x + _HIGH / 1.7, place.y), (place.x + _WIDE / 2, place.y), linewidth=3)
-        else:
-            corner = (place.x - _WIDE / 2, place.y - _HIGH / 2)
-            self.ax.add_patch(Rectangle(corner, _WIDE, _HIGH, facecolor=_BODY, edgecolor=BLACK, linewidth=1.4))
-        inertia = body.inertia_of()
-        weighs = shown(inertia, "kg m^2" if body.turns else "kg") if inertia else "no mass"
-        self.words(place.x, place.y, f"{name}\n{weighs}", fontsize=_TEXT if len(name) < 9 else SMALL)
-        self._forces(name)
+    def words(
+        self, x: float, y: float, text: str, *, ha: str = "center", va: str = "center", color: str = INK,
+        large: bool = False, paper: bool = False,
+    ) -> None:  # fmt: skip
+        style: dict[str, Any] = {"bbox": {"facecolor": "white", "edgecolor": "none", "pad": 1.2}} if paper else {}
+        self.ax.text(x, y, printed(text), ha=ha, va=va, color=COLORS[color], fontsize=LARGE if large else SMALL,
+                     linespacing=1.25, **style)  # fmt: skip
+        lines = text.count("\n") + 1
+        wide = 0.105 * max(map(len, text.splitlines()))
+        share = {"center": 0.5, "left": 0.0, "right": 1.0}[ha]
+        rise = {"center": 0.5, "bottom": 0.0, "top": 1.0}[va]
+        low, high = y - 0.19 * lines * rise, y + 0.19 * lines * (1 - rise)
+        self.ax.update_datalim([(x - share * wide, low), (x + (1 - share) * wide, high)])
 
-    def _forces(self, name: str) -> None:
-        body, place = self.machine.bodies[name], self.places[name]
-        along, away = float(body.along()), float(body.away())
-        if along:
-            y, way = place.y + _HIGH / 2 + 0.22, math.copysign(0.7, along)
-            x = place.x + (0.95 if self.machine.drive.driven() == name else 0.0)  # beside what the drive does
-            self.arrow((x - way / 2, y), (x + way / 2, y), color=VERMILION)
-            self.words(x, y + 0.2, shown(abs(along), "N m" if body.turns else "N"), color=VERMILION, va="bottom")
-        if away:
-            x, y = place.x + 0.6, place.y + _HIGH / 2
-            start, end = ((x, y + 0.75), (x, y + 0.04)) if away < 0 else ((x, y + 0.04), (x, y + 0.75))
-            self.arrow(start, end, color=VERMILION)
-            self.words(x + 0.12, y + 0.6, shown(abs(away), "N"), color=VERMILION, ha="left")
+    def arrow(self, start: Point, end: Point, *, color: str = DRIVEN, dashed: bool = False) -> None:
+        style: Any = (0, (3, 2)) if dashed else "-"
+        self.ax.add_patch(FancyArrowPatch(
+            start, end, color=COLORS[color], linewidth=1.2 if dashed else 1.6, linestyle=style,
+            mutation_scale=9 if dashed else 11, arrowstyle="-|>", shrinkA=0, shrinkB=0,
+        ))  # fmt: skip
+        self.ax.update_datalim([start, end])
 
-    def _contacts(self, name: str) -> None:
-        """What a body slides on: pads beside each other on ground or drive, or another body above or below."""
-        place = self.places[name]
-        own = [(n, one) for n, one in self.machine.contacts.items() if one.body == name]
-        beside = [(n, one) for n, one in own if one.against in (GROUND, LOAD_POINT)]
-        wide = max(_WIDE, 1.25 * len(beside)) / max(len(beside), 1)
-        for i, (contact, one) in enumerate(beside):
-            x = place.x + (i - (len(beside) - 1) / 2) * wide
-            self._pad(x, place, wide, contact, one)
-        for contact, one in own:
-            if one.against in self.machine.bodies:
-                self._interface(place, self.places[one.against], contact, one)
+    def block(self, name: str, x: float, y: float, wide: float, high: float, text: str) -> None:
+        self.ax.add_patch(Rectangle((x, y), wide, high, facecolor=BODY, edgecolor=BLACK, linewidth=1.4))
+        self.words(x + wide / 2, y + high / 2, text, large=len(name) < LONG)
 
-    def _pad(self, x: float, place: _Place, wide: float, name: str, one: Surface) -> None:
-        top = place.y - _HIGH / 2
-        gap = 0.38 if one.contact.is_compliant() else 0.1
-        foot, half = top - gap, wide / 2 - 0.06
-        if one.contact.is_compliant():
-            for shift in (-0.5, 0.5):
-                self.spring((x + shift, top), (x + shift, foot))
-        else:
-            self.line((x - 0.8 * half, foot + 0.04), (x + 0.8 * half, foot + 0.04), linewidth=4, color=PALE)
-        self.line((x - half, foot), (x + half, foot), linewidth=1.6)
-        if abs(x - place.x) + half > _WIDE / 2 + 0.2:  # a rail of its own beyond the body
-            self.line((x, top), (x, foot))
-            self.line((place.x, top), (x, top))
-        self.hatched(x - half, foot - 0.2, 2 * half, 0.2)
-        if one.against == LOAD_POINT:
-            self.arrow((x - 0.3, foot - 0.1), (x + 0.3, foot - 0.1))
-        self.words(x, foot - 0.28, f"{name}\n{self._load(name, one)}", va="top")
+    def wheel(self, name: str, x: float, y: float, radius: float, text: str) -> None:
+        self.ax.add_patch(Circle((x, y), radius, facecolor=BODY, edgecolor=BLACK, linewidth=1.4))
+        self.words(x, y, text, large=len(name) < LONG)
 
-    def _interface(self, place: _Place, other: _Place, name: str, one: Surface) -> None:
-        if abs(place.x - other.x) < 0.1 and abs(abs(place.y - other.y) - _UP) < 0.1:
-            y = (place.y + other.y) / 2
-            for edge in (place.y, other.y):
-                near = edge + math.copysign(_HIGH / 2, y - edge)
-                self.line((place.x - _WIDE / 2, near), (place.x + _WIDE / 2, near), linewidth=2.4)
-            corner = (place.x - _WIDE / 2, y - (_UP - _HIGH) / 2)
-            self.ax.add_patch(
-                Rectangle(corner, _WIDE, _UP - _HIGH, facecolor="white", edgecolor=PALE, hatch="---", linewidth=0)
-            )
-            text = f"{name}\n{self._load(name, one)}"
-            self.ax.text(place.x, y, printed(text), ha="center", va="center", fontsize=SMALL,
-                         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.2})  # fmt: skip
-            return
-        self.around += 1
-        y = min(p.y for p in self.places.values()) - _HIGH / 2 - 0.85 - 0.35 * self.around
-        ends = [(p.x - 0.6, p.y - _HIGH / 2) for p in (place, other)]
-        self.line(ends[0], (ends[0][0], y), (ends[1][0], y), ends[1], linestyle=":", color=PALE)
-        self.words((ends[0][0] + ends[1][0]) / 2, y, f"{name}, {self._load(name, one)}", backgroundcolor="white")
+    def rough(self, corners: list[Point]) -> None:
+        self.ax.add_patch(Polygon(corners, facecolor="white", edgecolor=COLORS[PALE], hatch="/////", linewidth=0))
 
-    def _load(self, name: str, one: Surface) -> str:
-        """What presses it, in a few words, and at which radius it rubs."""
-        return self._pressed(name, one) + (f" at {shown(one.radius, 'm')}" if one.radius is not None else "")
-
-    def _pressed(self, name: str, one: Surface) -> str:
-        if one.loaded_by is not None:
-            return f"pressed by {one.loaded_by}"
-        for full, known in self.machine.parameters().items():
-            told = known.role.kind in ("normal stress", "stiffness") and known.value is not None
-            if told and full.startswith(f"contacts.{name}.contact."):
-                return shown(float(known.value or 0.0), known.role.unit, area=self.machine.area_of(full))
-        return one.contact.name
-
-    # -- links
-
-    def _link(self, name: str, link: Link) -> None:
-        bodies = [end for end in link.between if end in self.places]
-        if len(bodies) == 1:
-            self._to_wall(name, link, bodies[0])
-        elif self.places[bodies[0]].x == self.places[bodies[1]].x:
-            one, two = sorted((self.places[n] for n in bodies), key=lambda p: p.y)
-            x = one.x + _WIDE / 2 + 0.4
-            start, end = (x, one.y + 0.35), (x, two.y - 0.35)
-            for at in (start, end):
-                self.line((one.x + _WIDE / 2, at[1]), at)
-            self.link(start, end, link.rigidity() is not None, link.is_damped())
-            self._named(name, link, (start[0] + 0.25, (start[1] + end[1]) / 2), ha="left", va="center")
-        else:
-            one, two = sorted((self.places[n] for n in bodies), key=lambda p: p.x)
-            if two.x - one.x > _ACROSS + 0.1 or one.y != two.y or one.taken.get("right") or two.taken.get("left"):
-                self._over(name, link, one, two)
-                return
-            start, end = one.side("right"), two.side("left")
-            if abs(start[1] - end[1]) < 0.5:
-                end = end[0], start[1]
-            self.link(start, end, link.rigidity() is not None, link.is_damped())
-            self._named(name, link, ((start[0] + end[0]) / 2, max(start[1], end[1]) + 0.32), va="bottom")
-
-    def _over(self, name: str, link: Link, one: _Place, two: _Place) -> None:
-        """Between bodies with others in between: above them."""
-        y = self._storey()
-        shift = 0.6 - 0.12 * self.storeys
-        start, end = (one.x + shift, y), (two.x - 0.3 - shift, y)
-        self.line((start[0], one.y + _HIGH / 2), start)
-        self.line((end[0], two.y + _HIGH / 2), end)
-        self.link(start, end, link.rigidity() is not None, link.is_damped())
-        self._named(name, link, ((start[0] + end[0]) / 2, y + 0.32), va="bottom")
-
-    def _to_wall(self, name: str, link: Link, body: str) -> None:
-        """To the ground, or to what the drive moves."""
-        place, other = self.places[body], next(end for end in link.between if end != body)
-        shares = link.directions()
-        if "x" not in shares:
-            x = place.x - 0.35
-            start, end = (x, place.y + _HIGH / 2), (x, place.y + _HIGH / 2 + _HOLD)
-            self.link(start, end, link.rigidity() is not None, link.is_damped())
-            self._wall(end, (0, 1), other)
-            self._named(name, link, (x - 0.28, end[1] - 0.6), ha="right", va="center")
-            return
-        way = 1.0 if link.between[0] == body else -1.0
-        if "y" in shares:
-            angle = math.atan2(float(shares["y"]), float(shares["x"]))
-            direction = (way * math.cos(angle), way * math.sin(angle))
-            start = (place.x + math.copysign(_WIDE / 2, direction[0]), place.y + math.copysign(_HIGH / 2, direction[1]))
-            end = (start[0] + _HOLD * direction[0], start[1] + _HOLD * direction[1])
-            self.link(start, end, link.rigidity() is not None, link.is_damped())
-            self._wall(end, direction, other)
-            beside = -1 if direction[0] < 0 else 1
-            self._named(name, link, (end[0] + 0.5 * beside, end[1]), ha="right" if beside < 0 else "left", va="center")
-            return
-        side = self._free_side(place, other)
-        if side == "over":
-            x, y = place.x + 0.6 - 0.12 * self.storeys, self._storey()
-            start, end = (x, y), (x + 1.45, y)
-            self.line((x, place.y + _HIGH / 2), start)
-        else:
-            start = place.side(side)
-            end = (start[0] + (_HOLD if side == "right" else -_HOLD), start[1])
-        self.link(start, end, link.rigidity() is not None, link.is_damped())
-        self._wall(end, (1, 0) if end[0] > start[0] else (-1, 0), other)
-        self._named(name, link, ((start[0] + end[0]) / 2, start[1] + 0.32), va="bottom")
-
-    def _storey(self) -> float:
-        """The height above bodies at which one more link has room."""
-        self.storeys += 1
-        return max(p.y for p in self.places.values()) + _HIGH / 2 + 0.75 + 0.95 * (self.storeys - 1)
-
-    def _free_side(self, place: _Place, other: str) -> str:
-        """Where a link to a wall has room: the load point ahead of all, in front where it pulls or behind."""
-        row = [p for p in self.places.values() if abs(p.y - place.y) < 1]
-        left = place.taken.get("left", 0) > 0 or any(p.x < place.x - 0.1 for p in row)
-        right = place.taken.get("right", 0) > 0 or any(p.x > place.x + 0.1 for p in row)
-        if other == LOAD_POINT:
-            return "left" if not left else "right" if not right else "over"
-        return "right" if not right else "left" if not left else "over"
-
-    def _wall(self, at: tuple[float, float], direction: tuple[float, float], other: str) -> None:
-        (x, y), (along, up) = at, direction
-        across, ends = (-up, along), []
-        for far in (0.0, 0.16):
-            ends += [(x + far * along + s * across[0], y + far * up + s * across[1]) for s in (-0.4, 0.4)]
-        if other == GROUND:
-            self.ax.add_patch(
-                Polygon([ends[i] for i in (0, 1, 3, 2)], facecolor="white", edgecolor=PALE, hatch="/////", linewidth=0)
-            )
-            self.line(*ends[:2])
-            return
-        self.line(*ends[:2], color=BLUE, linewidth=3)
-        if not self.pulled:  # there is one load point, wherever it is held
-            self.pulled = True
-            begin = (x - 0.55, y + 0.58) if abs(along) > abs(up) else (x - 0.4, y + 0.2)
-            self.arrow(begin, (begin[0] + 0.9, begin[1]))
-            speed = shown(float(self.machine.drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
-            self.words(begin[0] + 0.45, begin[1] + 0.12, speed, color=BLUE, va="bottom")
-
-    def _named(self, name: str, link: Link, at: tuple[float, float], **style: Any) -> None:
-        known = self.machine.parameters()
-        key = "stiffness" if link.rigidity() is not None else "damping"
-        one = known[f"links.{name}.{key}"]
-        words = [name, shown(float(one.value or 0.0), one.role.unit)]
-        if link.turning[0] and link.ratio() != 1:
-            ratio = next(known[f"links.{name}.{key}"] for key in ("lead", "gear") if f"links.{name}.{key}" in known)
-            words[0] += ", " + (
-                f"{shown(float(ratio.value or 0) * 2 * math.pi, 'm')}/rev"
-                if ratio.role.unit == "m/rad"
-                else f"gear {float(ratio.value or 0):.3g}"
-            )
-        self.words(*at, "\n".join(words), **style)
-
-    # -- the drive
-
-    def _drive(self) -> None:
-        drive = self.machine.drive
-        body = drive.driven()
-        if body is None:
-            return
-        place = self.places[body]
-        speed = shown(float(drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
-        late = f"\n{shown(float(drive.lateness()), 's')} late" if drive.lateness() else ""
-        top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.storeys
-        box = (place.x - 1.0, top), 2.0, 0.75
+    def gouge(self, x: float, y: float, wide: float, high: float) -> None:
         self.ax.add_patch(
-            FancyBboxPatch(*box, boxstyle="round,pad=0.02,rounding_size=0.08", facecolor="white", edgecolor=BLUE)
+            Rectangle((x, y), wide, high, facecolor="white", edgecolor=COLORS[PALE], hatch="---", linewidth=0)
         )
-        self.words(place.x, top + 0.375, f"{drive.name}, {speed}{late}", color=BLUE)
-        roof = place.y + (_HIGH / 1.7 if self.machine.bodies[body].turns else _HIGH / 2)
-        self.arrow((place.x - 0.2, top), (place.x - 0.2, roof + 0.02))
-        for i, seen in enumerate(dict.fromkeys(drive.watched())):
-            self._measured(seen, seen == body, place, top, i, drive)
 
-    def _measured(self, seen: str, own: bool, place: _Place, top: float, i: int, drive: Any) -> None:
-        other = self.places[seen]
-        roof = other.y + (_HIGH / 1.7 if self.machine.bodies[seen].turns else _HIGH / 2)
-        first, second = drive.watched()
-        what = "measured" if first == second else "place" if seen == first else "speed"
-        style = {"color": BLUE, "linewidth": 1.2, "linestyle": (0, (3, 2)), "mutation_scale": 9}
-        if own:
-            self.arrow(
-                (place.x - 0.55, roof - (0.14 if self.machine.bodies[seen].turns else 0)),
-                (place.x - 0.55, top),
-                **style,
-            )
-            self.words(place.x - 0.65, (roof + top) / 2, what, color=BLUE, ha="right")
-            return
-        x, y = other.x - 0.75, top + 0.2 + 0.25 * i
-        self.line((x, roof), (x, y), **{k: v for k, v in style.items() if k != "mutation_scale"})
-        self.arrow((x, y), (place.x + math.copysign(1.05, x - place.x), y), **style)
-        self.words((x + place.x) / 2 + 0.5, y + 0.06, what, color=BLUE, va="bottom")
-
-
-def _places(machine: Machine) -> dict[str, _Place]:
-    """A row of bodies in the order in which links lead away from the drive.
-
-    What only rests on the ground and is slid on by another body stands below or above that.
-    """
-    ties = [link.between for link in machine.links.values() if GROUND not in link.between]
-    order = [machine.drive.driven() or LOAD_POINT]
-    for one in order:  # grows while it is gone through
-        for tie in ties:
-            order += [end for end in tie if one in tie and end not in order]
-    row = [name for name in order if name in machine.bodies]
-    partner: dict[str, str] = {}
-    for touch in machine.contacts.values():
-        for end, other in ((touch.against, touch.body), (touch.body, touch.against)):
-            if end in machine.bodies and end not in row and other in row:
-                partner.setdefault(end, other)
-    row += [name for name in machine.bodies if name not in row and name not in partner]
-    found = {name: _Place(i * _ACROSS, 0.0) for i, name in enumerate(row)}
-    count: dict[str, int] = {}
-    for name, other in partner.items():
-        i = count[other] = count.get(other, 0) + 1
-        found[name] = _Place(found[other].x, _UP * ((i + 1) // 2) * (-1 if i % 2 else 1))
-    return {name: found[name] for name in machine.bodies}
+    def frame(self, x: float, y: float, wide: float, high: float) -> None:
+        style = "round,pad=0.02,rounding_size=0.08"
+        self.ax.add_patch(FancyBboxPatch((x, y), wide, high, boxstyle=style, facecolor="white", edgecolor=BLUE))

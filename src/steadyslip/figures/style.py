@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from steadyslip.core.quantities import outside, shown, unit
+from steadyslip.core.quantities import outside, printed as printed, shown, unit
 
 # Okabe & Ito (2008): told apart with every common kind of colour vision
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
@@ -65,11 +64,6 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     name = shown(typical, si_unit, area=area).partition(" ")[2]
     factor = (unit(name)[0] if name else 1.0) / outside(si_unit, area)[0]
     return factor, printed(name)
-
-
-def printed(text: str) -> str:
-    """Words with units as they are set in print: µm, m²."""
-    return re.sub(r"(?<![A-Za-z])um(?![A-Za-z])", "µm", text.replace("^2", "²").replace("^3", "³"))
 
 
 def labelled(name: str, unit_name: str) -> str:

@@ -5,7 +5,7 @@ import { ABSENT, UNKNOWN } from "./linear.js";
 import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
 import { shown, unitIn } from "./quantities.js";
-import { Sketch } from "./sketch.js";
+import { MachineSketch, Sketch } from "./sketch.js";
 import { outcome, quantity } from "./words.js";
 
 /** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; those of the phase plane */
@@ -27,13 +27,14 @@ export class Course {
   constructor(page, library) {
     this.page = page;
     const { motion, still, sketch } = page.rig.data;
+    if (motion) motion.parameters ??= page.rig.data.facts.parameters;
     this.mover = motion && new Mover(library, motion);
     this.box = make("section", { className: "motion", "aria-label": "motion" }, make("h2", { textContent: "What does it do?" }));
     this.told = make("p", { className: "told", role: "status" });
     this.done = make("p", { className: "hint" }); // to the rig, and when
-    this.sketch = /** @type {any} */ (sketch ? new Sketch(sketch) : null);
+    this.sketch = /** @type {any} */ (page.rig.data.phrases ? new MachineSketch(sketch, motion?.bodies ?? []) : new Sketch(sketch));
     if (!this.mover) {
-      this.box.append(make("p", { className: "told", textContent: `No motion on this page: ${still}.` }), ...(this.sketch ? [this.sketch.canvas] : []));
+      this.box.append(make("p", { className: "told", textContent: `No motion on this page: ${still}.` }), this.sketch.canvas);
       return;
     }
     this.build();
@@ -44,7 +45,7 @@ export class Course {
     this.size = make("input", { type: "text", "aria-label": "size of the disturbance", size: 9 });
     this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself" });
     this.halt = make("button", { type: "button", textContent: "stop", disabled: true, onclick: () => this.mover.stop() });
-    const { contacts, bodies, shares } = this.page.rig.data.motion, named = [...contacts, ...bodies.map(([name]) => name)].filter(Boolean);
+    const { motion } = this.page.rig.data, { contacts, bodies, shares } = motion, named = [...contacts, ...bodies.map(([name]) => name)].filter(Boolean);
     this.on = make("select", { "aria-label": "where it acts", onchange: () => this.forget() });
     this.where = make("label", {}, "on ", this.on);
     this.view = make("select", { "aria-label": "contact or body", onchange: () => this.draw() }, ...named.map((name, n) => make("option", { value: String(n), textContent: `${n < contacts.length ? "contact" : "body"} ${name}` })));
@@ -76,7 +77,7 @@ export class Course {
     this.box.append(
       make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), this.where, make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt),
       this.told, this.done, make("p", { className: "pick" }, this.shown), this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
-      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), ...(this.sketch ? [make("figure", {}, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)] : [])), this.list);
+      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", { className: motion.bodies.length ? "wide" : "" }, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)), this.list);
   }
 
   /** Something else is done to the rig: sizes and curves are not those of before. */
@@ -196,7 +197,7 @@ export class Course {
     this.phase.setAttribute("aria-label", `${now.shown[up][2]} over ${now.shown[across][2]}`);
     this.phase.replaceChildren(drawn.group, this.mark);
     this.now = { ...now, strips, ups: parts.map((part) => part.up), drawn };
-    this.sketch?.take(course);
+    this.sketch.take(course);
     this.table();
     this.show(Number(this.time.value) / 1000 || 0);
   }
@@ -244,7 +245,7 @@ export class Course {
     });
     this.mark.setAttribute("cx", (PLANE.left + drawn.across.of(between(series[across][0])) * PLANE.width).toFixed(1));
     this.mark.setAttribute("cy", (PLANE.top + (1 - drawn.up.of(between(series[up][0]))) * PLANE.height).toFixed(1));
-    this.sketch?.place(between, this.course);
+    this.sketch.place(between, this.course);
     const now = series.map(([values, unit, label]) => (unit === "1" ? `friction ${between(values).toPrecision(4)}` : `${label === "ahead" ? "ahead by " : ""}${shown(between(values), unit, unit === "N" || unit === "Pa" ? 4 : 3)}`));
     this.reading.textContent = `${shown(at, "s")}: ${now.join(", ")}`;
   }

@@ -70,7 +70,7 @@ export function digits(value, many = 4) {
 export function display(value, si) {
   if (si === "1") return [1, ""];
   if (si === "rad") return [Math.PI / 180, "deg"];
-  const first = /^(Pa|N|m|s)(?![a-z])/.exec(si), size = Math.abs(value);
+  const first = /^(Pa|N|m|s)(?![a-z^])/.exec(si), size = Math.abs(value);
   if (si === "s" && Number.isFinite(size)) for (const [factor, name] of LONG) if (size >= Math.max(600, 2 * factor)) return [factor, name];
   if (!first || !(size > 0) || !Number.isFinite(size)) return [1, si];
   const large = first[0] === "Pa" || first[0] === "N";

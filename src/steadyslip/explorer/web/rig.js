@@ -11,10 +11,13 @@ import { Linear, UNKNOWN } from "./linear.js";
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
+const USUAL = { factor: 1, low: null, high: null, lowAllowed: false, highAllowed: false, whole: false }; // unless a parameter says otherwise
+
 export class Rig {
   /** @param {Data} data @param {any} programs */
   constructor(data, programs) {
     this.data = data;
+    for (const one of data.parameters) Object.assign(one, { ...USUAL, ...one });
     this.linear = new Linear(programs, data.facts);
     this.values = data.parameters.map((one) => one.value);
     this.vector = new Float64Array(data.facts.parameters.length);

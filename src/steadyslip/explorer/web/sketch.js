@@ -31,8 +31,52 @@ export class Sketch {
   }
 
   stretch(part, shift) {
-    const [x1, y1, x2, y2] = part.dataset.ends.split(" ").map(Number), dx = x2 - x1 - shift, dy = y2 - y1;
-    const angle = (Math.atan2(dy, dx) * 180) / Math.PI;
-    part.setAttribute("transform", `translate(${x1 + shift} ${y1}) rotate(${angle}) scale(${Math.hypot(dx, dy)} 1)`);
+    const [x1, y1, x2, y2] = part.dataset.ends.split(" ").map(Number);
+    between(part, x1 + shift, y1, x2, y2, 1);
+  }
+}
+
+/** Put a link, drawn so many units long, between two points. */
+function between(part, x1, y1, x2, y2, unit) {
+  const dx = x2 - x1, dy = y2 - y1, angle = (Math.atan2(dy, dx) * 180) / Math.PI;
+  part.setAttribute("transform", `translate(${x1} ${y1}) rotate(${angle}) scale(${Math.hypot(dx, dy) / unit} 1)`);
+}
+
+const TURN = 40, LINK = 62; // degrees that a wheel turns at most; length that a link is drawn with
+
+/** The sketch of a machine: bodies shift and turn by as much as they are ahead of steady sliding. */
+export class MachineSketch {
+  caption = "The machine, as seen by who moves with it";
+  /** @type {number[]} */ gain = [];
+
+  /** @param {string} text drawn by steadyslip/explorer/machine_sketch.py @param {[string, string, number, number][]} bodies */
+  constructor(text, bodies) {
+    this.canvas = /** @type {any} */ (document.importNode(new DOMParser().parseFromString(text, "image/svg+xml").documentElement, true));
+    this.bodies = bodies.map(([name, unit]) => ({ name, turns: unit === "rad" }));
+    this.parts = [...this.canvas.querySelectorAll(".part")];
+    this.links = [...this.canvas.querySelectorAll(".link")];
+  }
+
+  /** @param {any} course */
+  take(course) {
+    const most = [0, 0]; // of what slides, of what turns
+    course.bodies.forEach(({ x }, n) => (most[Number(this.bodies[n].turns)] = x.reduce((a, b) => Math.max(a, Math.abs(b - x[0])), most[Number(this.bodies[n].turns)])));
+    const gain = [most[0] > 0 ? SHIFT / most[0] : 0, most[1] > 0 ? TURN / most[1] : 0];
+    this.gain = this.bodies.map(({ turns }) => gain[Number(turns)]);
+  }
+
+  /** @param {(series: any) => number} now @param {any} course */
+  place(now, course) {
+    const moved = /** @type {Record<string, number>} */ ({});
+    this.bodies.forEach(({ name }, n) => (moved[name] = this.gain[n] * (now(course.bodies[n].x) - course.bodies[n].x[0])));
+    for (const part of this.parts) {
+      const { body, turns } = part.dataset;
+      part.setAttribute("transform", turns ? `rotate(${moved[body]} ${turns})` : `translate(${moved[body] ?? 0} ${-(moved[`${body}.normal`] ?? 0)})`);
+    }
+    const wheels = new Set(this.parts.filter((part) => part.dataset.turns).map((part) => part.dataset.body)), shift = (name) => (wheels.has(name) ? 0 : moved[name] ?? 0);
+    for (const link of this.links) {
+      const [x1, y1, x2, y2] = link.dataset.ends.split(" ").map(Number), [one, other] = link.dataset.bodies.split(" ");
+      between(link, x1 + shift(one), y1 - shift(`${one}.normal`), x2 + shift(other), y2 - shift(`${other}.normal`), LINK);
+    }
   }
 }

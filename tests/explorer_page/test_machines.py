@@ -1,0 +1,55 @@
+"""Pages of machines in a browser: the sentence, the bar of any parameter, motion of named contacts and bodies."""
+
+from pathlib import Path
+
+import pytest
+
+import steadyslip as ss
+from explored_pages import Visit
+
+MACHINES = Path(__file__).parents[2] / "examples" / "machines"
+
+
+@pytest.fixture(scope="module")
+def page_of_servo(tmp_path_factory):
+    path = tmp_path_factory.mktemp("machines") / "servo.html"
+    machine = ss.read_rig(MACHINES / "geared-servo.toml")
+    ss.explore(machine, title="servo").save(path)
+    return machine, path
+
+
+def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
+    machine, path = page_of_servo
+    analysis = ss.analyze(machine)
+    with Visit(browser, path) as visit:
+        assert visit.sentence() == "Unstable: steady sliding at 20 µm/s"
+        reason = visit.page.locator(".verdict p").first.inner_text()
+        assert reason.lower() == f"{analysis.reason}.".lower()
+        assert analysis.mode.words() in visit.page.locator(".mode").inner_text()
+        bar = visit.page.locator(".bar").get_attribute("aria-label")
+        assert "drive.kp" in bar
+        assert "above 436.2 kN/m" in bar
+        visit.page.get_by_label("parameter of the bar").select_option("contacts.mesh.friction.a")
+        assert "above 0.02108" in visit.page.locator(".bar").get_attribute("aria-label")
+        visit.type("drive.kp", "1 N/um")
+        assert visit.sentence().startswith("Stable")
+        visit.page.get_by_role("button", name="undo").click()
+        assert visit.sentence().startswith("Unstable")
+        assert visit.page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+
+
+def test_a_machine_is_disturbed_where_one_says_and_shown_by_name(browser, page_of_servo):
+    _, path = page_of_servo
+    with Visit(browser, path) as visit:
+        visit.told("slip events .*of mesh.*of guide")
+        visit.page.get_by_label("disturbance", exact=True).select_option("pull")
+        visit.page.get_by_label("where it acts").select_option("load")
+        visit.page.locator(".motion .hint", has_text="pull on load").wait_for()
+        visit.page.get_by_label("contact or body").select_option(label="body load")
+        assert "ahead" in visit.page.locator("svg.strips").get_attribute("aria-label")
+        bodies = visit.page.locator(".sketch .part")
+        before = [bodies.nth(i).get_attribute("transform") for i in range(bodies.count())]
+        visit.page.get_by_label("time", exact=True).fill("700")
+        after = [bodies.nth(i).get_attribute("transform") for i in range(bodies.count())]
+        assert len(before) == 2
+        assert before != after

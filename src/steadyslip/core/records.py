@@ -177,9 +177,10 @@ def parameter(
     idle: float | None = None,
     standing: float | None = None,
     letter: str = "",
+    elsewhere: tuple[str, ...] = (),
 ) -> Any:
     """Declare a numeric parameter; ``default=None`` makes it optional, the rest is as in `Parameter`."""
-    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle)
+    role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere)
     return field(default=default, metadata={_ROLE: role})
 
 

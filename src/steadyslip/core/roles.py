@@ -123,6 +123,22 @@ class Total(float):
     """A number given for a whole contact, in N, N/m, ..., in place of one per unit area; it waits for the area."""
 
 
+class InUnit(float):
+    """A number (SI) from text whose unit only some rigs have, ``"0.05 rpm"``; it waits for the rig."""
+
+    unit: str
+
+    def __new__(cls, number: float, unit: str) -> InUnit:
+        """A number of a unit."""
+        found = super().__new__(cls, number)
+        found.unit = unit
+        return found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For copies in other processes."""
+        return InUnit, (float(self), self.unit)
+
+
 @dataclass(frozen=True)
 class Parameter(Value):
     """What a numeric field of a record means.
@@ -152,6 +168,8 @@ class Parameter(Value):
     idle : float or None
         Value at which the parameter, with the others of its own member of a list, does nothing: without it the law is
         a simpler one.
+    elsewhere : tuple of str
+        SI units that it has for rigs of other kinds: forces, angles.
     """
 
     unit: str
@@ -165,6 +183,7 @@ class Parameter(Value):
     standing: float | None = None
     letter: str = ""
     idle: float | None = None
+    elsewhere: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind and self.kind not in KINDS:
@@ -191,12 +210,16 @@ class Parameter(Value):
         return number
 
     def given(self, value: Any) -> float:
-        """What a constructor takes: as `checked`, or text for the whole of a contact, which is a `Total`."""
-        if isinstance(value, Total):
+        """What a constructor takes: as `checked`; or text, a `Total` or `InUnit` where its unit depends on the rig."""
+        if isinstance(value, (Total, InUnit)):
             return value
         try:
-            return self.checked(value)
+            number = self.checked(value)
+            return InUnit(number, self.unit) if self.elsewhere and isinstance(value, str) else number
         except ParameterError:
+            for unit in self.elsewhere if isinstance(value, str) else ():
+                with suppress(ParameterError):
+                    return InUnit(Parameter(unit, self.domain, self.doc).checked(value), unit)
             if isinstance(value, str) and is_per_area(self.unit):
                 with suppress(ParameterError):
                     return Total(Parameter(total_unit(self.unit), self.domain, self.doc).checked(value))

@@ -16,6 +16,7 @@ from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.runner import Runner, runner
+from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
@@ -213,7 +214,9 @@ def prepare(
         If the rig cannot move as asked, or the numbers of a single rig leave the range of floating point.
     """
     own = {name: value for name, value in vary.items() if not name.startswith("protocol.")}
-    plan = Protocol.of(protocol).varied({name: value for name, value in vary.items() if name not in own})
+    plan = in_units_of(rig, Protocol.of(protocol)).varied(
+        {name: value for name, value in vary.items() if name not in own}
+    )
     if branch and isinstance(rig, Machine):
         raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
     push, press = targets(rig, plan)

@@ -58,6 +58,9 @@ def event_names(rig: Rig) -> tuple[str, ...]:
     return tuple(f"{contact}.{_of_contact(name)}" for contact in rig.contacts for name in EVENT_UNITS)
 
 
+NORMAL_FORCE = ".normal_force"
+
+
 def _of_contact(name: str) -> str:
     """What a column is called where it is one of a contact's: its stresses are forces."""
     return name.replace("stress_drop", "force_drop")
@@ -108,11 +111,31 @@ class Ensemble(ReadOnly):
     def shape(self) -> tuple[int, ...]:
         return self.status_code.shape
 
+    @property
+    def contact(self) -> np.ndarray:
+        """Of machines, the contact that lifted off in runs that ended so; empty elsewhere.
+
+        Also where normal forces are not among the observables, which tell.
+        """
+        lost = self.status_code == WORDS.index("contact lost")
+        names = [name.removesuffix(NORMAL_FORCE) for name in self.final if name.endswith(NORMAL_FORCE)]
+        found = np.full(self.shape, "", dtype=object)
+        if names and np.any(lost):
+            forces = np.stack([self.final[name + NORMAL_FORCE] for name in names])
+            found[lost] = np.array(names, dtype=object)[np.argmin(forces, axis=0)][lost]
+        return np.asarray(read_only(found.astype(str)))
+
     def summary(self) -> str:
         """How many runs ended how."""
         codes, counts = np.unique(self.status_code, return_counts=True)
-        parts = [f"{count} {WORDS[code]}" for code, count in zip(codes, counts, strict=True)]
+        parts = [f"{count} {WORDS[code]}{self._lifted(code)}" for code, count in zip(codes, counts, strict=True)]
         return f"{self.status_code.size} runs: " + ", ".join(parts)
+
+    def _lifted(self, code: int) -> str:
+        """Which contacts lifted off, and how often."""
+        names, counts = np.unique(self.contact[self.status_code == code], return_counts=True)
+        told = [f"{name} {count}" for name, count in zip(names, counts, strict=True) if name]
+        return f" ({', '.join(told)})" if told else ""
 
     def __str__(self) -> str:
         return self.summary()
@@ -128,6 +151,8 @@ class Ensemble(ReadOnly):
             "steps": (dims, self.steps),
             "rejected": (dims, self.rejected),
         }
+        if np.any(self.contact != ""):
+            variables["contact"] = (dims, self.contact)
         variables |= {f"final_{n}": (dims, a, {"units": self.units[n]}) for n, a in self.final.items()}
         variables |= {f"event_{n}": (dims, a, {"units": event_unit(n)}) for n, a in self.events.items()}
         variables |= {n: ((*dims, "time"), a, {"units": self.units[n]}) for n, a in self.samples.items()}
@@ -281,7 +306,7 @@ class _Store:
     def __init__(
         self, jobs: Jobs, size: int, times: np.ndarray, observables: Sequence[str] | None, events: bool
     ) -> None:
-        self.units = observable_units(jobs.point.model)
+        self.units = observable_units(jobs.point.model, jobs.push)
         wanted = list(self.units) if observables is None else list(observables)
         problems = [
             Problem("observables", unknown_name("observable", name, self.units))

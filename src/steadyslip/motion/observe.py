@@ -10,6 +10,7 @@ import sympy as sp
 
 from steadyslip.core.questions import question
 from steadyslip.kernels.runner import Runner
+from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model import Model, OperatingPoint
 from steadyslip.motion.jobs import Jobs
 
@@ -23,16 +24,16 @@ EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "
                "disturbance": "Pa"}  # fmt: skip
 
 
-def observable_units(model: Model) -> dict[str, str]:
-    """Names and SI units of everything that a run can show."""
+def observable_units(model: Model, push: str = "") -> dict[str, str]:
+    """Names and SI units of everything that a run can show, whose disturbance acts on `push`."""
     if model.contacts[0].name:
-        return _machine_units(model)
+        return _machine_units(model, push)
     units = {"x": "m", "v": "m/s"} | EXTRA_UNITS
     units |= {name: unit for name, (_, unit) in model.observables.items()}
     return units | {m.name: m.unit for m in model.variables}
 
 
-def _machine_units(model: Model) -> dict[str, str]:
+def _machine_units(model: Model, push: str) -> dict[str, str]:
     """Of a machine: by body and by contact, in forces."""
     units: dict[str, str] = {}
     for one in model.coordinates:
@@ -46,7 +47,9 @@ def _machine_units(model: Model) -> dict[str, str]:
     for contact in model.contacts:
         units |= {f"{contact.name}.slip": "m", f"{contact.name}.slip_rate": "m/s"}
     unit = model.roles["drive.velocity"].unit.removesuffix("/s")
-    units |= {"load_displacement": unit, "load_velocity": f"{unit}/s", "disturbance": "N"}
+    pushed = unit if push == LOAD_POINT else next((one.unit for one in model.coordinates if one.name == push), "m")
+    disturbance = "N m" if pushed == "rad" else "N"
+    units |= {"load_displacement": unit, "load_velocity": f"{unit}/s", "disturbance": disturbance}
     units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}
     return units | {m.name: m.unit for m in model.variables if m.name not in units}
 

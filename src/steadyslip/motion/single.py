@@ -15,6 +15,7 @@ from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
+from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, OperatingPoint
@@ -99,7 +100,7 @@ def simulate(
     """
     most = most_steps or (OWN_STEPS if times is None else Options.most_steps)
     options = Options(method, rtol, most, arrest)
-    plan = Protocol.of(protocol)
+    plan = in_units_of(rig, Protocol.of(protocol))
     jobs = prepare(rig, plan, until, {}, initial or {}, options, branch)
     if not jobs.exists[0]:
         steady_state(rig)  # raises, and says why
@@ -161,7 +162,7 @@ def _history(
     lane = np.zeros(len(time), dtype=int)
     found = observe(jobs, machine, 0, lane, segment, time, points, outcome.tables)
     model = machine.reduction.model
-    units = {"t": "s"} | observable_units(model)
+    units = {"t": "s"} | observable_units(model, jobs.push)
     contacts = tuple(contact.name for contact in model.contacts)
     surfaces = _surfaces(jobs.point)
     events = events_of(outcome.log, contacts, surfaces)

@@ -21,6 +21,7 @@ from steadyslip.motion.events import ContactEvent, Event
 from steadyslip.motion.history import HistoryData
 from steadyslip.motion.observe import observable_units
 from steadyslip.motion.status import WORDS
+from steadyslip.motion.targets import targets
 
 RUN = FileKind("run", 3, 2**29, "simulate again and save the run anew")
 MOST_EVENTS = 10**6
@@ -117,7 +118,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     try:
         rig = rig_from_text(attributes["rig"], str(path))
         protocol = protocol_from_text(attributes["rig"], str(path)) or Protocol()
-        units = {"t": "s"} | observable_units(build_model(rig))
+        units = {"t": "s"} | observable_units(build_model(rig), targets(rig, protocol)[0])
     except SteadyslipError as error:
         raise table.fault(f"its rig is refused: {error}") from error
     columns = {"time" if name == "t" else name: ColumnRule(("time",), unit) for name, unit in units.items()}

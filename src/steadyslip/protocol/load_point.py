@@ -19,7 +19,7 @@ class VelocityStep(Piece, name="velocity-step"):
     """The load-point velocity changes at once and stays so."""
 
     at: float = parameter("s", nonnegative, "time of the step")
-    to: float = parameter("m/s", real, "velocity from then on")
+    to: float = parameter("m/s", real, "velocity from then on", elsewhere=("rad/s",))
 
     def curve(self, before: Any) -> Curve:
         return knots((self.at, before, self.to))
@@ -29,7 +29,7 @@ class VelocityRamp(Piece, name="velocity-ramp"):
     """The load-point velocity changes at a constant rate from its present value to another, and stays so."""
 
     at: float = parameter("s", nonnegative, "start of the ramp")
-    to: float = parameter("m/s", real, "velocity at its end")
+    to: float = parameter("m/s", real, "velocity at its end", elsewhere=("rad/s",))
     duration: float = parameter("s", positive, "duration of the ramp")
 
     def curve(self, before: Any) -> Curve:
@@ -83,7 +83,7 @@ class DisplacementStep(Piece, name="displacement-step"):
     """The load point jumps forward (or back) without time passing; its velocity goes on as before."""
 
     at: float = parameter("s", nonnegative, "time of the jump")
-    by: float = parameter("m", real, "displacement")
+    by: float = parameter("m", real, "displacement", elsewhere=("rad",))
 
     def jump(self) -> Jump:
         return Jump(column(self.at), column(self.by))
@@ -92,7 +92,7 @@ class DisplacementStep(Piece, name="displacement-step"):
 class VelocityHarmonic(Harmonic, name="velocity-harmonic"):
     """The load-point velocity oscillates: amplitude · sin(2π (t − at)/period + phase) is added to it."""
 
-    amplitude: float = parameter("m/s", real, "amplitude of the velocity")
+    amplitude: float = parameter("m/s", real, "amplitude of the velocity", elsewhere=("rad/s",))
 
 
 class LoadPointTable(Piece, name="load-point-table"):

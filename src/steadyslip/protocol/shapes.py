@@ -14,12 +14,15 @@ from steadyslip.core.roles import nonnegative, positive, real
 from steadyslip.protocol.curves import Curve, Wave, column, knots
 from steadyslip.protocol.protocol import Piece
 
+FORCES = ("N", "N m")
+"""What stresses are of a rig with an area, or of a machine."""
+
 
 class StressStep(Piece):
     """The stress changes at once and stays so."""
 
     at: float = parameter("s", nonnegative, "time of the step")
-    by: float = parameter("Pa", real, "change of the stress")
+    by: float = parameter("Pa", real, "change of the stress", elsewhere=FORCES)
 
     def curve(self, before: Any) -> Curve:
         return knots((self.at, 0, self.by))
@@ -29,7 +32,7 @@ class StressPulse(Piece):
     """The stress changes at once, and back after some time."""
 
     at: float = parameter("s", nonnegative, "start of the pulse")
-    by: float = parameter("Pa", real, "change of the stress")
+    by: float = parameter("Pa", real, "change of the stress", elsewhere=FORCES)
     duration: float = parameter("s", positive, "duration of the pulse")
 
     def curve(self, before: Any) -> Curve:
@@ -40,7 +43,7 @@ class StressRamp(Piece):
     """The stress changes at a constant rate for some time and stays so."""
 
     at: float = parameter("s", nonnegative, "start of the ramp")
-    by: float = parameter("Pa", real, "change of the stress in all")
+    by: float = parameter("Pa", real, "change of the stress in all", elsewhere=FORCES)
     duration: float = parameter("s", positive, "duration of the ramp")
 
     def curve(self, before: Any) -> Curve:
@@ -50,7 +53,7 @@ class StressRamp(Piece):
 class Harmonic(Piece):
     """A sine wave: amplitude · sin(2π (t − at)/period + phase) is added between `at` and `until`."""
 
-    amplitude: float = parameter("Pa", real, "amplitude of the stress")
+    amplitude: float = parameter("Pa", real, "amplitude of the stress", elsewhere=FORCES)
     period: float = parameter("s", positive, "period")
     at: float = parameter("s", nonnegative, "start", default=0.0)
     until: float | None = parameter("s", positive, "end; without it the wave goes on", default=None)

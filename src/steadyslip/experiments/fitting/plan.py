@@ -33,9 +33,11 @@ from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.kernels.experiment import experiment_program
 from steadyslip.laws.contact import pressed_at
+from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.scales import natural_scales
+from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
 
@@ -232,7 +234,12 @@ def make_plan(
         raise ParameterError(
             [Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
         )
-    plan_protocol = None if protocol is None else Protocol.of(protocol)
+    plan_protocol = None if protocol is None else in_units_of(rig, Protocol.of(protocol))
+    if plan_protocol is not None:
+        push, press = targets(rig, plan_protocol)
+        if push or press:
+            raise NotAvailable("fits are not offered for creep and injection; allowed: other pieces, that move the "
+                               "load point or change the normal stress")  # fmt: skip
     problems: list[Problem] = []
     known = _can_be_free(rig, plan_protocol)
     names = _default_free(rig) if free is None else _resolved("free", free, known, problems)

@@ -25,9 +25,9 @@ from steadyslip.core.records import (
 from steadyslip.core.roles import Parameter, Value, positive
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
 from steadyslip.files.specifications.toml import Table
+from steadyslip.machine.doing import TURNING, turns_on
 from steadyslip.machine.machine import Machine
-
-_TURNING = {"m": "rad", "m/s": "rad/s", "m/s^2": "rad/s^2"}
+from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
 
 class TableReader:
@@ -39,6 +39,9 @@ class TableReader:
         self.turning = False
         """Whether the load point turns, so that its ways are angles."""
         self.in_totals = False
+        self.machine: Machine | None = None
+        self.twisted = False
+        """Whether a torque is described in place of a force."""
 
     def problem(self, name: str, message: str) -> None:
         self.problems.append(Problem(name, message))
@@ -61,8 +64,10 @@ class TableReader:
     def _complete(self, law: type[FrozenRecord], table: Table, prefix: str) -> FrozenRecord | None:
         """Build a record; with bad values, still find what the others contradict."""
         before = len(self.problems)
+        before_it, self.twisted = self.twisted, self._twists(law, table)
         with self._own_area(law, table):
             arguments = self._arguments(law, table, prefix)
+        self.twisted = before_it
         if len(self.problems) == before:
             return self._built(law, arguments, prefix)
         if issubclass(law, Settings):
@@ -84,11 +89,20 @@ class TableReader:
     @contextmanager
     def of_machine(self, machine: Machine | None) -> Iterator[None]:
         """Read what is done to a machine: in forces, and in angles where its load point turns; None for a slider."""
-        outside = self.in_totals, self.turning
+        outside = self.in_totals, self.turning, self.machine
         if machine is not None:
-            self.in_totals, self.turning = True, machine.drive.turns
+            self.in_totals, self.turning, self.machine = True, machine.drive.turns, machine
         yield
-        self.in_totals, self.turning = outside
+        self.in_totals, self.turning, self.machine = outside
+
+    def _twists(self, law: type[FrozenRecord], table: Table) -> bool:
+        """Whether a piece of a protocol acts on what turns."""
+        if self.machine is None or not issubclass(law, Piece) or law.channel != DISTURBANCE:
+            return False
+        if law.frees_load_point:
+            return self.machine.drive.turns
+        on = table.get("on")
+        return turns_on(self.machine, on if isinstance(on, str) else None)
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
         """Tables by names that the user gives."""
@@ -142,7 +156,7 @@ class TableReader:
             elif is_required(item):
                 self.problem(prefix + key, _missing(role))
         for name in rest:
-            self.problem(prefix + name, unknown_name("key", name, keys))
+            self.problem(prefix + name, unknown_name("key", name, keys) + _key_of_another(law, name))
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
@@ -189,8 +203,9 @@ class TableReader:
     def outside(self, role: Parameter) -> Parameter:
         """A parameter in the unit in which it is described here."""
         if self.in_totals and self.area is None and is_per_area(role.unit):
-            return replace(role, unit=total_unit(role.unit))  # a contact without area is described in forces
-        return replace(role, unit=_TURNING[role.unit]) if self.turning and role.unit in _TURNING else role
+            unit = "N m" if self.twisted else total_unit(role.unit)  # a contact without area is described in forces
+            return replace(role, unit=unit)
+        return replace(role, unit=TURNING[role.unit]) if self.turning and role.unit in TURNING else role
 
     def _part(self, role: Part, raw: Any, name: str) -> Any:
         if role.keyed:
@@ -299,3 +314,18 @@ def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with
         if problem is not None and not any(math.isnan(number) for number in condition.numbers):
             found.append(problem)
     return found
+
+
+def _key_of_another(law: type[FrozenRecord], name: str) -> str:
+    """Which law of the same family a key belongs to, where the one that was chosen has none of that name."""
+    for base in law.__mro__:
+        registry = getattr(base, "registry", None)
+        if registry and has_choice(base) and law in registry.values():
+            known = [
+                word for word, other in registry.items() if name in (key_of(item) for item, _ in own_fields(other))
+            ]
+            if known and law not in (registry[word] for word in known):
+                words = " or ".join(f'"{word}"' for word in known[:3])
+                return f"; it is a key of {selector(base)[0]} = {words}"
+            return ""
+    return ""

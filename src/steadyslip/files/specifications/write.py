@@ -21,6 +21,7 @@ from steadyslip.files.specifications.layout import (
     sections,
     selector,
 )
+from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -64,7 +65,7 @@ def rig_to_text(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
         blocks.append(_table(f"[{section.name}]", record, first, section.name, area))
     if protocol is not None:
         own = 1.0 if isinstance(rig, Machine) else area  # in forces
-        blocks.append(_table(f"[{PROTOCOL.name}]", protocol, [], PROTOCOL.name, own))
+        blocks.append(_table(f"[{PROTOCOL.name}]", in_units_of(rig, protocol), [], PROTOCOL.name, own))
     return "\n".join(blocks)
 
 

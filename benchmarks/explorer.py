@@ -2,12 +2,15 @@
 
     python benchmarks/explorer.py verdicts [--first N]
     python benchmarks/explorer.py motion [--first N]
+    python benchmarks/explorer.py machines [--first N]
     python benchmarks/explorer.py speeds
 
 Each kind of rig is judged at its own numbers and with some of them changed; each is moved through a velocity step.
 Printed are the kinds that differ, how many there were, and the largest differences. Where a motion has other slip
 events than compiled, it counts as other unless their number changes in compiled kernels too as the stiffness does by a
 few units of its last place: friction that falls with velocity and forgets at once makes such motions.
+
+`machines` judges and moves machines of one to four bodies, drawn at random, on pages and in Python.
 
 `speeds` makes pages of examples, opens them in Chromium and prints every judged time beside its bar, on an idle
 machine: the command from the start, the verdict after opening, a redraw while sliders move (script, style, layout and
@@ -34,8 +37,9 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 import steadyslip as ss
 import users_laws
-from explored import Explored, compared
+from explored import Explored, ExploredMachine, MovedOnAPage, compared, differences, same_motion
 from fuzz_rigs import DRIVES, FRICTION
+from machines import at_random
 from moved import compiled_run, moved, slip_events
 from rigs_of_theory import CONTACTS
 from steadyslip.model.point import operating_point
@@ -131,6 +135,31 @@ def in_the_last_digits(rig: ss.Slider, protocol: Any, until: float, many: int = 
     return found
 
 
+def machines(first: int) -> None:
+    """Machines drawn at random: verdict, eigenvalues, mode in words, stable values of gain or stiffness; a motion."""
+    count = wrong = other = moved_ones = refused = 0
+    for seed in range(min(first, 2000)):
+        machine, _ = at_random(seed)
+        found = differences(ExploredMachine(machine), machine, machine.of_kind("stiffness")[:2])
+        count, wrong = count + 1, wrong + bool(found)
+        if found:
+            print(f"{seed}: {found}", flush=True)
+        try:
+            page = MovedOnAPage(machine)
+        except ss.NotAvailable:
+            refused += 1
+            continue
+        piece = ss.VelocityStep(at=1.0, to=2.0)
+        runs = [ss.simulate(machine, piece, until=8.0, rtol=rtol) for rtol in (1e-6, 1e-9)]
+        moved_ones += 1
+        try:
+            same_motion(page(machine, disturbance="velocity", size=2.0, at=1.0, until=8.0), runs, 8.0)
+        except AssertionError as apart:
+            other += 1
+            print(f"{seed}: motion, {str(apart)[:200]}", flush=True)
+    print(f"{count} machines: {wrong} judged otherwise; {moved_ones} moved, {refused} refused: {other} other motions")
+
+
 WATCH = """new MutationObserver((_, observer) => {
   if (!document.querySelector("h1")?.textContent) return;
   performance.mark("verdict");
@@ -161,7 +190,8 @@ SLIDE = """async () => {
   }
   return [script, drawn];
 }"""
-SHOWN = "inclined-spring", "stick-slip", "two-states", "slow-axis"
+SHOWN = ("inclined-spring", "stick-slip", "two-states", "slow-axis",
+         *(f"machines/{path.stem}" for path in sorted((EXAMPLES / "machines").glob("*.toml"))))  # fmt: skip
 
 
 def speeds(_: int) -> None:
@@ -179,7 +209,7 @@ def speeds(_: int) -> None:
     with driver() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
         for name in SHOWN:
-            written = folder / f"{name}.html"
+            written = folder / f"{Path(name).stem}.html"
             found("explore cold, s", _explored(name, written))
             found("size of the page, kB", written.stat().st_size / 1e3)
             for size, slower in (((1440, 900), 1), ((360, 740), 4)):
@@ -264,9 +294,9 @@ def _twenty_cycles() -> float:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("verdicts", "motion", "speeds"))
+    parser.add_argument("what", choices=("verdicts", "motion", "machines", "speeds"))
     parser.add_argument("--first", type=int, default=10**6, help="kinds of rig, of those drawn first")
     given = parser.parse_args()
     began = time.process_time()
-    {"verdicts": verdicts, "motion": motion, "speeds": speeds}[given.what](given.first)
+    {"verdicts": verdicts, "motion": motion, "machines": machines, "speeds": speeds}[given.what](given.first)
     print(f"{time.process_time() - began:.0f} CPU s")

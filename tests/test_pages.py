@@ -19,11 +19,12 @@ from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.standalone import write_page
+from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import math, table, typed
-from steadyslip.reports.results import LISTED, _told_apart
+from steadyslip.reports.results import LISTED, _told_apart, done_to
 from steadyslip.reports.rig import inputs
 
 MACHINES = Path(__file__).parents[1] / "examples" / "machines"
@@ -257,6 +258,24 @@ def test_documents_are_called_by_their_kind_and_file(results, tmp_path):
     for name, title in (("run", "Run"), ("press 4", "Run: press 4")):
         write_page(results["history"], tmp_path / f"{name}.html", "Run", explorer=False)
         assert f"<title>{title} – steadyslip</title>" in (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_documents_of_runs_and_maps_give_the_hash_of_their_file(results, tmp_path):
+    file = tmp_path / "press.toml"
+    file.write_bytes(b"# the file\n")
+    write_history(results["history"], tmp_path / "run.html", source=file)
+    assert hashlib.sha256(b"# the file\n").hexdigest() in (tmp_path / "run.html").read_text(encoding="utf-8")
+    assert "SHA-256 of press.toml" in (tmp_path / "run.html").read_text(encoding="utf-8")
+
+
+def test_what_was_done_to_a_rig_is_told_in_units_that_people_read():
+    plan = ss.Protocol.of([ss.VelocityStep(at=10.0, to=2e-6), ss.Hold(at=20.0, duration=7200.0)])
+    text = "".join(done_to(rig(), plan))
+    assert "at 10 s, to 2 µm/s" in text
+    assert "duration 2 h" in text
+    turning = ss.read_rig(MACHINES / "telescope.toml")
+    assert "to 0.05 rad/s" in "".join(done_to(turning, ss.Protocol.of([ss.VelocityStep(at=1.0, to=0.05)])))
 
 
 def test_lists_of_cycles_leave_out_what_reads_the_same():

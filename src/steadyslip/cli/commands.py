@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -299,7 +300,7 @@ def simulate(
         history,
         output or (),
         as_json,
-        lambda result, path: write_history(result, path, "phase" if phase else "history"),
+        partial(write_history, kind="phase" if phase else "history", source=rig),
     )
 
 
@@ -321,7 +322,7 @@ def cycles(
 
     check_output(output or (), ENDINGS)
     branch = cycles_of_file(rig, changes or (), along, between, doublings)
-    give(branch, output or (), as_json, write_branch)
+    give(branch, output or (), as_json, partial(write_branch, source=rig))
 
 
 @app.command()
@@ -355,7 +356,7 @@ def threshold(
     wanted = [path for path in output or () if not found.interrupted or path.suffix == ".html"]
     if len(wanted) < len(output or ()):
         typer.secho("stopped: the basin is not drawn", err=True)
-    give(found, wanted, as_json, write_thresholds)
+    give(found, wanted, as_json, partial(write_thresholds, source=rig))
 
 
 @app.command("map")
@@ -393,7 +394,7 @@ def map_(
     edge = refined(found, refine, **about, workers=workers, cluster=cluster) if refine else None
     others = [path for path in output or () if path.suffix != STORE]
     for path in others:
-        write_map(found, path, figure, edge)
+        write_map(found, path, figure, edge, source)
     if as_json:
         say_json(found.to_dict())
         return
@@ -422,7 +423,7 @@ def sensitivity(
 
     check_output(output or (), SHARES)
     found = sensitivity_file(rig, changes or (), of or (), points)
-    give(found, output or (), as_json, write_sensitivity)
+    give(found, output or (), as_json, partial(write_sensitivity, source=rig))
 
 
 @app.command()

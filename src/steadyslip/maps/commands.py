@@ -66,8 +66,12 @@ def _check_words(refine: bool, figure: Mapping[str, Any], edge: Mapping[str, Any
         raise ParameterError([Problem(f"--{name}", message) for name in idle])
 
 
-def write_map(found: MapResult, path: Path, options: Mapping[str, Any], edge: Refined | None = None) -> None:
-    """Write a map as netCDF, Parquet or figure, or a refined edge as text or figure, by the ending of the name.
+def write_map(
+    found: MapResult, path: Path, options: Mapping[str, Any], edge: Refined | None = None, source: Path | None = None
+) -> None:
+    """Write a map as netCDF, Parquet, document or figure, or a refined edge as text or figure, by the name's ending.
+
+    A document gives the hash of the `source`, the file that it was made of.
 
     Raises
     ------
@@ -78,7 +82,7 @@ def write_map(found: MapResult, path: Path, options: Mapping[str, Any], edge: Re
     """
     writers: dict[str, Any] = {".nc": found.to_netcdf, ".parquet": found.to_parquet}
     if edge is None:
-        writers[".html"] = lambda p: write_page(found, p, "Map")
+        writers[".html"] = lambda p: write_page(found, p, "Map", source=source)
     if edge is not None:
         writers[".csv"] = edge.to_csv
     write_by_ending(path, writers, lambda: found.plot(**options) if edge is None else edge.plot())
@@ -107,15 +111,17 @@ def sensitivity_file(
     return sensitivity(plan.rig, ranges, wanted or _suited(plan), points=points, protocol=plan.protocol)
 
 
-def write_sensitivity(found: Sensitivity, path: Path) -> None:
+def write_sensitivity(found: Sensitivity, path: Path, source: Path | None = None) -> None:
     """Write a document or draw the shares, by the ending of the name.
+
+    A document gives the hash of the `source`, the file that it was made of.
 
     Raises
     ------
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".html": lambda p: write_page(found, p, "Sensitivity")}
+    writers = {".html": lambda p: write_page(found, p, "Sensitivity", source=source)}
     write_by_ending(path, writers, found.plot)
 
 

@@ -110,8 +110,10 @@ def _starting_values(texts: Iterable[str]) -> dict[str, float]:
     return found
 
 
-def write_history(history: History, path: Path, kind: str = "history") -> None:
+def write_history(history: History, path: Path, kind: str = "history", source: Path | None = None) -> None:
     """Write a run as netCDF, as columns, as a document or as a figure, by the ending of the name.
+
+    A document gives the hash of the `source`, the file that the run was made of.
 
     Raises
     ------
@@ -121,6 +123,6 @@ def write_history(history: History, path: Path, kind: str = "history") -> None:
     writers = {
         ".nc": history.save,
         ".csv": history.to_csv,
-        ".html": lambda p: write_page(history, p, "Run"),
+        ".html": lambda p: write_page(history, p, "Run", source=source),
     }
     write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind), dtype=object)))

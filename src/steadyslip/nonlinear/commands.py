@@ -42,8 +42,10 @@ def cycles_of_file(
         return cycles(rig, along, between=between, doublings=doublings, progress=progress)
 
 
-def write_branch(branch: CycleBranch, path: Path) -> None:
+def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) -> None:
     """Write a branch as netCDF, as columns, as a document or as a figure, by the ending of the name.
+
+    A document gives the hash of the `source`, the file that it was made of.
 
     Raises
     ------
@@ -53,7 +55,7 @@ def write_branch(branch: CycleBranch, path: Path) -> None:
     writers = {
         ".nc": lambda p: write_dataset(branch.to_xarray(), p),
         ".csv": branch.to_csv,
-        ".html": lambda p: write_page(branch, p, "Cycles"),
+        ".html": lambda p: write_page(branch, p, "Cycles", source=source),
     }
     write_by_ending(path, writers, branch.plot)
 
@@ -116,14 +118,16 @@ def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any
     return Thresholds(rig, tuple(found), found[-1].interrupted)
 
 
-def write_thresholds(thresholds: Thresholds, path: Path) -> bool:
+def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = None) -> bool:
     """Write a document, or draw the basin of the same rig, by the ending; whether Ctrl-C cut the basin short.
+
+    A document gives the hash of the `source`, the file that it was made of.
 
     Raises
     ------
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".html": lambda p: write_page(thresholds, p, "Kicks")}
+    writers = {".html": lambda p: write_page(thresholds, p, "Kicks", source=source)}
     write_by_ending(path, writers, lambda: thresholds.basin.plot())
     return path.suffix.lower() != ".html" and thresholds.basin.interrupted

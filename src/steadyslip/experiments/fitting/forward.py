@@ -19,6 +19,7 @@ from steadyslip.motion.jobs import automatic_method
 
 Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
+LOOK = 0.3  # of the work of a step: to look up what is observed at a sample
 SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
 RICHER = 0.025  # more patience for each parameter: what a simpler model can follow, a richer one can
 _STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
@@ -197,7 +198,7 @@ class Forward:
             work(0, len(found), threading.Event())
         elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
             raise KeyboardInterrupt  # half of the runs would pass for runs that failed
-        self.effort.budget.spend(np.sum(taken, axis=1), 1 + chain.shape[1])
+        self.effort.budget.spend(np.sum(taken, axis=1) + LOOK * len(table.times), 1 + chain.shape[1])
         if found is not seen:
             seen[good] = found
         return seen

@@ -246,3 +246,16 @@ def test_tables_pass_through_every_sample():
     np.testing.assert_allclose(rows[1:, 0], rows[:-1, 1], rtol=1e-12)
     ends = rows[:, 5] + rows[:, 8] * (rows[:, 1] - rows[:, 0])
     np.testing.assert_allclose(ends[at_samples], pressed[1:], atol=1e-6)
+
+
+def test_a_sample_at_a_step_shows_what_comes_after_it():
+    rig = lab.rig(alpha=0.4)
+    steps = ss.Protocol(
+        pieces=(ss.VelocityStep(at=20.0, to=3e-6), ss.NormalStressStep(at=50.0, by=5e5)), until=80.0
+    )  # fmt: skip
+    plan, columns = plan_of(rig, steps, count=81, protocol=steps)
+    assert {20.0, 50.0} <= set(columns["time"])
+    _, z = truth(plan, rig)
+    seen, _ = replace(plan, rtol=1e-9).comparison().model(z[None])
+    np.testing.assert_allclose(seen[0], columns["friction"], rtol=0, atol=2e-9)
+    assert columns["friction"][50] < columns["friction"][49] - 0.02

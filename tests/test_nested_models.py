@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import lab_records as lab
 import steadyslip as ss
+from steadyslip.experiments.fitting import search
 from steadyslip.experiments.fitting.nested import simpler
 from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.search import in_order, ordered
 from steadyslip.experiments.fitting.starts import features_of, starting_points
+from steadyslip.experiments.numerics.least_squares import Minima
 
 ALLOWED = 1 + 1e-7  # what a converged search may leave
 
@@ -25,10 +31,24 @@ def two():
     return ss.Slider(friction=law, contact=rig.contact, stiffness=1e10, drive=rig.drive)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_two_states_and_one(seed):
     """A record of one state: the second is worth nothing, which a search from outside need not find."""
     record = made(lab.STEP, seed)
+    assert ss.fit(two(), record, starts=8).ssq <= ss.fit(ss.lab_rig(), record).ssq * ALLOWED
+
+
+def test_a_search_that_ends_badly_is_led_on_by_the_simpler_model(monkeypatch):
+    """Searches find the best minimum of all records tried here by themselves; one is made to miss it."""
+    record, whole = made(lab.STEP), search._Search.polished
+
+    def missed(self):
+        found = whole(self)
+        if "friction.states.2.b" not in self.plan.free:
+            return found
+        return replace(found, coordinates=found.coordinates + 0.05, ssq=100 * found.ssq)
+
+    monkeypatch.setattr(search._Search, "polished", missed)
     assert ss.fit(two(), record, starts=8).ssq <= ss.fit(ss.lab_rig(), record).ssq * ALLOWED
 
 
@@ -108,8 +128,31 @@ def test_a_time_at_the_end_of_its_window_stops_no_fit():
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_the_valley_that_catches_most_starts():
-    """Half a minute of basalt, two states: nearly all starts end in a degenerate valley at 1.8755e-3."""
+def test_two_states_of_half_a_minute_of_basalt():
+    """The best minimum, beside a degenerate valley at 1.8755e-3 in which nearly all starts used to end."""
     spec = ss.read_spec("examples/fits/basalt.toml")
     record = spec.read("examples/data/basalt_b819_velocity_step.txt").between(11650, 11700)
     assert ss.fit(two(), record, trend=1, starts=6).ssq == pytest.approx(1.85867e-3, rel=1e-4)
+
+
+def test_states_are_put_in_order_only_where_that_changes_nothing():
+    """A motion that amplifies its rounding may end otherwise with the states exchanged: a fit then stays as it is."""
+    space = make_plan(two(), made(lab.STEP)).space()
+    z = np.zeros((1, len(space)))
+    names = [one.name for one in space.unknowns]
+    long, short = (names.index(f"friction.states.{k}.d_c") for k in (1, 2))
+    z[0, long], z[0, short] = -9.0, -12.0
+    found = replace(Minima.at(z), ssq=np.array([2.0]))
+    rising = ordered(z, space)[0]
+    assert rising[long] < rising[short]
+
+    def compared(slope):
+        def residuals(_):
+            return np.array([[1.0, 1.0]]), np.full((1, len(space), 2), slope)
+
+        return SimpleNamespace(space=space, residuals=residuals)
+
+    np.testing.assert_array_equal(in_order(compared(np.nan), found)[0], z[0])
+    best, ssq = in_order(compared(0.5), found)
+    np.testing.assert_array_equal(best, rising)
+    assert ssq == 2.0

@@ -1,12 +1,17 @@
 """Velocities, frictions and accelerations that are found together at every moment, against equations typed by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import root
 
 import steadyslip as ss
-from machines import rate_state, surface
+from machines import at_random, rate_state, surface
 from moving_machines import aging, agree, radau, slopes_of_motion
+from steadyslip.kernels.newton import eliminated
+from steadyslip.kernels.nodes import Program
+from steadyslip.kernels.printers import python as plain
 
 TIMES = np.linspace(0.0, 8.0, 33)
 FINE = {"rtol": 1e-9, "times": TIMES, "until": 8.0}
@@ -247,3 +252,47 @@ def test_a_lane_moves_as_a_run_alone():
     )
     alone = ss.simulate(two_smooth(), ss.DisturbanceStep(at=1.0, by=0.3, on="two"), times=TIMES, until=8.0)
     assert many.samples["first.slip_rate"][2] == pytest.approx(alone["first.slip_rate"], rel=1e-12)
+
+
+PLACES = {
+    "full": {(i, k) for i in range(3) for k in range(3)},
+    "nothing on the diagonal": {(0, 1), (1, 2), (2, 0), (0, 2)},
+    "a chain": {(0, 0), (0, 1), (1, 0), (1, 1), (1, 2), (2, 1), (2, 2)},
+    "apart": {(0, 0), (1, 1), (2, 2)},
+}
+
+
+@pytest.mark.parametrize("places", PLACES)
+def test_equations_are_eliminated_in_programs(places):
+    random = np.random.default_rng(1)
+    matrix, right = random.normal(size=(3, 3)), random.normal(size=3)
+    matrix[0, 0] *= 1e-9  # no pivot
+    matrix = np.where([[(i, k) in PLACES[places] for k in range(3)] for i in range(3)], matrix, 0.0)
+    program = Program("solve")
+    entries = {(i, k): program.load(3 * i + k) for i, k in PLACES[places]}
+    for k, value in enumerate(eliminated(entries, [program.load(9 + i) for i in range(3)])):
+        program.store(k, value, "y")
+    found, expected = np.zeros(3), np.linalg.solve(matrix, right)
+    plain.function(program)(np.append(matrix.ravel(), right), 0.0, found)
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(24))
+def test_machines_at_random_on_laws_that_go_through_rest(seed):
+    """Every second one without mass: up to three velocities to be found together."""
+    machine = at_random(seed)[0]
+    contacts = {
+        name: replace(one, friction=replace(one.friction, regularised=True)) for name, one in machine.contacts.items()
+    }
+    light = {name: ss.SlidingBody() for name in machine.bodies} if seed % 2 else {}
+    machine = replace(machine, contacts=contacts, bodies={**machine.bodies, **light})
+    jacobian, rates, _ = slopes_of_motion(machine)
+    if not np.all(np.isfinite(rates)):
+        with pytest.raises(ss.NoSteadySliding):
+            ss.steady_state(machine)
+        return
+    found, wanted = np.linalg.eigvals(jacobian), ss.eigenvalues(machine)
+    assert len(found) == len(wanted)
+    for s in wanted:
+        assert np.min(np.abs(found - s)) < 1e-7 * np.max(np.abs(wanted))

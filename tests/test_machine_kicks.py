@@ -119,3 +119,14 @@ def test_kicks_that_cannot_be_are_refused():
     with pytest.raises(ss.ParameterError, match="'table' has no mass"):
         ss.threshold(weak(), "velocity", at="table")
     assert ss.threshold(two_mass(kp=1.0), "velocity").outcome == "unstable"
+
+
+def test_the_verdict_tells_kicks_of_bodies():
+    found = ss.analyze(two_mass(kp=1.0), kick=("force at table", "velocity"))
+    assert [(one.kick, one.at, one.unit) for one in found.kicks] == [("force", "table", "N"), ("velocity", "", "m/s")]
+    assert str(found).count("a kick") == 2
+    assert found.to_dict()["kicks"][0]["at"] == "table"
+    with pytest.raises(ss.ParameterError, match="name the body"):
+        ss.analyze(two_mass(kp=1.0), kick="force")
+    with pytest.raises(ss.NotAvailable, match="one steady sliding"):
+        ss.analyze(two_mass(), branch=1)

@@ -81,8 +81,9 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     branch : int
         Which steady sliding to judge where there are several, by rising normal stress.
     kick : str or sequence of str
-        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived; on a terminal
-        progress is shown. Ctrl-C leaves the kinds that were not begun out.
+        Kinds of kick, as for `steadyslip.threshold`, of which to find the smallest that is not survived; of machines
+        with the body or contact where it is, such as ``"force at table"``. On a terminal progress is shown; Ctrl-C
+        leaves the kinds that were not begun out.
 
     Returns
     -------
@@ -94,13 +95,12 @@ def analyze(rig: Slider | Machine, *, branch: int = 0, kick: str | Sequence[str]
     ParameterError
         If `rig` is neither a Slider nor a Machine.
     NotAvailable
-        If `branch` does not exist, kicks are asked for of a machine, or the numbers of the rig leave the range of
-        floating point.
+        If `branch` does not exist, or the numbers of the rig leave the range of floating point.
     """
     if isinstance(rig, Machine):
-        if branch or kick:
-            raise NotAvailable("branches and kicks are not offered for a machine yet; its verdict is, without them")
-        return analyze_machine(rig)
+        if branch:
+            raise NotAvailable("a machine has one steady sliding: leave the branch out")
+        return analyze_machine(rig, (kick,) if isinstance(kick, str) else tuple(kick))
     if not isinstance(rig, Slider):
         raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider or a Machine, such as read_rig gives")])
     return _analyze_slider(rig, branch, (kick,) if isinstance(kick, str) else tuple(kick))

@@ -35,7 +35,7 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
         "critical_axial_stiffness": analysis.critical_axial_stiffness,
         "stable_stiffness": [[low, _finite(high)] for low, high in analysis.stable_stiffness],
         **{name: value for name, value in common.items() if name not in ("boundaries", "warnings")},
-        "onset": None if analysis.onset is None else _onset(analysis.onset, analysis.rig.area),
+        "onset": None if analysis.onset is None else onset_dict(analysis.onset),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
         "boundaries": common["boundaries"],
         "warnings": common["warnings"],
@@ -70,7 +70,9 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
     }
 
 
-def _onset(onset: Onset, area: float | None) -> dict[str, Any]:
+def onset_dict(onset: Onset) -> dict[str, Any]:
+    """Plain data of an onset; of a machine with the contact to which amplitudes refer."""
+    own = {"contact": onset.contact} if onset.contact else {}
     return {
         "kind": onset.kind,
         "parameter": onset.along,
@@ -80,7 +82,8 @@ def _onset(onset: Onset, area: float | None) -> dict[str, Any]:
         "growth_slope": onset.growth_slope,
         "angular_frequency": onset.angular_frequency,
         "meaning": onset.meaning,
-    } | total(onset.value, onset.unit, area)
+        **own,
+    } | total(onset.value, onset.unit, onset.rig.area_of(onset.along))
 
 
 def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:

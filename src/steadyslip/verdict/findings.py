@@ -137,6 +137,10 @@ class MachineFindings(Verdict):
     growth_rate, period, damping_ratio, time_to_halve, time_to_double : float or None
         As for a slider.
     on_edge : bool
+    onset : Onset or None
+        Kind of onset at the nearest oscillatory edge of all parameters, None where there is none, or with a delay.
+    kicks : tuple of Threshold
+        Smallest kicks that are not survived, where asked for.
     margins : tuple of Margin
         Distance of each parameter to its nearest edge, the most critical first.
     warnings : tuple of str
@@ -145,3 +149,5 @@ class MachineFindings(Verdict):
     rig: Machine
     steady: SteadyMachine | None = None
     mode: Mode | None = None
+    onset: Onset | None = None
+    kicks: tuple[Threshold, ...] = ()

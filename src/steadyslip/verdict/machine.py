@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.linear import formula as linear_formula
@@ -19,13 +20,16 @@ from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import SteadyMachine, steady_machine
-from steadyslip.verdict.export import common_numbers
+from steadyslip.nonlinear.onset.hopf import Onset, onset_at
+from steadyslip.verdict.export import common_numbers, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.words import BEYOND, disturbance, headline, lines_of, margin_table
+from steadyslip.verdict.words import BEYOND, disturbance, headline, lines_of, margin_table, onset_words, survived
 
 if TYPE_CHECKING:
     import sympy as sp
+
+    from steadyslip.nonlinear.kicks.threshold import Threshold
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,7 +62,9 @@ class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
 def machine_facts(found: MachineAnalysis) -> list[tuple[str, str]]:
     """What is known of steady sliding, its disturbances and the leading mode: name and words."""
     rows = [("steady sliding", _sliding(found.steady)), ("a disturbance", disturbance(found))] if found.steady else []
-    return rows + ([("the mode", found.mode.words())] if found.mode else [])
+    rows += [("the mode", found.mode.words())] if found.mode else []
+    rows += [("onset", onset_words(found.onset))] if found.onset else []
+    return rows + [("a kick", survived(kick)) for kick in found.kicks]
 
 
 def machine_meaning(found: MachineAnalysis) -> list[str]:
@@ -69,7 +75,7 @@ def machine_meaning(found: MachineAnalysis) -> list[str]:
 _MEANING = "Stable means: small disturbances die out. A large enough kick may still start an oscillation."
 
 
-def analyze_machine(machine: Machine) -> MachineAnalysis:
+def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnalysis:
     """Verdict on a machine; see `steadyslip.analyze`."""
     from steadyslip import __version__
 
@@ -91,11 +97,34 @@ def analyze_machine(machine: Machine) -> MachineAnalysis:
             mode=mode_of(machine, point, complex(leading.real, abs(leading.imag))) if posed else None,
             on_edge=bool(on_edge(point)) or decided_by_rounding(point),
             margins=distances,
+            onset=None if point.model.delays else _onset(machine, distances),
+            kicks=_kicks(machine, kicks),
             warnings=_warnings(machine, steady),
             version=__version__,
             **numbers,
         )
     return replace(found, reason=_reason(found))
+
+
+def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:
+    """What happens at the oscillatory edge that is nearest, of all parameters."""
+    edges = [one.edge for one in distances if one.edge is not None]
+    nearest = next((edge for edge in edges if edge.kind == "oscillatory" and edge.stable != "neither"), None)
+    try:
+        return None if nearest is None else onset_at(machine, nearest)
+    except NotAvailable:  # lost in rounding
+        return None
+
+
+def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
+    """Those that are not survived, from words such as ``force at table``."""
+    found: tuple[Threshold, ...] = ()
+    if kinds:
+        from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
+    for words in kinds:
+        kick, _, at = words.partition(" at ")
+        found += thresholds_shown(machine, (kick.strip(),), at=at.strip() or None).found
+    return found
 
 
 PHRASES = {
@@ -164,7 +193,11 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
 
 def as_dict(found: MachineAnalysis) -> dict[str, Any]:
     """SI units, forces; numbers that do not exist, and infinite ones, are None."""
-    return common_numbers(found) | {"steady": _steady(found.steady), "mode": _mode(found.mode)}
+    return common_numbers(found) | {
+        "steady": _steady(found.steady), "mode": _mode(found.mode),
+        "onset": None if found.onset is None else onset_dict(found.onset),
+        "kicks": [kick.to_dict() for kick in found.kicks],
+    }  # fmt: skip
 
 
 def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:

@@ -156,11 +156,11 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
     if analysis.critical_axial_stiffness is not None:
         rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
     if analysis.onset is not None:
-        rows.append(("onset", _onset(analysis.onset)))
-    return rows + [("a kick", _survived(kick)) for kick in analysis.kicks]
+        rows.append(("onset", onset_words(analysis.onset)))
+    return rows + [("a kick", survived(kick)) for kick in analysis.kicks]
 
 
-def _onset(onset: Onset) -> str:
+def onset_words(onset: Onset) -> str:
     """The kind of onset and, on the stable side of a subcritical edge, what it means for this rig."""
     text = f"{onset.kind}: {_ONSETS[onset.kind]}"
     if not isinstance(onset.rig, Slider):
@@ -178,7 +178,7 @@ def _onset(onset: Onset) -> str:
     return f"{text}; this rig is too far from it to say how large it is" if math.isfinite(amplitude) else text
 
 
-def _survived(kick: Threshold) -> str:
+def survived(kick: Threshold) -> str:
     """A threshold in a few words."""
     if kick.size == 0:
         return "none is survived: steady sliding is unstable"

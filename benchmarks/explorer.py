@@ -259,7 +259,7 @@ def _slid(browser: Any, page: Path, size: tuple[int, int], slower: int) -> Any:
     session = tab.context.new_cdp_session(tab)
     session.send("Emulation.setCPUThrottlingRate", {"rate": slower})
     tab.goto(page.as_uri())
-    tab.wait_for_function("document.querySelector('.steadyslip').dataset.ready")
+    tab.wait_for_selector(".steadyslip[data-ready]")
     tab.wait_for_timeout(1500)
     found = tab.evaluate(OPENED), [np.array(one) for one in tab.evaluate(SLIDE)]
     tab.close()

@@ -34,7 +34,9 @@ class Visit:
         for what, hear in self._hears.items():
             self.page.on(what, hear)
         self.page.goto(path.as_uri() + link)
-        self.page.wait_for_function("[...document.querySelectorAll('.steadyslip')].every(e => e.dataset.ready)")
+        self.page.locator(".steadyslip[data-ready]").first.wait_for(state="attached")  # no code, which pages forbid
+        waiting = ".steadyslip-root:not([data-ready]), .steadyslip:not([data-ready])"
+        self.page.locator(waiting).first.wait_for(state="detached")
 
     def leave(self, whole=True):
         if self._idle is None or not whole:

@@ -2,10 +2,11 @@
 import { make, put, svg, tell } from "./dom.js";
 import { ABSENT } from "./linear.js";
 import { ticks } from "./plot.js";
-import { shown } from "./quantities.js";
-import { headline, kindBeyond, kindOf, machineReason, quantity, reason } from "./words.js";
+import { digits, display, shown } from "./quantities.js";
+import { headline, kindBeyond, kindOf, machineReason, reason } from "./words.js";
 
 const DECADE = Math.log(10); // on both sides of what is marked
+const ASUNDER = 1e3; // between marks that share a unit
 
 /** Marks or labels of a bar: class, place in per cent and text; only what is new is written. */
 function placed(box, rows, name) {
@@ -64,7 +65,7 @@ export class Banner {
   showBar(answer) {
     const { gain } = answer, own = answer.stiffness + gain; // a controller's gain counts as the sentence counts it
     const { phrases, parameters, area } = this.data, chosen = parameters[this.page.rig.bar];
-    const stiffness = (k) => (phrases ? shown(k * chosen.factor, chosen.unit) : quantity(k, "Pa/m", area));
+    const [per, si] = phrases ? [chosen.factor, chosen.unit] : area === null ? [1, "Pa/m"] : [area, "N/m"];
     if (answer.intervals === null || (phrases && !(own > 0))) {
       this.bar.hidden = true;
       put(this.bar, "aria-label", "it does not enter linearly here");
@@ -79,12 +80,14 @@ export class Banner {
       return;
     }
     this.bar.hidden = false;
+    const most = Math.max(...marks), [factor, name] = display(own * per, si), one = most < ASUNDER * Math.min(...marks);
+    const stiffness = (k) => (one ? `${digits((k * per) / factor)} ${name.replace("^2", "²")}`.trim() : shown(k * per, si)); // one unit on one bar, unless decades lie between
     const low = Math.log(Math.min(...marks)) - DECADE, high = Math.log(Math.max(...marks)) + DECADE;
     const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
     const least = gain > 0 ? `M0 0H${x(gain)}V10H0Z` : ""; // less than the gain alone is not to be had
     const drawn = `M0 0H100V10H0Z|${least}|${intervals.map((one) => `M${x(one.low)} 0H${x(one.high)}V10H${x(one.low)}Z`).join("")}`.split("|");
     this.paths.forEach((path, n) => put(path, "d", drawn[n]));
-    const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low)), per = phrases ? chosen.factor : area ?? 1;
+    const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low));
     const scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).map((k) => k / per).filter((k) => x(k) > 6 && x(k) < 94);
     const marked = [...scale.map((k) => ["tick", x(k), ""]), ["own", x(own), ""], ...ends.map((k) => ["edge", x(k), ""])];
     const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `${phrases ? "" : gain > 0 ? "gain" : "stiffness"}${gain > 0 && own > gain ? " and stiffness" : ""} now ${stiffness(own)}`.trim()],

@@ -104,6 +104,8 @@ def test_the_arrow_line_is_the_same_everywhere():
 # --- what is added in one file ----------------------------------------------------------------------
 
 ADDED = {"add-an-event": r"EVENTS = \(\n.*?\n(?=\))", "add-an-integrator": r"\Z"}
+EVERYTHING = "(at.tau - at.T) * at.sigma_low * at.sigma - at.acceleration * at.v_lp * at.v_low"
+OTHERS = {"add-an-event": f"    Watched('other', lambda at: {EVERYTHING}, rises='others'),\n"}
 
 
 @pytest.mark.parametrize("page", ADDED)
@@ -117,6 +119,7 @@ def test_what_a_page_adds_to_one_file_works(page, tmp_path):
     before = source.read_text(encoding="utf-8")
     place = re.search(ADDED[page], before, re.S)
     assert place, f"no place for it in {path}"
+    added += OTHERS.get(page, "")
     source.write_text(before[: place.end()] + added + before[place.end() :], encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-c", script], env=os.environ | {"PYTHONPATH": str(tmp_path / "src")}, capture_output=True,

@@ -186,7 +186,8 @@ class Step(Evaluator):
     def _events(self) -> Node:
         """Which functions of events changed sign; returns how many, where that is watched."""
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
-        moments = self.moments(self.here, self.outputs, self.h)
+        here = self.here | {f"y{i}": value for i, value in enumerate(self.new)}
+        moments = self.moments(here, self.outputs, self.h)
         count = as_node(0.0)
         for e, value in enumerate(self.marks(moments)):
             event, at = EVENTS[e % len(EVENTS)], moments[e // len(EVENTS)]

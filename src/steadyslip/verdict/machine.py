@@ -128,8 +128,8 @@ def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
 
 
 PHRASES = {
-    "ill-posed": "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls at "
-    "once by more than mass, direct effect and dampings provide, so any small lag grows at once",
+    "are ill-posed": "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls "
+    "at once by more than mass, direct effect and dampings provide, so any small lag grows at once",
     "on edge": "neither verdict should be relied on: the least change of a number decides",
     "dies out": "every small disturbance dies out",
     "nearest": "the nearest edge is that of {name}: {side} {value} {beyond}",
@@ -142,7 +142,7 @@ PHRASES = {
 def _reason(found: MachineAnalysis) -> str:
     """What grows, or how near the nearest edge is, in one sentence."""
     if found.growth_rate == math.inf:
-        return PHRASES["ill-posed"]
+        return PHRASES["are ill-posed"]
     if found.on_edge:
         return PHRASES["on edge"]
     first = next((one for one in found.margins if one.edge is not None), None)

@@ -54,7 +54,7 @@ export function machineReason(answer, { phrases, facts, areas }, edge) {
     if (!(answer.slope < 1)) return sentence(fill(absent["lock-up"], { at, margin: digits(1 - answer.slope) }));
     return sentence(fill(absent["lift-off"], { at, force: "force", load: force(answer.had), taken: force(answer.had - answer.load), left: force(answer.load) }));
   }
-  if (answer.illPosed) return sentence(phrases["ill-posed"]);
+  if (answer.illPosed) return sentence(phrases["are ill-posed"]);
   if (answer.onEdge) return sentence(phrases["on edge"]);
   const what = answer.status === STABLE ? phrases["dies out"] : phrases[answer.eigenvalues[0].im ? "oscillatory" : "divergence"];
   return sentence(edge ? `${what}; ${fill(phrases.nearest, { ...edge, beyond: phrases[edge.kind] })}` : what);

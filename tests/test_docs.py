@@ -101,6 +101,14 @@ def test_the_arrow_line_is_the_same_everywhere():
     assert arrow in " ".join(ss.__doc__.replace(" (`analyze`)", "").split())
 
 
+def test_the_table_of_folders_is_the_contract_of_imports():
+    text = (ROOT / "docs/explanation/how-it-works.md").read_text(encoding="utf-8")
+    table = text.partition("| folder | does not know |\n")[2].partition("\n\n")[0]
+    told = [" : ".join(re.findall(r"`([\w/]+)`", row.split("|")[1])) for row in table.splitlines()[1:]]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert told == project["tool"]["importlinter"]["contracts"][0]["layers"]
+
+
 # --- what is added in one file ----------------------------------------------------------------------
 
 ADDED = {"add-an-event": r"EVENTS = \(\n.*?\n(?=\))", "add-an-integrator": r"\Z"}

@@ -16,12 +16,14 @@ import numpy as np
 
 import steadyslip as ss
 from delays import some, spectral, winding
+from machine_onsets import compared
 from machines import at_random, same_block, three_bodies
 from moving_machines import slopes_of_motion
 from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.model import operating_point
 
+APART = 1e-3  # of the terms that a cubic coefficient is the sum of
 SINGULAR = 1e-8  # smallest over largest singular value of the matrix at an eigenvalue
 
 
@@ -54,6 +56,16 @@ def campaign(count, first):
             if not good:
                 print(f"seed {seed}: {s}")
     print(f"{count} random machines: {right} eigenvalues right, {wrong} wrong")
+
+
+def onsets(count, first):
+    """Cubic coefficients of random machines against differences of the rates that kernels integrate."""
+    found = [(seed, compared(seed)) for seed in range(first, first + count)]
+    told = [one for one in found if one[1] is not None]
+    wrong = [seed for seed, apart in told if apart > APART]
+    for seed in wrong:
+        print(f"seed {seed}: the coefficient of the onset differs")
+    print(f"{len(told)} onsets of {count} random machines: {len(wrong)} wrong")
 
 
 def motions(count, first):
@@ -141,6 +153,7 @@ if __name__ == "__main__":
     chosen = parser.parse_args()
     times()
     campaign(chosen.count, chosen.first)
+    onsets(chosen.count, chosen.first)
     delays(chosen.count, chosen.first)
     small_motions(chosen.count, chosen.first)
     motions(chosen.count, chosen.first)

@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import steadyslip as ss
+from machine_onsets import compared
 from machines import rate_state, same_block, surface, three_bodies, two_mass
 
 KP = "drive.kp"
@@ -205,3 +206,11 @@ def test_the_verdict_on_a_machine_tells_the_onset_at_its_nearest_edge():
     late = ss.analyze(two_mass(kp=4.0, kd=3.0).with_values({"drive.delay": 0.1}))
     assert late.onset is None
     assert late.to_dict()["onset"] is None
+
+
+@pytest.mark.campaign
+def test_random_machines_have_the_coefficients_of_their_motion():
+    """Massless bodies, several contacts, controllers: the equations as they stand against reduced rates in steps."""
+    found = [one for one in map(compared, range(12)) if one is not None]
+    assert len(found) >= 10
+    assert max(found) < 1e-3

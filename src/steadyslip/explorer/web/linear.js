@@ -100,7 +100,9 @@ export class Linear {
 
   /** The largest real gain with which contacts press on each other. */
   gain() {
-    const many = this.facts.contacts.length, real = roots(this.y.subarray(many, 2 * many + 1)).filter((s) => Math.abs(s.im) <= REAL * Math.hypot(s.re, s.im));
+    const many = this.facts.contacts.length;
+    if (this.y.subarray(many, 2 * many).every((one) => one === 0)) return 0; // one presses on the other, and that is all
+    const real = roots(this.y.subarray(many, 2 * many + 1)).filter((s) => Math.abs(s.im) <= REAL * Math.hypot(s.re, s.im));
     return real.reduce((most, s) => Math.max(most, s.re), -Infinity);
   }
 

@@ -4,6 +4,7 @@ import { make, put, tell } from "./dom.js";
 import { display, parse, shown } from "./quantities.js";
 import { inside } from "./rig.js";
 
+const ROOM = 15; // letters that a field has room for
 const STEPS = 1000, NEAR = 0.005, FAR = 0.05;
 const KEYS = { ArrowRight: NEAR, ArrowUp: NEAR, ArrowLeft: -NEAR, ArrowDown: -NEAR, PageUp: FAR, PageDown: -FAR };
 
@@ -37,7 +38,7 @@ export class Controls {
       page.slide(i, Number(slider.value) / STEPS + step, false);
     });
     text.addEventListener("change", () => this.typed(i, text.value, fault));
-    const name = make("span", { className: "name" }, make("b", { textContent: one.label.replace(/_/g, "_\u200b") }), " ", make("small", { textContent: one.doc }));
+    const name = make("span", { className: "name" }, make("b", { textContent: one.label.replace(/[_.]/g, "$&\u200b") }), " ", make("small", { textContent: one.doc }));
     return { box: make("div", { className: "row" }, name, text, slider, fault), slider, text, fault, name };
   }
 
@@ -59,7 +60,7 @@ export class Controls {
     const { rig, tracks } = this.page;
     this.rows.forEach(({ slider, text, fault, name }, i) => {
       const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = display(value * one.factor, one.unit);
-      const place = String(STEPS * this.page.scale(i).of(value)), words = `${Number(((value * one.factor) / factor).toPrecision(6))} ${unit.replace("^2", "²")}`.trim();
+      const place = String(STEPS * this.page.scale(i).of(value)), told = (many) => `${Number(((value * one.factor) / factor).toPrecision(many))} ${unit.replace("^2", "²")}`.trim(), words = told(told(6).length > ROOM ? 4 : 6);
       if (slider.value !== place) slider.value = place;
       put(slider, "aria-valuetext", shown(value * one.factor, one.unit));
       if (document.activeElement !== text || !fault.textContent) {

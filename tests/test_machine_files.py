@@ -221,11 +221,7 @@ def test_changes_that_are_wrong(change, said):
     assert "Traceback" not in done.stderr
 
 
-COMMANDS = [
-    ("cycles",), ("threshold",), ("explore", "-o", "a.html"),
-    ("map", "-o", "a.zarr"), ("sensitivity",), ("analyze", "--kick", "velocity"),
-    ("analyze", "--branch", "1"),
-]  # fmt: skip
+COMMANDS = [("analyze", "--branch", "1")]
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
@@ -239,10 +235,9 @@ def test_what_machines_do_not_have_yet_is_refused_in_one_line(command, tmp_path)
 
 
 CALLS = [
-    lambda m: ss.hopf(m),
-    lambda m: ss.cycles(m), lambda m: ss.threshold(m, kick="velocity"), lambda m: ss.critical_stiffness(m),
+    lambda m: ss.basin(m), lambda m: ss.tolerate(m, {"drive.kp": "5 %"}), lambda m: ss.critical_stiffness(m),
     lambda m: ss.stable_stiffness(m), lambda m: ss.small_signal(m), lambda m: ss.state_space(m),
-    lambda m: ss.formula(m), lambda m: ss.explore(m), lambda m: ss.safety_factor(m),
+    lambda m: ss.formula(m), lambda m: ss.safety_factor(m),
     lambda m: ss.steady_states(m),
 ]  # fmt: skip
 

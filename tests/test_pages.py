@@ -269,6 +269,18 @@ def test_documents_of_runs_and_maps_give_the_hash_of_their_file(results, tmp_pat
     assert "SHA-256 of press.toml" in (tmp_path / "run.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("unpainted")
+def test_documents_of_maps_begin_with_what_was_found(tmp_path):
+    settings = {"slider.stiffness": ss.Grid("5 GPa/m", "50 GPa/m", 5)}
+    found = ss.run_map(
+        ss.Map(rig(), settings, ["status", "safety_factor"]), tmp_path / "m.zarr", workers=1, progress=False
+    )
+    text = ss.report(found).html
+    stable = int(np.sum(np.linspace(5e9, 50e9, 5) > ss.critical_stiffness(rig())))
+    assert 0 < stable < 5
+    assert f"table at {20 * stable} %" in text.partition("<h1>")[2].partition("</h1>")[0]
+
+
 def test_what_was_done_to_a_rig_is_told_in_units_that_people_read():
     plan = ss.Protocol.of([ss.VelocityStep(at=10.0, to=2e-6), ss.Hold(at=20.0, duration=7200.0)])
     text = "".join(done_to(rig(), plan))

@@ -12,7 +12,7 @@ import numpy as np
 from steadyslip import figures
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import shown, shown_range
+from steadyslip.core.quantities import percent, shown, shown_range
 from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, predict
@@ -280,14 +280,22 @@ def _told_apart(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
 @parts_of.register
 def _map(result: MapResult) -> Parts:
     rig, (first, _, rest) = result.rig, str(result).partition("\n")
+    about, found = sentence(first).rstrip(".").replace(" x ", " × "), _verdicts(result)
     body = [
         *about_rig(rig),
         heading("The map"), *_words(rest),
         *_pictures(result),
     ]  # fmt: skip
     question = "How does the answer depend on the numbers that vary here?"
-    head = sentence(first).rstrip(".").replace(" x ", " × ")
-    return Parts(head, "", question, body, rig, of_rig.as_file(rig))
+    return Parts(found or about, f"{about}." if found else "", question, body, rig, of_rig.as_file(rig))
+
+
+def _verdicts(result: MapResult) -> str:
+    """How large a share of the points has each verdict, the largest first; empty where there is none."""
+    if "status" not in result.results:
+        return ""
+    shares = sorted(result.statistics()["status"].items(), key=lambda one: -one[1])
+    return sentence(", ".join(f"{word} at {percent(share)}" for word, share in shares) + " of the points").rstrip(".")
 
 
 def _pictures(result: MapResult) -> Iterator[str]:

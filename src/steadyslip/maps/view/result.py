@@ -13,7 +13,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import outside, shown, shown_range
+from steadyslip.core.quantities import outside, percent, shown, shown_range
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.store.arrays import Store
@@ -201,11 +201,11 @@ class MapResult(Displayed):
         width = max([24, *(len(name) + 2 for name in statistics)])
         for name, found in statistics.items():
             if self.words(name):
-                text = ", ".join(f"{word} {_percent(share)}" for word, share in found.items())
+                text = ", ".join(f"{word} {percent(share)}" for word, share in found.items())
             elif "low" in found:
                 low, high, unit, area = found["low"], found["high"], self.unit(name), self.area(name)
                 text = shown_range(low, high, unit, area) if low < high else shown(low, unit, area=area)
-                text += "" if found["share"] == 1 else f", for {_percent(found['share'])} of the points"
+                text += "" if found["share"] == 1 else f", for {percent(found['share'])} of the points"
             else:
                 text = "nowhere"
             if name in LINEAR and "status" not in self.results and found.get("share", 1) < 1:
@@ -259,10 +259,6 @@ class MapResult(Displayed):
     def plot(self, x: str | None = None, y: str | None = None, show: str | None = None, **options: Any) -> Any:
         """Draw it; see `steadyslip.figures.map_figure`."""
         return draw(self, x=x, y=y, show=show, **options)
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
 
 
 @checked()

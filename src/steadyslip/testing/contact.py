@@ -86,8 +86,9 @@ class _Statement:
         v, v0 = sp.symbols("v v_0", positive=True)
         k = sp.Symbol("k", nonnegative=True)
         apart = sp.symbols("u u_ss u_dot", real=True)
-        self.inputs = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0, *apart)
-        self.motion = Motion(*self.inputs)
+        outside = sp.Symbol("q", real=True)
+        self.inputs = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0, *apart, outside)
+        self.motion = replace(Motion(*self.inputs[:-1]), outside=outside)
         self.stress = stated(contact, "normal_stress", self.copy.normal_stress, self.motion)
         require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
 

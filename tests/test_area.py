@@ -171,7 +171,7 @@ def test_maps(rig, tmp_path):
     plan = Map(rig, over={"slider.stiffness": [1e10, 2e10, 4e10], "contact.preload": [1e6, 5e6]},
                compute=["critical_stiffness"])  # fmt: skip
     found = run_map(plan, tmp_path / "map.zarr", progress=False)
-    assert found.area == AREA
+    assert found.area("critical_stiffness") == AREA
     assert not PER_AREA.search(str(found).split("\n", 2)[2])
     data, plain = found.to_dict(), found.statistics()["critical_stiffness"]
     assert data["forces"]["statistics"]["critical_stiffness"] == pytest.approx(

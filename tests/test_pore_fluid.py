@@ -7,7 +7,6 @@ import pytest
 from scipy.linalg import eigvals
 
 import steadyslip as ss
-from machines import rate_state
 
 A, B, F0 = 0.01, 0.015, 0.6
 
@@ -102,11 +101,3 @@ def test_wet_layers_in_a_machine_of_several_bodies():
     text = ss.rig_to_text(both)
     assert ss.rig_from_text(text) == both
     assert "STABLE" in str(ss.analyze(both))
-
-
-def test_what_is_not_offered_says_so():
-    with pytest.raises(ss.ParameterError, match="describe it as a machine"):
-        ss.Slider(
-            friction=rate_state(1, 0, 1), contact=layer().contacts["layer"].contact, stiffness=1.0,
-            drive=ss.Steady(1.0),
-        )  # fmt: skip

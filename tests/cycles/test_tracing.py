@@ -26,7 +26,7 @@ def started(a_rig, **initial):
     """Jobs of one run of a rig, and the kernel's state at its start, at the drive's velocity."""
     one = np.ones(1)
     jobs = prepare(a_rig, None, 1.0, {}, initial, Options())
-    jobs = replace(jobs, segments=constant_inputs(one, one * a_rig.drive.velocity, 0 * one, 0 * one))
+    jobs = replace(jobs, segments=constant_inputs(one, one * a_rig.drive.velocity, 0 * one, 0 * one, 0 * one))
     state = np.zeros(Runs(jobs).size)
     state[0], state[2:] = jobs.initial[0][0], jobs.initial[0][2:]
     return jobs, state

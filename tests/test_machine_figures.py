@@ -118,6 +118,8 @@ def test_a_machine_has_a_document_with_its_sketch_and_its_picture(path, tmp_path
     for name in (*machine.bodies, *machine.links, *machine.contacts):
         assert name in text
     assert "NaN" not in text
+    onset = ss.analyze(machine).onset
+    assert onset is None or "<th>onset" in text or ">onset<" in text
     assert "<svg" in machine._repr_html_()
     assert "<svg" in ss.analyze(machine)._repr_html_()
 

@@ -150,5 +150,6 @@ def test_the_sketch_of_a_page_has_everything_that_moves(name):
     held = [tuple(sorted(end for end in link.between if end in machine.bodies)) for link in machine.links.values()]
     assert sorted(ends) == sorted(held)
     assert "nan" not in text
+    assert not re.search(r">[^<]*\d (k|M|G|µ|m)?(N|kg|m|rad)\b", text)  # numbers change on the page, not in the sketch
     for one in (*machine.bodies, *machine.links, *machine.contacts):
         assert one in text

@@ -318,6 +318,16 @@ def test_runs_have_documents(results):
     assert found.html.count("<figure>") == 3
 
 
+@pytest.mark.usefixtures("unpainted")
+def test_a_run_without_disturbance_says_that_it_tells_nothing_of_stability():
+    run = ss.simulate(rig(), until=10.0)
+    assert run.undisturbed
+    assert "<h1>Undisturbed" in ss.report(run, explorer=False).html
+    pushed = ss.simulate(rig(), ss.VelocityStep(at=1.0, to=2e-6), until=10.0)
+    assert not pushed.undisturbed
+    assert "<h1>Undisturbed" not in ss.report(pushed, explorer=False).html
+
+
 def test_what_is_no_result_has_no_document():
     with pytest.raises(ss.ParameterError, match="got int; allowed: a rig or a result"):
         ss.report(3)

@@ -120,10 +120,13 @@ class Pencil:
 
 
 class Drawing:
-    """Draws a machine with a pencil: motion is to the right, up is up; a body is `WIDE` and `HIGH`."""
+    """Draws a machine with a pencil: motion is to the right, up is up; a body is `WIDE` and `HIGH`.
 
-    def __init__(self, machine: Machine, pencil: Pencil) -> None:
-        self.machine, self.pencil = machine, pencil
+    Without `values` names alone are written, where numbers change beside the drawing.
+    """
+
+    def __init__(self, machine: Machine, pencil: Pencil, values: bool = True) -> None:
+        self.machine, self.pencil, self.values = machine, pencil, values
         self.places = _places(machine)
         self.pulled, self.around, self.storeys = False, 0, 0
 
@@ -137,13 +140,17 @@ class Drawing:
             self._contacts(name)
         self._drive()
 
+    def _told(self, name: str, value: str, between: str = "\n") -> str:
+        """A name, and its value where values are written."""
+        return f"{name}{between}{value}" if self.values else name
+
     # -- bodies and contacts
 
     def _body(self, name: str) -> None:
         body, place = self.machine.bodies[name], self.places[name]
         inertia = body.inertia_of()
         weighs = shown(inertia, "kg m^2" if body.turns else "kg") if inertia else "no mass"
-        text = f"{name}\n{weighs}"
+        text = self._told(name, weighs)
         if body.turns:
             for side in (-1, 1):
                 near, far = place.x + side * _HIGH / 1.7, place.x + side * _WIDE / 2
@@ -160,12 +167,14 @@ class Drawing:
             y, way = place.y + _HIGH / 2 + 0.22, math.copysign(0.7, along)
             x = place.x + (0.95 if self.machine.drive.driven() == name else 0.0)  # beside what the drive does
             self.pencil.arrow((x - way / 2, y), (x + way / 2, y), color=FORCED)
-            self.pencil.words(x, y + 0.2, shown(abs(along), "N m" if body.turns else "N"), color=FORCED, va="bottom")
+            size = shown(abs(along), "N m" if body.turns else "N") if self.values else "force"
+            self.pencil.words(x, y + 0.2, size, color=FORCED, va="bottom")
         if away:
             x, y = place.x + 0.6, place.y + _HIGH / 2
             start, end = ((x, y + 0.75), (x, y + 0.04)) if away < 0 else ((x, y + 0.04), (x, y + 0.75))
             self.pencil.arrow(start, end, color=FORCED)
-            self.pencil.words(x + 0.12, y + 0.6, shown(abs(away), "N"), color=FORCED, ha="left")
+            size = shown(abs(away), "N") if self.values else "force"
+            self.pencil.words(x + 0.12, y + 0.6, size, color=FORCED, ha="left")
 
     def _contacts(self, name: str) -> None:
         """What a body slides on: pads beside each other on ground or drive, or another body above or below."""
@@ -196,7 +205,7 @@ class Drawing:
         self.pencil.hatched(x - half, foot - 0.2, 2 * half, 0.2)
         if one.against == LOAD_POINT:
             self.pencil.arrow((x - 0.3, foot - 0.1), (x + 0.3, foot - 0.1))
-        self.pencil.words(x, foot - 0.28, f"{name}\n{self._load(name, one)}", va="top")
+        self.pencil.words(x, foot - 0.28, self._told(name, self._load(name, one)), va="top")
 
     def _interface(self, place: _Place, other: _Place, name: str, one: Surface) -> None:
         if abs(place.x - other.x) < 0.1 and abs(abs(place.y - other.y) - _UP) < 0.1:
@@ -205,13 +214,13 @@ class Drawing:
                 near = edge + math.copysign(_HIGH / 2, y - edge)
                 self.pencil.line((place.x - _WIDE / 2, near), (place.x + _WIDE / 2, near), linewidth=2.4)
             self.pencil.gouge(place.x - _WIDE / 2, y - (_UP - _HIGH) / 2, _WIDE, _UP - _HIGH)
-            self.pencil.words(place.x, y, f"{name}\n{self._load(name, one)}", paper=True)
+            self.pencil.words(place.x, y, self._told(name, self._load(name, one)), paper=True)
             return
         self.around += 1
         y = min(p.y for p in self.places.values()) - _HIGH / 2 - 0.85 - 0.35 * self.around
         ends = [(p.x - 0.6, p.y - _HIGH / 2) for p in (place, other)]
         self.pencil.line(ends[0], (ends[0][0], y), (ends[1][0], y), ends[1], dashed=True, color=PALE)
-        self.pencil.words((ends[0][0] + ends[1][0]) / 2, y, f"{name}, {self._load(name, one)}", paper=True)
+        self.pencil.words((ends[0][0] + ends[1][0]) / 2, y, self._told(name, self._load(name, one), ", "), paper=True)
 
     def _load(self, name: str, one: Surface) -> str:
         """What presses it, in a few words, and at which radius it rubs."""
@@ -327,9 +336,14 @@ class Drawing:
             begin = (x - 0.55, y + 0.58) if abs(along) > abs(up) else (x - 0.4, y + 0.2)
             self.pencil.arrow(begin, (begin[0] + 0.9, begin[1]))
             speed = shown(float(self.machine.drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
-            self.pencil.words(begin[0] + 0.45, begin[1] + 0.12, speed, color=DRIVEN, va="bottom")
+            self.pencil.words(
+                begin[0] + 0.45, begin[1] + 0.12, speed if self.values else "drive", color=DRIVEN, va="bottom"
+            )
 
     def _named(self, name: str, link: Link, at: tuple[float, float], **style: Any) -> None:
+        if not self.values:
+            self.pencil.words(*at, name, **style)
+            return
         known = self.machine.parameters()
         key = "stiffness" if link.rigidity() is not None else "damping"
         one = known[f"links.{name}.{key}"]
@@ -355,7 +369,7 @@ class Drawing:
         late = f"\n{shown(float(drive.lateness()), 's')} late" if drive.lateness() else ""
         top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.storeys
         self.pencil.frame(place.x - 1.0, top, 2.0, 0.75)
-        self.pencil.words(place.x, top + 0.375, f"{drive.name}, {speed}{late}", color=DRIVEN)
+        self.pencil.words(place.x, top + 0.375, self._told(drive.name, speed + late, ", "), color=DRIVEN)
         roof = place.y + (_HIGH / 1.7 if self.machine.bodies[body].turns else _HIGH / 2)
         self.pencil.arrow((place.x - 0.2, top), (place.x - 0.2, roof + 0.02))
         for i, seen in enumerate(dict.fromkeys(drive.watched())):

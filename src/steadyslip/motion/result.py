@@ -69,14 +69,19 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
         return "\n".join(lines)
 
+    @property
+    def undisturbed(self) -> bool:
+        """Whether nothing was done to steady sliding, which goes on then, be it stable or not."""
+        known = self.velocities.values() if isinstance(self.velocities, dict) else [self.velocities]
+        still = all(high - low <= STILL * abs(high) for low, high in known)
+        return not self.protocol.pieces and still and self.status == "done"
+
     def _caveats(self) -> list[str]:
         """What a reader must know to make no mistake about the run."""
         lines = []
         if self.protocol.frees_load_point:
             lines.append("drive           pulls with a force of its own; its motion does not hold anything back")
-        known = self.velocities.values() if isinstance(self.velocities, dict) else [self.velocities]
-        still = all(high - low <= STILL * abs(high) for low, high in known)
-        if not self.protocol.pieces and still and self.status == "done":
+        if self.undisturbed:
             lines.append("disturbance     none: steady sliding goes on, were it unstable too; analyze tells")
         return lines
 

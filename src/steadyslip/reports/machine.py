@@ -12,7 +12,7 @@ from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import MachineAnalysis
-from steadyslip.verdict.words import disturbance
+from steadyslip.verdict.machine import machine_facts
 
 
 def about(analysis: MachineAnalysis) -> Parts:
@@ -41,10 +41,7 @@ def _verdict(analysis: MachineAnalysis) -> Iterator[str]:
     """Steady sliding of every contact, what disturbances do, and the eigenvalues."""
     if analysis.steady is None:
         return
-    rows = [("a disturbance", disturbance(analysis))]
-    if analysis.mode is not None:
-        rows.append(("the mode", analysis.mode.words()))
-    yield table(rows)
+    yield table(row for row in machine_facts(analysis) if row[0] != "steady sliding")  # which has a table of its own
     contacts = [
         (name, shown(one.slip_rate, "m/s"), shown(one.normal_force, "N"), shown(one.friction_force, "N"),
          f"{one.friction:.4g}")

@@ -187,14 +187,21 @@ def _history(result: History) -> Parts:
         *about_rig(rig),
         heading("What was done to it"), *done_to(rig, result.protocol),
         heading("What it did"), *_words(result.summary()),
-        figure(drawn(lambda: figures.history(result), "history", 7.0), "Velocity, friction, normal stress."),
+        figure(drawn(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load(rig)}."),
         *plane,
         *_slips(result),
     ]  # fmt: skip
     slips = len(result.slip_events)
     head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {shown(result.end, 's')}"
+    if result.undisturbed:
+        head = "Undisturbed: steady sliding goes on, which does not tell whether it is stable"
     question = f"What does this rig do in {shown(result.protocol.until or result.end, 's')} under the protocol below?"
     return Parts(head, sentence(result.message), question, body, rig, text)
+
+
+def _load(rig: Slider | Machine) -> str:
+    """What presses, as the pictures of a rig have it."""
+    return "normal force" if isinstance(rig, Machine) or rig.area is not None else "normal stress"
 
 
 def done_to(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:

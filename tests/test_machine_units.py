@@ -69,6 +69,8 @@ def test_a_wrong_number_is_refused_in_the_unit_of_its_user():
     done = run("analyze", str(FOLDER / "feed-axis.toml"), "--set", "preload=-1")
     assert done.returncode == 2
     assert "in N, or text" in done.stderr
+    done = run("analyze", str(FOLDER / "feed-axis.toml"), "--set", "links.screw.lead=10 mm")
+    assert "such as '10 mm/rev'" in done.stderr or "for example '10 mm/rev'" in done.stderr
 
 
 def test_shafts_carry_torques_and_links_say_what_they_carry():

@@ -285,6 +285,8 @@ _EXAMPLES = {
     "m/s": "1 um/s",
     "s": "10 s",
     "rad": "-45 deg",
+    "m/rad": "10 mm/rev",
+    "rad/s": "5 rpm",
     "kg/m^2": "200 kg/m^2",
     "Pa s/m": "1e6 Pa s/m",
     "N": "50 N",

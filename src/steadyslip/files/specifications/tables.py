@@ -121,7 +121,7 @@ class TableReader:
         try:
             return find_law(family, name)
         except ParameterError as error:
-            self.problem(where, error.problems[0].message)
+            self.problem(where, error.problems[0].message + _part_of_another(family, name))
             return None
 
     def _built(self, law: type[FrozenRecord], arguments: Table, prefix: str) -> FrozenRecord | None:
@@ -155,8 +155,8 @@ class TableReader:
                     arguments[item.name] = value
             elif is_required(item):
                 self.problem(prefix + key, _missing(role))
-        for name in rest:
-            self.problem(prefix + name, unknown_name("key", name, keys) + _key_of_another(law, name))
+        for name, value in rest.items():
+            self.problem(prefix + name, unknown_name("key", name, keys) + _key_of_another(law, name, value))
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
@@ -316,16 +316,24 @@ def _contradictions(law: type[FrozenRecord], valid: Mapping[str, Any], came_with
     return found
 
 
-def _key_of_another(law: type[FrozenRecord], name: str) -> str:
-    """Which law of the same family a key belongs to, where the one that was chosen has none of that name."""
-    for base in law.__mro__:
-        registry = getattr(base, "registry", None)
-        if registry and has_choice(base) and law in registry.values():
-            known = [
-                word for word, other in registry.items() if name in (key_of(item) for item, _ in own_fields(other))
-            ]
-            if known and law not in (registry[word] for word in known):
-                words = " or ".join(f'"{word}"' for word in known[:3])
-                return f"; it is a key of {selector(base)[0]} = {words}"
-            return ""
+def _key_of_another(law: type[FrozenRecord], name: str, value: Any) -> str:
+    """Which law of the same family a key belongs to, or its value names, where the chosen one has no such key."""
+    bases = (base for base in law.__mro__ if issubclass(base, FrozenRecord) and base is not FrozenRecord)
+    family = next((base for base in bases if has_choice(base) and law in base.registry.values()), None)
+    if family is None:
+        return ""
+    key, _ = selector(family)
+    if isinstance(value, str) and value in family.registry:
+        return f'; did you mean {key} = "{value}"?'
+    known = [word for word, other in family.registry.items() if name in (key_of(item) for item, _ in own_fields(other))]
+    words = " or ".join(f'"{word}"' for word in known)
+    return f"; it is a key of {key} = {words}" if words else ""
+
+
+def _part_of_another(family: type[FrozenRecord], name: object) -> str:
+    """Which law of a family has a part of this name, where the family itself has no such law."""
+    for word, law in family.registry.items():
+        for item, role in own_fields(law):
+            if isinstance(role, Part) and role.inline and name in role.family.registry:
+                return f'; write {selector(family)[0]} = "{word}" and {item.name} = "{name}"'
     return ""

@@ -18,7 +18,7 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
-from steadyslip.explorer.narrow import dense, narrow
+from steadyslip.explorer.narrow import dense, narrow, renamed
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
@@ -181,6 +181,13 @@ def test_shortened_code_says_the_same():
     assert dense(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));\n"
     generated = "function f(R, x, y) {\n    var t1 = R[0] - (-2.5e-07);\n    y[0] = (t1 >= 0) ? t1 : (1 / x);\n}\n"
     assert dense(generated) == "function f(R,x,y){\nvar t1=R[0]-(-2.5e-07);\ny[0]=(t1>=0)?t1:1/x;\n}\n"
+
+
+def test_names_of_generated_code_are_as_short_as_may_be():
+    """Those that others know, and what JavaScript has, keep theirs; numbers with exponents hold no names."""
+    text = "function far(R, x, y) {\nvar t1 = R[0], t20 = log(t1) - 1e-7;\ny[0] = Math.abs(t20 * t1) + t20;\n}\n"
+    short = "function far(c, e, d) {\nvar a = c[0], b = log(a) - 1e-7;\nd[0] = Math.abs(b * a) + b;\n}\n"
+    assert renamed(text, {"far", "log"}) == short
 
 
 def test_no_two_parameters_of_a_part_are_called_the_same():

@@ -16,8 +16,8 @@ from steadyslip.core.quantities import outside
 from steadyslip.core.records import Address, twin
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
-from steadyslip.explorer.motion import driver, motion_part
-from steadyslip.explorer.narrow import dense, narrow, narrow_style
+from steadyslip.explorer.motion import DRIVER, driver, motion_part
+from steadyslip.explorer.narrow import dense, functions_of, narrow, narrow_style, renamed
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
@@ -43,6 +43,8 @@ USUAL = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAll
 """What parameters are unless they say otherwise; `web/rig.js` has the same."""
 LIBRARY = ("motion",)
 """Modules that a worker needs too, with the runtime and the driver: the page hands it their text."""
+KEYS = ("layout", "routines", "segments")
+"""Of a machine's motion, what `web/motion.js` asks for beside its programs."""
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data:; worker-src blob:; "
     "base-uri 'none'; form-action 'none'"
@@ -113,18 +115,23 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
     modules = [_web(f"{name}.js") for name in MODULES]
     library = [_web(f"{name}.js") for name in LIBRARY]
     script = narrow(javascript.as_script(javascript.runtime(), *modules))
-    worker = narrow(javascript.as_script(javascript.runtime(), *library)) + dense(driven)
+    worker = narrow(javascript.as_script(javascript.runtime(), *library)) + _short(driven, DRIVER)
     known = _data(rig, title, branch, facts) | {
         "motion": moving,
         "still": still,
         "sketch": sketch(rig) if isinstance(rig, Slider) else machine_sketch(rig),
     }
     code = (
-        f"{script}\nconst programs = {dense(text)};\n"
-        f"const library = () => {{\n{worker}\nconst machine = {dense(machine)};\n"
+        f"{script}\nconst programs = {_short(text, functions_of(text))};\n"
+        f"const library = () => {{\n{worker}\nconst machine = {_short(machine, {*functions_of(machine), *KEYS})};\n"
         "const begin = (facts) => new Motion(machine, facts, { advance, observe });\nreturn { begin, serve };\n};\n"
     )
     return code, known
+
+
+def _short(generated: str, known: Iterable[str]) -> str:
+    """Generated code, of which modules of the page know some names."""
+    return dense(renamed(generated, {*known, *javascript.runtime_names()}))
 
 
 def _web(name: str) -> str:

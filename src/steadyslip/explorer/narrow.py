@@ -1,10 +1,11 @@
-"""Code and styles without what only people read: comments, indentation, spaces; names stay."""
+"""Code and styles without what only people read: comments, indentation, spaces; names stay but in generated code."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from itertools import groupby
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from itertools import groupby, product
 
 _OTHER = re.compile(
     r""""(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'"""  # strings
@@ -73,6 +74,37 @@ def dense(text: str) -> str:
         own = list(lines)
         rows += ["var " + ",".join(line[4:-1] for line in own) + ";"] if declared else own
     return "\n".join(rows)
+
+
+_NAME = re.compile(r"(?<![\w.$])[A-Za-z_]\w*")
+_LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_WORDS = frozenset(
+    "as break const continue do else false null for function if in let new of return true var while Math Number Infinity NaN "
+    "Float64Array".split()  # noqa: SIM905 -- a list of words
+)
+"""What generated code has of JavaScript itself."""
+
+
+def functions_of(text: str) -> set[str]:
+    """Names of the functions of generated code."""
+    return set(re.findall(r"^ *function (\w+)", text, flags=re.M))
+
+
+def renamed(text: str, known: Iterable[str]) -> str:
+    """Generated code with names of its own as short as may be, the shortest for those that occur most.
+
+    Parameters
+    ----------
+    text : str
+        Without strings.
+    known : iterable of str
+        Names that others know.
+    """
+    taken = _WORDS.union(known)
+    counts = Counter(name for name in _NAME.findall(text) if name not in taken)
+    free = (name for size in (1, 2, 3) for name in map("".join, product(_LETTERS, repeat=size)) if name not in taken)
+    short = {name: next(free) for name, _ in sorted(counts.items(), key=lambda item: (-item[1], item[0]))}
+    return _NAME.sub(lambda found: short.get(found[0], found[0]), text)
 
 
 def _once(text: str) -> str:

@@ -17,12 +17,18 @@ _WORDS = {"and": "&&", "or": "||"}
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
 _EXPORT = re.compile(r"^export (?=const|let|class|function|async)", re.M)
 _DECLARED = re.compile(r"^(?:export )?(?:const|let|class|function\*?|async function) (\w+)", re.M)
+_EXPORTED = re.compile(r"(?:^export (?:const|function)|,) (\w+)(?= =|\()", re.M)
 _OWN = {"abs": "Math.abs", "sqrt": "Math.sqrt"}
 
 
 def runtime() -> str:
     """The text of the module whose functions programs and driver call."""
     return files("steadyslip.kernels.printers").joinpath("runtime.js").read_text(encoding="utf-8")
+
+
+def runtime_names() -> set[str]:
+    """What `runtime` exports."""
+    return set(_EXPORTED.findall(runtime()))
 
 
 def as_script(*modules: str) -> str:

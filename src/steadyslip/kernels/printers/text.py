@@ -9,6 +9,7 @@ from typing import Any
 from steadyslip.kernels.nodes import Loop, Node, Program, reachable
 
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_SUMS, _PRODUCTS = frozenset(("add", "sub")), frozenset(("mul", "div"))
 _DEEPEST = 8  # operations in one line
 
 
@@ -25,6 +26,7 @@ class Writer(ABC):
         self.program = program
         self.lines: list[str] = []
         self.known: dict[int, str] = {program.number.order: "x"}
+        self.signs: dict[int, str] = {}  # operations of what is in brackets
         self.depth: dict[int, int] = {}
         self.uses: dict[int, int] = {}
         for _, _, node in program.stores:
@@ -103,8 +105,10 @@ class Writer(ABC):
             often = self.uses.get(node.order, 0) != 1 or depth > _DEEPEST
             if node.op != "number" and (often or node.op == "load" or loop is not None):
                 name = f"t{len(self.lines) + 1}"
-                self.line(level, self.named(name, written))
+                self.line(level, self.named(name, written[1:-1] if node.op in _SIGNS else written))
                 written, depth = name, 0
+            elif node.op in _SIGNS:
+                self.signs[node.order] = node.op
             self.known[node.order], self.depth[node.order] = written, depth
 
     def _written(self, node: Node) -> str:
@@ -114,10 +118,20 @@ class Writer(ABC):
             return f"{node.args[0]}[{node.args[1]}]"
         a = [self.known[operand.order] for operand in node.operands]
         if node.op in _SIGNS:
-            return f"({a[0]} {_SIGNS[node.op]} {a[1]})"
+            first, second = self._beside(node)
+            return f"({first} {_SIGNS[node.op]} {second})"
         if node.op == "select":
             return self.select(*a)
         return f"(-{a[0]})" if node.op == "neg" else self.operation(node, a)
+
+    def _beside(self, node: Node) -> tuple[str, str]:
+        """Both operands, without brackets that change nothing, not even the order of operations."""
+        signs = [self.signs.get(operand.order, "") for operand in node.operands]
+        product, compares = node.op in _PRODUCTS, node.op not in _SUMS | _PRODUCTS
+        spare = _PRODUCTS if product else _SUMS | _PRODUCTS, _SUMS | _PRODUCTS if compares else _PRODUCTS
+        bare = (signs[0] in spare[0], not product and signs[1] in spare[1])
+        first, second = (self.known[operand.order] for operand in node.operands)
+        return first[1:-1] if bare[0] else first, second[1:-1] if bare[1] else second
 
     def _loop(self, loop: Loop, level: int) -> None:
         if loop.results[0].order in self.known:

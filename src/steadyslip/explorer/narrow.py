@@ -79,8 +79,11 @@ def dense(text: str) -> str:
 _NAME = re.compile(r"(?<![\w.$])[A-Za-z_]\w*")
 _LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _WORDS = frozenset(
-    "as break const continue do else false null for function if in let new of return true var while Math Number Infinity NaN "
-    "Float64Array".split()  # noqa: SIM905 -- a list of words
+    re.findall(
+        r"\w+",
+        "as break const continue do else false for function if in let new null of return true var while "
+        "Math Number Infinity NaN Float64Array",
+    )
 )
 """What generated code has of JavaScript itself."""
 

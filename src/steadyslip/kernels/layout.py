@@ -13,6 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+GROUP = 8
+"""Lanes that are computed as one vector; kernels of several lanes have some of these."""
+
 
 class Row(IntEnum):
     """Numbers of a record that every kernel has."""
@@ -266,7 +269,7 @@ class Routines(NamedTuple):
         derivatives, row by row
     dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`, unknowns
     extend : the dense output of the last step, made ready for `dense`
-    watch_lanes : of every lane: frequent events within the last step, found and tallied
+    watch_group : of `GROUP` lanes from lane `number` on: frequent events within the last step, found and tallied
     rates_lanes, see_lanes : of every lane: the rates; what is observed
     extend_lanes, look_lanes : of every lane: `extend`; what was observed at `Row.NEXT`, within the last step
     """
@@ -280,7 +283,7 @@ class Routines(NamedTuple):
     balance: Routine
     dense: Routine
     extend: Routine
-    watch_lanes: Routine
+    watch_group: Routine
     rates_lanes: Routine
     see_lanes: Routine
     extend_lanes: Routine

@@ -143,6 +143,15 @@ class Method:
         """Those of dense output included."""
         return self.stages if self.implicit else len(self.a)
 
+    @cached_property
+    def dense_stages(self) -> tuple[int, ...]:
+        """Stages of a step on which its dense output depends."""
+        if self.implicit:
+            return tuple(range(self.stages))
+        rows = self._full(list(self.a))[self.stages :]
+        weights = np.vstack([np.array(self.dense).T, rows])
+        return tuple(i for i in range(self.stages) if weights[:, i].any())
+
     def arguments(self) -> list[tuple[float, ...]]:
         """For every stage and then the result: weights of the earlier stages in its argument."""
         rows = [tuple(row) for row in self.a]

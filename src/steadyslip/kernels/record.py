@@ -91,6 +91,7 @@ class Evaluator:
     def __init__(self, kernel: Formulation, program: Program, extended: bool = False) -> None:
         self.kernel, self.program = kernel, program
         self.extended = extended  # whether the dense output of the last step is there as polynomials
+        self._polynomials: dict[int, list[Value]] = {}
         layout, load = kernel.layout, program.load
         self.constants: Values = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
         count = range(kernel.unknowns)
@@ -159,6 +160,11 @@ class Evaluator:
 
     def polynomial(self, i: int) -> list[Value]:
         """Dense output of state variable i: coefficients of powers of the fraction of the last step."""
+        if i not in self._polynomials:
+            self._polynomials[i] = self._polynomial(i)
+        return self._polynomials[i]
+
+    def _polynomial(self, i: int) -> list[Value]:
         method, load = self.kernel.method, self.program.load
         if self.extended:
             return [load(self.kernel.layout.curve + i * self.kernel.terms + j) for j in range(self.kernel.terms)]
@@ -172,7 +178,7 @@ class Evaluator:
 
     def course(self, i: int) -> list[Value]:
         """The same with the rates at both ends, which the dense output of a Rosenbrock method does not have."""
-        found = self.polynomial(i)
+        found = list(self.polynomial(i))
         if not self.kernel.method.implicit:
             return found
         h = self.program.load(Row.DONE)

@@ -229,9 +229,9 @@ class Step(Evaluator):
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
         for i in range(n):
             store(layout.old + i, self.old[i])
-        for s, stage in enumerate(self.stages):
+        for s in self.kernel.method.dense_stages:
             for i in range(n):
-                store(layout.stage + s * n + i, stage[i])
+                store(layout.stage + s * n + i, self.stages[s][i])
         if layout.w >= 0:
             store(Row.W_RATE_OLD, self.first[layout.w])
         for k in range(self.kernel.unknowns):

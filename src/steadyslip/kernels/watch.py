@@ -1,4 +1,4 @@
-"""The program that finds frequent events in all lanes at once, and keeps the tally of lanes without a log.
+"""The program that finds frequent events in a group of lanes at once, and keeps the tally of lanes without a log.
 
 Extremes of velocity and the begin and end of slip are roots of the dense output's polynomial in the velocity variable,
 or of its derivative. A lane where that is not enough keeps its flag and is left to the driver: contact that is lost,
@@ -23,7 +23,7 @@ class Watch(Evaluator):
     """Writes it."""
 
     def __init__(self, kernel: Formulation, speed: Formulas) -> None:
-        super().__init__(kernel, Program("watch_lanes"))
+        super().__init__(kernel, Program("watch_group"))
         self.speed = speed
         load, layout = self.program.load, kernel.layout
         slip, turn = load(layout.happened + EventPlace.SLIP), load(layout.happened + EventPlace.TURN)

@@ -7,7 +7,7 @@ import numpy as np
 from steadyslip.kernels.driver.jobs import attend
 from steadyslip.kernels.driver.places import width
 from steadyslip.kernels.driver.samples import BETWEEN
-from steadyslip.kernels.layout import Array, Cursor, Layout, Routines, Row, Setting, call
+from steadyslip.kernels.layout import GROUP, Array, Cursor, Layout, Routines, Row, Setting, call
 
 
 def flagged(S: Array, lanes: int) -> int:
@@ -16,6 +16,15 @@ def flagged(S: Array, lanes: int) -> int:
     for lane in range(lanes):
         count += 1 if S[Row.FLAG * lanes + lane] != 0.0 else 0
     return count
+
+
+def watch(layout: Layout, routines: Routines, S: Array, y: Array) -> None:
+    """Look for events in the groups of lanes in which one asks for attention."""
+    for first in range(0, layout.lanes, GROUP):
+        for lane in range(first, first + GROUP):
+            if S[Row.FLAG * layout.lanes + lane] != 0.0:
+                call(routines.watch_group, S, float(first), y)
+                break
 
 
 def advance(
@@ -49,7 +58,7 @@ def advance(
         cursor[Cursor.PAUSED] = 0
         attention = flagged(S, lanes)
         if attention > 0 and together:
-            call(routines.watch_lanes, S, 0.0, y)
+            watch(layout, routines, S, y)
             attention = flagged(S, lanes)
         if attention > 0:
             if (log.shape[0] > 0 and cursor[Cursor.LOGGED] + 16 * lanes * layout.contacts > log.shape[0]) or (

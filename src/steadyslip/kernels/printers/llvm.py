@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from steadyslip.kernels import primitives
+from steadyslip.kernels.layout import GROUP
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Node, Program, reachable
 
-VECTOR = 8  # lanes in one vector, which LLVM splits where registers are shorter
 _FAST = "nsz contract"  # what may be done with arithmetic: fused multiply-add, no care for the sign of zero
 _REAL = {"add": f"fadd {_FAST}", "sub": f"fsub {_FAST}", "mul": f"fmul {_FAST}", "div": f"fdiv {_FAST}"}
 _WHOLE = {"add": "add", "sub": "sub", "mul": "mul", "and": "and", "or": "or", "shl": "shl", "shr": "ashr"}
@@ -28,9 +28,10 @@ def assembly(programs: Sequence[Program], lanes: int, names: dict[str, str], poi
     Parameters
     ----------
     programs : sequence of Program
-        Those whose name ends in ``lanes`` or is ``step`` do all lanes.
+        Those whose name ends in ``lanes`` or is ``step`` do all lanes, those whose name ends in ``group``
+        `GROUP` of them, from the one on that their number says.
     lanes : int
-        One, or a multiple of `VECTOR`.
+        One, or a multiple of `GROUP`.
     names : dict of str to str
         Symbols of the programs.
     pointer : str
@@ -38,13 +39,16 @@ def assembly(programs: Sequence[Program], lanes: int, names: dict[str, str], poi
     """
     text, used = [], set()
     for program in programs:
-        together = lanes if program.name == "step" or program.name.endswith("lanes") else 1
-        writer = _Writer(together, pointer)
+        if program.name == "step" or program.name.endswith("lanes"):
+            writer = _Writer(lanes, pointer)
+        else:
+            together = program.name.endswith("group")
+            writer = _Writer(GROUP if together else 1, pointer, chains=1, apart=lanes if together else 1)
         text.append(writer.function(program, names[program.name]))
         used |= writer.used
     for name, width in sorted(used):
         text.append(_primitive(name, width))
-    widths = sorted({width for _, width in used} | {1, VECTOR})
+    widths = sorted({width for _, width in used} | {1, GROUP})
     text += [f"declare {_type('real', w)} @llvm.{f}.{_suffix(w)}({_type('real', w)})" for w in widths
              for f in ("fabs", "sqrt")]  # fmt: skip
     return "\n".join(text) + "\n"
@@ -79,9 +83,11 @@ def _primitive(name: str, width: int) -> str:
 class _Writer:
     """Writes one function."""
 
-    def __init__(self, lanes: int, pointer: str, chains: int = 0) -> None:
-        self.lanes, self.pointer = lanes, pointer
-        self.width = lanes if chains else min(lanes, VECTOR)
+    def __init__(self, lanes: int, pointer: str, chains: int = 0, apart: int = 0) -> None:
+        self.pointer = pointer
+        self.apart = apart or lanes  # between two numbers of one lane
+        self.record = "R"
+        self.width = lanes if chains else min(lanes, GROUP)
         self.chains = chains or lanes // self.width
         self.lines: Lines = []
         self.values: dict[int, list[str]] = {}
@@ -91,6 +97,10 @@ class _Writer:
     def function(self, program: Program, symbol: str) -> str:
         """The whole function."""
         self.values[program.number.order] = ["%x"] * self.chains
+        if self.apart > self.width * self.chains:  # a group of the lanes
+            self.lines.append("  %first = fptosi double %x to i64")
+            self.lines.append(f"  %G = getelementptr inbounds double, {self.pointer} %R, i64 %first")
+            self.record = "G"
         self.emit(program.nodes())
         for array, place, node in program.stores:
             for chain in range(self.chains):
@@ -100,7 +110,7 @@ class _Writer:
         body = "\n".join(self.lines)
         array = f"{self.pointer} noalias nocapture"
         head = f"define void @{symbol}({array} %R, double %x, {array} %y) nounwind"
-        aligned = "" if self.width == 1 else f" alignstack({8 * VECTOR})"  # a fifth of the time
+        aligned = "" if self.width == 1 else f" alignstack({8 * GROUP})"  # a fifth of the time
         return f"{head}{aligned} {{\nentry:\n{body}\n  ret void\n}}"
 
     def emit(self, nodes: Sequence[Node], loop: Loop | None = None) -> None:
@@ -135,9 +145,9 @@ class _Writer:
         return f"{_type('real', self.width)}*"
 
     def _address(self, array: str, place: int, chain: int) -> str:
-        index = place * self.lanes + chain * self.width if array == "R" else place
-        name = self._fresh("p")
-        self.lines.append(f"  {name} = getelementptr inbounds double, {self.pointer} %{array}, i64 {index}")
+        index = place * self.apart + chain * self.width if array == "R" else place
+        name, base = self._fresh("p"), self.record if array == "R" else array
+        self.lines.append(f"  {name} = getelementptr inbounds double, {self.pointer} %{base}, i64 {index}")
         if self._vector() != self.pointer:
             plain, name = name, self._fresh("p")
             self.lines.append(f"  {name} = bitcast {self.pointer} {plain} to {self._vector()}")

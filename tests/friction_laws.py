@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import settings, strategies as st
 
 import steadyslip as ss
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.linear.response import response
 from steadyslip.model.linearisation import characteristic_coefficients
 from steadyslip.model.point import operating_point
@@ -77,7 +77,7 @@ def rig_with(law, velocity=1e-6, sigma=5e6, contact=None, **slider):
 def numbers_of(rig, expressions):
     values = operating_point(rig)
     sigma = ss.steady_state(rig).normal_stress
-    function = array_function([*values.model.arguments], expressions(values.model))
+    function = ArrayFunction([*values.model.arguments], expressions(values.model))
     return [float(number) for number in function(*values.arguments, sigma)]
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.linear.response import contact_coefficients
 from steadyslip.linear.state_space import state_matrices
 from steadyslip.model.point import operating_point
@@ -70,7 +70,7 @@ def coefficients(rig):
     """B0...B3, derived from the nonlinear normal stress."""
     values = operating_point(rig)
     sigma = ss.steady_state(rig).normal_stress
-    function = array_function([*values.model.arguments], contact_coefficients(values.model))
+    function = ArrayFunction([*values.model.arguments], contact_coefficients(values.model))
     return [float(b) for b in function(*values.arguments, sigma)]
 
 

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import steadyslip as ss
-from steadyslip.core.expressions import array_function, asinh_exp, derivative, occurrences
+from steadyslip.core.expressions import FEW, ArrayFunction, asinh_exp, derivative, occurrences
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.source import Formulas
 
@@ -33,15 +33,39 @@ def test_values_are_those_of_sympy(name):
     random = np.random.default_rng(len(name))
     x, y, z = random.uniform(-2, 2, 50), random.uniform(-2, 2, 50), random.uniform(0.1, 3, 50)
     expected = np.array([float(expression.subs({X: a, Y: b, Z: c})) for a, b, c in zip(x, y, z, strict=True)])
-    (found,) = array_function([X, Y, Z], [expression])(x, y, z)
+    (found,) = ArrayFunction([X, Y, Z], [expression])(x, y, z)
     np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-14)
-    (single,) = array_function([X, Y, Z], [expression])(float(x[0]), float(y[0]), float(z[0]))
+    (single,) = ArrayFunction([X, Y, Z], [expression])(float(x[0]), float(y[0]), float(z[0]))
     assert single == pytest.approx(expected[0], rel=1e-13, abs=1e-14)
 
 
 def test_extremes_of_several():
-    (found,) = array_function([X, Y, Z], [sp.Max(X, Y, Z) - sp.Min(X, Y, Z)])(np.array([1.0, -3.0]), 2.0, 0.5)
+    (found,) = ArrayFunction([X, Y, Z], [sp.Max(X, Y, Z) - sp.Min(X, Y, Z)])(np.array([1.0, -3.0]), 2.0, 0.5)
     np.testing.assert_array_equal(found, [1.5, 5.0])
+
+
+@pytest.mark.parametrize("name", [*EXPRESSIONS, "regularised"])
+def test_few_rows_in_numbers_are_those_of_arrays(name):
+    expression = EXPRESSIONS.get(name, asinh_exp(X * Z, Y - sp.log(Z)) * Z)
+    random = np.random.default_rng(len(name))
+    rows = random.uniform(-2, 2, (FEW + 1, 3))
+    rows[:, 2] = np.abs(rows[:, 2]) + 0.1
+    rows[::3, 0] = 0.0
+    function = ArrayFunction([X, Y, Z], [expression, expression + X, sp.Integer(2)])
+    many = function.rows(rows)
+    assert many.shape == (FEW + 1, 3)
+    np.testing.assert_allclose(function.rows(rows[:FEW]), many[:FEW], rtol=1e-13)
+
+
+def test_rows_beyond_floating_point():
+    """Python's numbers raise, or become complex, where NumPy's are inf or NaN."""
+    function = ArrayFunction([X, Y], [sp.exp(X), 1 / X, sp.log(X), X**Y, sp.Max(X, Y), sp.sqrt(X)])
+    rows = np.array([[1e3, 0.5], [0.0, 1.0], [-1.0, 0.5], [np.nan, 1.0], [1.0, np.nan], [1.0, 2.0]])
+    with np.errstate(all="ignore"):
+        expected = np.array(np.broadcast_arrays(*function(*rows.T))).T
+    for row, own in zip(rows, expected, strict=True):
+        np.testing.assert_array_equal(function.rows(row[None])[0], own)
+    np.testing.assert_array_equal(function.rows(rows), expected)
 
 
 @pytest.mark.parametrize("name", [*EXPRESSIONS, "regularised"])
@@ -56,7 +80,7 @@ def test_derivatives_are_those_of_sympy(name):
                 own.doit().replace(sp.DiracDelta, lambda *_: sp.S.Zero),
                 theirs.doit().replace(sp.DiracDelta, lambda *_: sp.S.Zero),
             )
-        found, expected = (np.broadcast_to(array_function([X, Y, Z], [e])(*numbers)[0], 20) for e in (own, theirs))
+        found, expected = (np.broadcast_to(ArrayFunction([X, Y, Z], [e])(*numbers)[0], 20) for e in (own, theirs))
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
 
 
@@ -75,11 +99,11 @@ def test_nothing_is_computed_twice():
 
 
 def test_what_leaves_floating_point_is_no_traceback():
-    function = array_function([X, Y], [1 / X, sp.log(X), sp.exp(Y), sp.sqrt(X - 1), sp.zoo, sp.nan, sp.oo])
+    function = ArrayFunction([X, Y], [1 / X, sp.log(X), sp.exp(Y), sp.sqrt(X - 1), sp.zoo, sp.nan, sp.oo])
     found = function(0.0, 1000.0)
     assert [str(float(one)) for one in found] == ["inf", "-inf", "inf", "nan", "nan", "nan", "inf"]
 
 
 def test_functions_that_arrays_do_not_have_are_named():
     with pytest.raises(ss.NotAvailable, match=r"zeta\(\.\.\.\)"):
-        array_function([X], [sp.zeta(X)])
+        ArrayFunction([X], [sp.zeta(X)])

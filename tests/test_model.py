@@ -12,7 +12,7 @@ from steadyslip.core.questions import Keeper, question
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
 from steadyslip.model.reducing import reduce_model
-from steadyslip.model.scales import natural_scales, posed, weights
+from steadyslip.model.scales import natural_scales, posed, scale_rows, weights
 from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks.rest import rest_of
@@ -154,10 +154,28 @@ def test_answers_are_the_same_for_everybody():
             array[...] = 2.0
 
 
+def lugre():
+    return ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
+
+
+def test_scales_of_few_rigs_are_those_of_many():
+    """Few are reckoned one by one."""
+    friction = ss.RateState(
+        a=0.01, b=0.014, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, normal_memory=ss.LinkerDieterich(alpha=0.3)
+    )
+    for rig in (RIG, replace(RIG, friction=friction), replace(RIG, mass=10.0), replace(RIG, friction=lugre())):
+        point = operating_point(rig, {"stiffness": np.geomspace(1e-3, 1e12, 20)})
+        reduction = reduce_model(point.model)
+        table, unknown = scale_rows(point, reduction)
+        assert table.shape == (20, len(reduction.names))
+        for i in range(20):
+            own, alone = scale_rows(point.part(slice(i, i + 1)), reduction)
+            np.testing.assert_array_equal(np.append(own[0], alone), np.append(table[i], unknown[i]))
+
+
 def test_kicks_leave_the_scales_of_motion_alone():
     """Steps of a run are those of before, whatever was asked of the rig in between."""
-    friction = ss.LuGre(mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e5, bristle_damping=10)
-    a_rig = replace(RIG, friction=friction, stiffness=9e9, mass=1e6)
+    a_rig = replace(RIG, friction=lugre(), stiffness=9e9, mass=1e6)
 
     def run():
         return ss.simulate(a_rig, ss.VelocityStep(at=0.0, to=2e-6), until=0.05)["v"].tobytes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -57,7 +58,34 @@ _NUMPY = {
 }  # fmt: skip
 _COMPARED = {sp.Lt: "<", sp.Le: "<=", sp.Gt: ">", sp.Ge: ">=", sp.Eq: "==", sp.Ne: "!="}
 _JOINED = {sp.And: " & ", sp.Or: " | "}
-_WORLD = {name: getattr(np, name, numpy_asinh_exp) for name in (*_NUMPY.values(), "where", "sqrt", "nan", "inf")}
+_WORLD = {
+    name: getattr(np, name, numpy_asinh_exp) for name in (*_NUMPY.values(), "where", "sqrt", "square", "nan", "inf")
+}
+
+FEW = 8
+"""Rows up to which numbers one by one are faster than arrays."""
+
+
+def _of_numbers(function: Callable[..., Any]) -> Callable[..., float]:
+    """NumPy's function for a number, which gives the last digit that it gives for an array."""
+
+    def own(*values: float) -> float:
+        found = float(function(*values))
+        if found - found != 0.0:
+            raise ArithmeticError("beyond floating point")
+        return found
+
+    return own
+
+
+_PLAIN: dict[str, Any] = {
+    name: _of_numbers(function) for name, function in _WORLD.items() if callable(function)
+} | {
+    "absolute": abs, "square": lambda x: x * x, "sqrt": math.sqrt, "logical_not": lambda x: not x,
+    "maximum": lambda x, y: x if x >= y or x != x else y, "minimum": lambda x, y: x if x <= y or x != x else y,
+    "where": lambda condition, x, y: x if condition else y, "nan": math.nan, "inf": math.inf,
+}  # fmt: skip
+"""The same for Python's numbers, which raise where NumPy's become inf or NaN."""
 
 
 def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
@@ -149,6 +177,8 @@ class _Text:
             return f"(1.0/{self._power(base, -exponent)})"
         if exponent == sp.S.Half:
             return f"sqrt({self._of(base)})"
+        if exponent == 2:
+            return f"square({self._of(base)})"
         return f"({self._of(base)}**{exponent if exponent.is_Integer else self._of(exponent)})"
 
 
@@ -157,7 +187,7 @@ def _number(e: Any) -> str:
     return value if value[0] != "-" else f"({value})"
 
 
-def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> Callable[..., list[Any]]:
+class ArrayFunction:
     """A function of the arguments' values that returns the values of all expressions.
 
     Common subexpressions are computed once; every argument may be a scalar or an array. What leaves the range of
@@ -168,20 +198,41 @@ def array_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr
     NotAvailable
         If an expression has a function in it that NumPy does not have.
     """
-    names = {symbol: f"p{i}" for i, symbol in enumerate(arguments)}
-    written = _Text(names, [sp.sympify(e) for e in expressions])
-    body = [*written.lines, f"return [{', '.join(written.results)}]"]
-    text = f"def function({', '.join(names.values())}):\n    " + "\n    ".join(body)
-    world = dict(_WORLD)
-    exec(text, world)
-    function = world["function"]
 
-    def evaluate(*values: Any) -> list[Any]:
+    def __init__(self, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> None:
+        names = {symbol: f"p{i}" for i, symbol in enumerate(arguments)}
+        written = _Text(names, [sp.sympify(e) for e in expressions])
+        body = [*written.lines, f"return [{', '.join(written.results)}]"]
+        code = compile(f"def function({', '.join(names.values())}):\n    " + "\n    ".join(body), "<equations>", "exec")
+        self._arrays, self._numbers = (_made(code, world) for world in (_WORLD, _PLAIN))
+
+    def __call__(self, *values: Any) -> list[Any]:
         with np.errstate(all="ignore"):
-            found: list[Any] = function(*[np.float64(v) if type(v) in _PYTHON else v for v in values])
-        return found
+            return self._arrays(*[np.float64(v) if type(v) in _PYTHON else v for v in values])
 
-    return evaluate
+    def rows(self, arguments: np.ndarray) -> np.ndarray:
+        """Values of all expressions, (rows, expressions), for rows of arguments, (rows, arguments).
+
+        Few rows are computed one by one in Python's numbers, of which an operation takes a tenth of NumPy's.
+        """
+        if len(arguments) <= FEW:
+            try:
+                with np.errstate(all="ignore"):
+                    return np.array([self._numbers(*row) for row in arguments.tolist()], dtype=float)
+            except (ArithmeticError, ValueError, TypeError):  # something is inf, NaN or complex
+                pass
+        found = self(*arguments.T)
+        table = np.empty((len(arguments), len(found)))
+        for i, column in enumerate(found):
+            table[:, i] = column
+        return table
+
+
+def _made(code: Any, world: Mapping[str, Any]) -> Callable[..., list[Any]]:
+    own = dict(world)
+    exec(code, own)
+    function: Callable[..., list[Any]] = own["function"]
+    return function
 
 
 @lru_cache(maxsize=2**15)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
@@ -83,15 +83,10 @@ class ExperimentProgram:
         return [steady[symbol] + away.get(symbol, 0) for symbol in self.reduction.continuous]
 
     @cached_property
-    def _values(self) -> Any:
-        constants = list(self.kernel.constants.symbols)
-        return self.reduction.model.function([*constants, *self._start], *self.unsettled.values())
+    def _values(self) -> tuple[Any, ArrayFunction]:
+        """Constants and starting values; their derivatives in every parameter, σss following, and in what is unsettled.
 
-    @cached_property
-    def _slopes(self) -> tuple[Any, Any]:
-        """Derivatives of constants and starting values in every parameter, σss following, and in what is unsettled.
-
-        Places among them all of those that are not zero, and the function that computes these.
+        Places among these of those that are not zero, and the function that computes values and these derivatives.
         """
         model = self.reduction.model
         expressions = [*self.kernel.constants.symbols, *self._start]
@@ -104,7 +99,8 @@ class ExperimentProgram:
                 found.append(derivative(expression, symbol) + derivative(expression, sigma) * stress)
         found += [derivative(expression, symbol) for symbol in self.unsettled.values() for expression in expressions]
         places = [i for i, expression in enumerate(found) if expression != 0]
-        return np.array(places, dtype=int), model.function([found[i] for i in places], *self.unsettled.values())
+        wanted = [*expressions, *(found[i] for i in places)]
+        return np.array(places, dtype=int), model.function(wanted, *self.unsettled.values())
 
     def arrays(self, point: OperatingPoint, chain: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Constants with their rates of change, and starting states with theirs.
@@ -119,23 +115,16 @@ class ExperimentProgram:
             How far that is.
         """
         jobs, _, count = chain.shape
-        with np.errstate(all="ignore"):
-            values = _stacked(point.evaluate(self._values, *away.T), jobs)
-            places, function = self._slopes
-            slopes = np.zeros((jobs, count * values.shape[1]))
-            slopes[:, places] = _stacked(point.evaluate(function, *away.T), jobs)
-        rates = np.matmul(chain, slopes.reshape(jobs, count, -1))
         table, size = self.kernel.constants, len(self.kernel.constants.symbols)
+        places, function = self._values
+        found, width = point.rows(function, *away.T), size + len(self._start)
+        values, slopes = found[:, :width], np.zeros((jobs, count * width))
+        slopes[:, places] = found[:, width:]
+        with np.errstate(all="ignore"):
+            rates = np.matmul(chain, slopes.reshape(jobs, count, width))
         constants = table.with_rates(values[:, :size], rates[:, :, :size], {})
         start = np.concatenate([values[:, None, size:], rates[:, :, size:]], axis=1)
         return constants, np.ascontiguousarray(start.reshape(jobs, -1))
-
-
-def _stacked(columns: list[Any], jobs: int) -> np.ndarray:
-    table = np.empty((jobs, len(columns)))
-    for i, column in enumerate(columns):
-        table[:, i] = column
-    return table
 
 
 @question

@@ -16,7 +16,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function, occurrences
+from steadyslip.core.expressions import ArrayFunction, occurrences
 from steadyslip.kernels.nodes import FUNCTIONS, Value, as_node, primitive, select
 
 
@@ -112,7 +112,7 @@ class Constants:
 
     def function(self, arguments: Sequence[sp.Symbol]) -> Callable[..., list[Any]]:
         """A NumPy function from parameter values to the constants, not to their rates of change."""
-        return array_function(arguments, list(self.symbols))
+        return ArrayFunction(arguments, list(self.symbols))
 
 
 class Formulas:

@@ -14,7 +14,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import InternalError
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
@@ -248,7 +248,7 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
         return by_search
     sigma, slope = equation.sigma, equation.slope
     stress = {model.contact.sigma_ss: sigma}
-    direct = array_function(arguments, [sigma, slope, *(sp.sympify(w).xreplace(stress) for w in wanted)])
+    direct = ArrayFunction(arguments, [sigma, slope, *(sp.sympify(w).xreplace(stress) for w in wanted)])
 
     def in_one_go(point: OperatingPoint) -> list[Array]:
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper
 from steadyslip.core.roles import Parameter
@@ -260,9 +259,9 @@ class Model(Keeper, Displayed):
         """What numbers stand for at an operating point: the parameters, then σss of every contact."""
         return (*self.parameters.values(), *(contact.sigma_ss for contact in self.contacts))
 
-    def function(self, expressions: Iterable[sp.Expr], *further: sp.Symbol) -> Callable[..., list[Any]]:
+    def function(self, expressions: Iterable[sp.Expr], *further: sp.Symbol) -> ArrayFunction:
         """Expressions as an array function of `arguments` and of further symbols; an operating point calls it."""
-        return array_function([*self.arguments, *further], [sp.sympify(e) for e in expressions])
+        return ArrayFunction([*self.arguments, *further], [sp.sympify(e) for e in expressions])
 
     @property
     def rate_of(self) -> dict[sp.Symbol, sp.Expr]:

@@ -16,7 +16,7 @@ import sympy as sp
 
 from steadyslip.core.arrays import Together, broadcast, check_together, checked_array, valid_together
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
-from steadyslip.core.expressions import array_function
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.rig import Rig
 from steadyslip.model.build import model_of
@@ -120,6 +120,14 @@ class OperatingPoint(Keeper):
         """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
         return function(*self._numbers, *further)
 
+    def rows(self, function: ArrayFunction, *further: Any) -> np.ndarray:
+        """The same as an array (rigs, expressions): of a single rig one row."""
+        values = (*self._numbers, *further)
+        table = np.empty((max(self.size, 1), len(values)))
+        for i, value in enumerate(values):
+            table[:, i] = value
+        return function.rows(table)
+
     def pieces(self, most: int) -> Iterator[OperatingPoint]:
         """The same rigs, flattened, at most `most` at a time; itself if it is no larger."""
         if self.size <= most:
@@ -204,7 +212,7 @@ def _placed(model: Model, rig: Rig, together: Together, branch: int, scan: bool)
 
 @question
 def _gain(model: Model) -> Callable[..., list[Any]]:
-    return array_function([*model.parameters.values()], [model.gain])
+    return ArrayFunction([*model.parameters.values()], [model.gain])
 
 
 @question
@@ -212,7 +220,7 @@ def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
     """k over the axial stiffness, as a function of numbers by dotted name."""
     share = sp.sympify(model.axial_share)
     names = [name for name, symbol in model.parameters.items() if share.has(symbol)]
-    function = array_function([model.parameters[name] for name in names], [share])
+    function = ArrayFunction([model.parameters[name] for name in names], [share])
     return lambda values: function(*(values[name] for name in names))[0]
 
 

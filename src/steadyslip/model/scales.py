@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import FEW, ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
@@ -254,6 +254,34 @@ def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping
             return _together(point, reduction, speeds, each)
         scales, unknown = each[0]
         return scales, (unknown,)
+
+
+@question
+def _few(model: Model) -> ArrayFunction:
+    """Slip rate and weights at the only contact."""
+    return model.function([model.steady[model.contact.velocity], *weighed(model)])
+
+
+def scale_rows(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
+    """`natural_scales` as arrays: (rigs, `Reduction.names`), and (rigs,) of the first unknown."""
+    names = reduction.names
+    if point.size <= FEW and not point.model.contacts[0].name:
+        try:
+            each = [
+                sizes(Weights.of(own), drive, reduction, _either)
+                for drive, *own in point.rows(_few(point.model)).tolist()
+            ]
+            return np.array([[own[name] for name in names] for own, _ in each]), np.array([one for _, one in each])
+        except ArithmeticError:  # something is not felt at all
+            pass
+    scales, (unknown, *_) = natural_scales(point, reduction)
+    size = max(point.size, 1)
+    table = np.stack([np.broadcast_to(scales[name], size) for name in names], axis=1)
+    return table, np.array(np.broadcast_to(unknown, size))
+
+
+def _either(condition: Any, value: Any, other: Any) -> Any:
+    return value if condition else other
 
 
 def moving_parts(model: Model) -> list[sp.Expr]:

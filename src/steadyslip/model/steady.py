@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import array_function, derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 
@@ -65,11 +65,11 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
     load = contact.steady_stress if contact.steady_load is None else contact.steady_load
     arguments = list(model.parameters.values())
     affine = sigma not in slope.free_symbols and sigma not in load.free_symbols
-    residual = array_function([*arguments, sigma], [contact.steady_stress - sigma])
+    residual = ArrayFunction([*arguments, sigma], [contact.steady_stress - sigma])
     if not affine:
         return SteadyEquation(False, given, residual)
     offset = contact.steady_coupling.xreplace({sigma: sp.Integer(0)})
-    parts = array_function(arguments, [load, offset, slope])
+    parts = ArrayFunction(arguments, [load, offset, slope])
     solved = load if given else (load + offset) / (1 - slope)
     return SteadyEquation(True, given, residual, parts, solved, slope)
 
@@ -125,7 +125,7 @@ def joint_equation(model: Model) -> JointEquation | None:
         raise NotAvailable("contacts that press on each other must be linear in the stresses; these are not")
     nothing = dict.fromkeys(sigmas, sp.Integer(0))
     rest = tuple(contact.steady_stress.xreplace(nothing) for contact in model.contacts)
-    parts = array_function(list(model.parameters.values()), [*(slope for row in slopes for slope in row), *rest])
+    parts = ArrayFunction(list(model.parameters.values()), [*(slope for row in slopes for slope in row), *rest])
     return JointEquation(size, parts, slopes, rest)
 
 

@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import array_function, derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import Keeper, question
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import in_symbols, precise_function, stated
@@ -80,7 +80,7 @@ class Statement(Keeper):
     @question
     def floats(self, *expressions: sp.Expr) -> Callable[..., list[Any]]:
         """The same in ordinary floats, as the rest of the package evaluates a law."""
-        compiled = array_function([*self.inputs, *self.numbers], expressions)
+        compiled = ArrayFunction([*self.inputs, *self.numbers], expressions)
         return lambda *numbers: compiled(*numbers, *self.numbers.values())
 
     @question

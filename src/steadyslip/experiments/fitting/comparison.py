@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.forward import Forward, InputTable
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp
@@ -93,15 +94,16 @@ class Comparison:
     def model(self, coordinates: Array) -> tuple[Array, Array]:
         """What the model says, (m, n), and its derivatives, (m, p, n); not weighted.
 
-        What is asked of one point shortly after a few are tried, such as errors at a minimum, costs no run.
+        What is asked of one point shortly after a few are tried, such as errors at a minimum, costs no run. Nobody may
+        write to the answer.
         """
         if len(coordinates) == 1:
             for point, own, slopes in self._recent:
                 if point == coordinates.tobytes():
-                    return own[None].copy(), slopes[None].copy()
-        seen, jacobian = self._run(coordinates)
+                    return own[None], slopes[None]
+        seen, jacobian = (read_only(array) for array in self._run(coordinates))
         if len(coordinates) * self.size <= REMEMBERED:
-            rows = zip(coordinates, seen.copy(), jacobian.copy(), strict=True)
+            rows = zip(coordinates, seen, jacobian, strict=True)
             self._recent.extend((z.tobytes(), own, slopes) for z, own, slopes in rows)
         return seen, jacobian
 
@@ -115,10 +117,9 @@ class Comparison:
             begin = list(part.begin_places)
             found = part.forward.run(part.table(values), values[:, places], slopes[:, places], values[:, begin])
             seen[:, where] = found[:, 0]
-            for k, place in enumerate(places):
-                jacobian[:, place, where] = found[:, 1 + k]
-            for k, place in enumerate((*part.time_places, *begin), start=len(places)):
-                jacobian[:, place, where] = found[:, 1 + k] * slopes[:, place, None]
+            jacobian[:, places, where] = found[:, 1 : 1 + len(places)]
+            for k, place in enumerate((*part.time_places, *begin), start=1 + len(places)):
+                jacobian[:, place, where] = found[:, k] * slopes[:, place, None]
             for row, place in zip(part.trend, part.trend_places, strict=True):
                 seen[:, where] += values[:, place, None] * row
                 jacobian[:, place, where] = slopes[:, place, None] * row
@@ -136,11 +137,10 @@ class Comparison:
         seen, jacobian = self.model(coordinates)
         r = (self.data if data is None else data) - seen
         if np.any(self.weights != 1.0):
-            r *= self.weights
-            jacobian *= self.weights
+            r, jacobian = r * self.weights, jacobian * self.weights
         if self.loss != "linear":
             r, slope = lost(self.loss, r, self.width)
-            jacobian *= slope[:, None, :]
+            jacobian = jacobian * slope[:, None, :]
         return r, jacobian
 
     def misfit(self, coordinates: Array) -> Array:

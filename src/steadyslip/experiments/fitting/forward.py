@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from steadyslip.kernels.experiment import LANES, experiment_program
 from steadyslip.kernels.layout import Setting
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
-from steadyslip.model.scales import natural_scales
+from steadyslip.model.scales import scale_rows
 from steadyslip.motion.engine import run_many
 from steadyslip.motion.jobs import automatic_method
 
@@ -71,6 +72,12 @@ def _padded(array: Array, size: int) -> Array:
     return np.concatenate([array, missing], axis=1)
 
 
+@lru_cache(maxsize=64)
+def _point_of(rig: Slider, names: tuple[str, ...]) -> OperatingPoint:
+    """Where a rig is, some of its parameters as arrays."""
+    return operating_point(rig, {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names})
+
+
 class Forward:
     """Runs an experiment for many sets of parameters at once.
 
@@ -97,8 +104,7 @@ class Forward:
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.unsettled = rig, tuple(names), rtol, shifts, tuple(unsettled)
         self.effort = effort or Effort()
-        own = {name: np.array([float(rig.parameters()[name].value or 0.0)]) for name in names}
-        self._base = operating_point(rig, own)
+        self._base = _point_of(rig, self.names)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
         self.directions = len(names) + shifts + len(unsettled) if sensitive else 0
@@ -113,22 +119,32 @@ class Forward:
         named = self._base.named() | varied
         return self._base.with_arguments(named.values(), (len(parameters),))
 
-    def _chain(self, parameters: Array, values: OperatingPoint) -> Array:
-        """How the model's parameters and where it begins change with the free ones."""
+    @cached_property
+    def _entries(self) -> Array:
+        """Which parameters of the model, and where it begins, each direction changes: (directions, all)."""
         order = {name: i for i, name in enumerate(self.model.parameters)}
         begins = {name: len(order) + i for i, name in enumerate(self.program.unsettled)}
-        chain = np.zeros((len(parameters), self.directions, len(order) + len(begins)))
+        found = np.zeros((-(-self.directions // max(self.size, 1)) * self.size, len(order) + len(begins)))
         if not self.directions:
-            return chain
+            return found
         for i, name in enumerate(self.unsettled, start=self.directions - len(self.unsettled)):
-            chain[:, i, begins[name]] = 1.0
+            found[i, begins[name]] = 1.0
         for i, name in enumerate(self.names):
             if name in order:
-                chain[:, i, order[name]] = 1.0
+                found[i, order[name]] = 1.0
+        return found
+
+    def _chain(self, parameters: Array, units: Array) -> Array:
+        """How the model's parameters and where it begins change with the free ones; zero in directions to spare."""
+        chain = np.tile(self._entries, (len(parameters), 1, 1))
+        if not self.directions:
+            return chain
         if self.rig.axial_stiffness is not None and "slider.stiffness" not in self.names:
+            stiffness = list(self.model.parameters).index("slider.stiffness")
             for i, name in enumerate(self.names):
                 if name == "slider.axial_stiffness" or name.startswith("contact."):
-                    chain[:, i, order["slider.stiffness"]] = self._stiffness_slope(parameters, i)
+                    chain[:, i, stiffness] = self._stiffness_slope(parameters, i)
+        chain[:, : len(self.names)] *= units[:, :, None]
         return chain
 
     def _stiffness_slope(self, parameters: Array, i: int) -> Array:
@@ -161,17 +177,15 @@ class Forward:
             steady sliding to start from.
         """
         values = self.values(parameters)
-        chain = self._chain(parameters, values)
+        chain = self._chain(parameters, units)
         away = np.zeros((len(parameters), len(self.program.unsettled)))
         if begin is not None:
             away[:, [list(self.program.unsettled).index(name) for name in self.unsettled]] = begin
-        if not self.directions:
-            return self._run(table, values, chain, away)
-        chain[:, : len(self.names)] *= units[:, :, None]
+        if self.directions <= self.size:
+            own = table.along(slice(self.directions), self.size) if self.directions else table
+            return self._run(own, values, chain, away)[:, : 1 + self.directions]
         parts = [slice(k, k + self.size) for k in range(0, self.directions, self.size)]
-        found = [
-            self._run(table.along(part, self.size), values, _padded(chain[:, part], self.size), away) for part in parts
-        ]
+        found = [self._run(table.along(part, self.size), values, chain[:, part], away) for part in parts]
         return np.concatenate([found[0], *(more[:, 1:] for more in found[1:])], axis=1)[:, : 1 + self.directions]
 
     def _run(self, table: InputTable, values: OperatingPoint, chain: Array, away: Array) -> Array:
@@ -186,7 +200,7 @@ class Forward:
             constants, start, settings, table = constants[good], start[good], settings[good], table.part(good)
         found, taken = (seen, steps) if np.all(good) else (seen[good], steps[good])
 
-        def work(first: int, last: int, _: threading.Event) -> None:
+        def work(first: int, last: int, _: threading.Event | None = None) -> None:
             part = slice(first, last)
             own = table.part(part)
             self.program.through_table(
@@ -195,7 +209,7 @@ class Forward:
             )  # fmt: skip
 
         if len(found) <= LANES:
-            work(0, len(found), threading.Event())
+            work(0, len(found))
         elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
             raise KeyboardInterrupt  # half of the runs would pass for runs that failed
         self.effort.budget.spend(np.sum(taken, axis=1) + LOOK * len(table.times), 1 + chain.shape[1])
@@ -205,18 +219,14 @@ class Forward:
 
     def _settings(self, table: InputTable, values: OperatingPoint, jobs: int) -> Array:
         """Rows of settings, absolute tolerances of state and sensitivities last."""
-        reduction = self.program.reduction
-        scales, (unknown, *_) = natural_scales(values, reduction)
-        size = len(reduction.names)
+        scales, unknown = scale_rows(values, self.program.reduction)
+        size = scales.shape[1]
         settings = np.zeros((jobs, Setting.ATOL + size * (1 + self.size)))
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
         richer = 1 + RICHER * (len(self.names) + self.shifts + len(self.unsettled))
         settings[:, Setting.MOST_STEPS] = int(self.effort.patience * richer * len(table.times)) + 1000
         settings[:, Setting.FIRST_STEP] = np.inf
-        for i, name in enumerate(reduction.names):
-            settings[:, Setting.ATOL + i] = self.rtol * scales[name]
-            if self.size:
-                loose = LOOSE * np.asarray(scales[name]) * np.ones(jobs)
-                settings[:, Setting.ATOL + size + i :: size] = loose[:, None]
+        settings[:, Setting.ATOL : Setting.ATOL + size] = self.rtol * scales
+        settings[:, Setting.ATOL + size :] = np.tile(LOOSE * scales, self.size)
         return settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -178,7 +178,7 @@ class Plan:
         if self.follows:
             inputs = CommandedInputs(self.loading[i], record.time, self.pressed and record.normal is not None, self.lag)
             load = self.loading[i].load
-            moved = None if load is None else load.integral(record.time)
+            moved = load.integral(record.time) if load is not None and self.trend else None
         elif self.protocol is None:
             inputs = MeasuredInputs(record, self.sharp[i], pressed)
         else:
@@ -202,18 +202,28 @@ class Plan:
             rate = (resting_rate(self.loading[i]) if self.follows else None) or rate
             if rate is None:
                 raise InternalError("rate is not None")
-            rig = rig.with_values({"drive.velocity": rate})
+            rig = _driven_at(rig, rate)
         if not self.pressed or record.normal is None:
             return rig, None
         stress = None if self.drive == "measured" else self.loading[i].stress
         if stress is not None and not self.follows:  # of a protocol that leaves the normal stress to the record
             pressed = stress.at(record.time)
-            rig = replace(rig, contact=pressed_at(float(pressed[0])))
+            rig = _pressed_with(rig, float(pressed[0]))
             return rig, (record.normal if stress.changes else pressed) - pressed[0]
         if stress is not None:
-            return replace(rig, contact=pressed_at(float(stress.at(record.time[:1])[0]))), None
-        rig = replace(rig, contact=pressed_at(float(record.normal[0])))
+            return _pressed_with(rig, float(stress.at(record.time[:1])[0])), None
+        rig = _pressed_with(rig, float(record.normal[0]))
         return rig, record.normal - record.normal[0]
+
+
+@lru_cache(maxsize=64)
+def _driven_at(rig: Slider, rate: float) -> Slider:
+    return rig.with_values({"drive.velocity": rate})
+
+
+@lru_cache(maxsize=64)
+def _pressed_with(rig: Slider, stress: float) -> Slider:
+    return replace(rig, contact=pressed_at(stress))
 
 
 def make_plan(

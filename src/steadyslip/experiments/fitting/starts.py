@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from steadyslip.core.errors import InternalError
+from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs, windows
 from steadyslip.experiments.fitting.comparison import RecordPart
 from steadyslip.experiments.fitting.inputs import ProtocolInputs
@@ -149,9 +151,7 @@ def starting_points(
     parts: Sequence[RecordPart], found: Sequence[Features], space: Space, count: int = STARTS, already: int = 0
 ) -> Array:
     """Coordinates to start from, (count, p): a design over what the records leave open, continued after `already`."""
-    from scipy.stats import qmc
-
-    grid = qmc.Halton(6, rng=12345).random(already + count)[already:]
+    grid = _design(already + count)[already:]
     shortest, longest = min(f.shortest for f in found), max(f.longest for f in found)
     d_c = shortest * (longest / shortest) ** (0.05 + 0.85 * grid[:, 0])
     directs = [f.direct for f in found if f.direct is not None]
@@ -174,6 +174,13 @@ def starting_points(
         alone = sum(one.kind == unknown.kind and one.record == unknown.record for one in space.unknowns) == 1
         values[:, i] = _start(unknown, part, own, (d_c, a, b, steepness, alpha, grid[:, 5]), alone)
     return space.coordinates(np.clip(values, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
+
+
+@lru_cache(maxsize=8)
+def _design(count: int) -> Array:
+    from scipy.stats import qmc
+
+    return np.asarray(read_only(qmc.Halton(6, rng=12345).random(count)))
 
 
 def search_bounds(parts: Sequence[RecordPart], told: Sequence[Features], space: Space) -> tuple[Array, Array]:

@@ -83,15 +83,20 @@ class Space:
         bounds = [u.bounds for u in unknowns]
         self.low = np.array([low for low, _ in bounds])
         self.high = np.array([high for _, high in bounds])
+        self._logarithmic = np.array([u.logarithmic for u in unknowns], dtype=bool)
+        self._sizes = np.array([u.size for u in unknowns])
 
     def __len__(self) -> int:
         return len(self.unknowns)
 
     def values(self, coordinates: Array) -> Array:
-        return np.stack([u.value(coordinates[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
+        powers = np.exp(np.where(self._logarithmic, coordinates, 0.0))
+        return np.where(self._logarithmic, powers, coordinates * self._sizes)
 
     def coordinates(self, values: Array) -> Array:
         return np.stack([u.coordinate(values[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
 
     def slopes(self, coordinates: Array) -> Array:
-        return np.stack([u.slope(coordinates[..., i]) for i, u in enumerate(self.unknowns)], axis=-1)
+        """Change of each parameter per unit of its coordinate."""
+        powers = np.exp(np.where(self._logarithmic, coordinates, 0.0))
+        return np.where(self._logarithmic, powers, self._sizes)

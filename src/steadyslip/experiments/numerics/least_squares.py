@@ -25,6 +25,7 @@ NEAR = 0.02  # of a coordinate: the same place
 SAME = 1e-2  # difference of sums of squares, as a share, between ends at one rough minimum
 PACE = 10  # iterations over which the progress of a problem is judged
 CRAWL = 3e-7  # of its sum of squares in as many: along a valley that data do not tell from its bottom; it ends there
+LARGEST = 1e100  # sum of squares, of residuals and of derivatives
 DAMPED, CLOSE = 1e-2, 1e-4  # damping to begin with, far from a minimum and close to one
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
@@ -128,9 +129,7 @@ def minimise(
     held = np.zeros((count, size), dtype=bool) if held is None else held
     everyone = np.arange(count)
     found = Minima(z.copy(), np.full(count, np.inf), np.zeros(count, dtype=bool), np.zeros(count, dtype=int))
-    r, jacobian = residuals(z, everyone)
-    normal, gradient = _normal(r, jacobian)
-    ssq = np.where(_usable(normal, gradient), _squares(r), np.inf)
+    ssq, normal, gradient = _normal(*residuals(z, everyone))
     found.ssq[:] = ssq
     damped, raised, scale = np.full(count, damping), np.full(count, 2.0), np.zeros((count, size))
     stuck = np.zeros(count, dtype=bool)
@@ -142,43 +141,41 @@ def minimise(
     for iteration in range(1, most + 1):
         if not len(active) or (enough is not None and enough()):
             break
-        z = found.coordinates[active]
-        diagonal = np.einsum("mii->mi", normal)
-        scale[active] = np.maximum(scale[active] * 0.5, diagonal)
-        free = ~held[active] & ~(((z <= low[active]) & (gradient < 0)) | ((z >= high[active]) & (gradient > 0)))
-        promise = _promise(normal, gradient, free)
-        over = (promise <= tolerance * np.maximum(found.ssq[active], 1e-300)) | stuck[active]
+        z, before = found.coordinates[active], found.ssq[active]
+        scale[active] = curvature = np.maximum(scale[active] * 0.5, np.einsum("mii->mi", normal))
+        bottom, top = low[active], high[active]
+        free = ~(held[active] | ((z <= bottom) & (gradient < 0)) | ((z >= top) & (gradient > 0)))
+        promise, step = _steps(normal, gradient, free, damped[active], curvature)
+        over = (promise <= tolerance * np.maximum(before, 1e-300)) | stuck[active]
         best = min(known, float(np.min(found.ssq[found.converged], initial=np.inf)))
         if iteration % PACE == 0:
-            gone = (earlier[active] - found.ssq[active]) / PACE
-            over |= gone * PACE <= CRAWL * found.ssq[active]
+            gone = (earlier[active] - before) / PACE
+            over |= gone * PACE <= CRAWL * before
             if race:
-                over |= found.ssq[active] - gone * (most - iteration) > best
+                over |= before - gone * (most - iteration) > best
             earlier = found.ssq.copy()
         if race and np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
-            over |= found.ssq[active] - promise > (1 - 1e-9) * best
+            over |= before - promise > (1 - 1e-9) * best
         if np.any(over):
             ended = active[over]
-            small = promise[over] <= max(STALLED, tolerance) * np.maximum(found.ssq[ended], 1e-300)
+            small = promise[over] <= max(STALLED, tolerance) * np.maximum(before[over], 1e-300)
             found.converged[ended] = small | stuck[ended]
             rest = ~over
-            active, normal, gradient, z, free = active[rest], normal[rest], gradient[rest], z[rest], free[rest]
+            active, normal, gradient, z, before = active[rest], normal[rest], gradient[rest], z[rest], before[rest]
+            step, curvature, bottom, top = step[rest], curvature[rest], bottom[rest], top[rest]
             if not len(active):
                 break
-        step = _step(normal, gradient, free, damped[active], scale[active])
-        stretch = _stretch(step, last[active], scale[active]) * plain[active]
+        stretch = _stretch(step, last[active], curvature) * plain[active]
         step *= np.maximum(stretch, 1.0)[:, None]
         step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
-        trial = np.clip(z + step, low[active], high[active])
-        hoped, expected = _expected(normal, gradient, step), _expected(normal, gradient, trial - z)
-        r, jacobian = residuals(trial, active)
-        new_normal, new_gradient = _normal(r, jacobian)
-        after = np.where(_usable(new_normal, new_gradient), _squares(r), np.inf)
-        good = after < found.ssq[active]
+        trial = np.clip(z + step, bottom, top)
+        hoped, expected = _expected(normal, gradient, np.stack([step, trial - z]))
+        after, new_normal, new_gradient = _normal(*residuals(trial, active))
+        good = after < before
         with np.errstate(all="ignore"):
-            ratio = np.where(expected > 0, (found.ssq[active] - after) / expected, 0.0)
+            ratio = np.where(expected > 0, (before - after) / expected, 0.0)
         tried = ~good & (stretch > 1)  # in vain, which says nothing of the step itself
-        stuck[active] = ~good & ~tried & (hoped <= STILL * found.ssq[active])
+        stuck[active] = ~good & ~tried & (hoped <= STILL * before)
         factor = np.where(good, np.where(ratio > 0.25, 0.2, 1.0), np.where(tried, 1.0, raised[active]))
         damped[active] = np.clip(damped[active] * factor, 1e-12, None)
         raised[active] = np.where(good | tried, 2.0, np.minimum(2 * raised[active], MOST_RAISED))
@@ -203,50 +200,37 @@ def _stretch(step: Array, last: Array, scale: Array) -> Array:
     return np.where((straight > ALONG) & (share < 1), 1 / (1 - np.clip(share, 0.0, MOST_SHARE)), 1.0)
 
 
-def _squares(r: Array) -> Array:
+def _normal(r: Array, jacobian: Array) -> tuple[Array, Array, Array]:
+    """Sums of squares, JᵀJ and −Jᵀr, r being data minus model and J the model's derivative.
+
+    The sum is inf where a motion gave no numbers, or some near the end of floating point.
+    """
     with np.errstate(all="ignore"):
-        total = np.einsum("mn,mn->m", r, r)
-    return np.asarray(np.where(np.isfinite(total), total, np.inf))
+        normal, gradient = np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
+        ssq, largest = np.einsum("mn,mn->m", r, r), np.max(np.einsum("mii->mi", normal), axis=1, initial=0.0)
+        return np.where((ssq < LARGEST) & (largest < LARGEST), ssq, np.inf), normal, gradient
 
 
-def _normal(r: Array, jacobian: Array) -> tuple[Array, Array]:
-    """JᵀJ and −Jᵀr, r being data minus model and J the model's derivative."""
-    with np.errstate(all="ignore"):
-        return np.matmul(jacobian, jacobian.transpose(0, 2, 1)), np.matmul(jacobian, r[:, :, None])[:, :, 0]
+def _steps(normal: Array, gradient: Array, free: Array, damping: Array, scale: Array) -> tuple[Array, Array]:
+    """How much the sum of squares would fall in the best step if the problem were linear; the step, damped."""
+    diagonal = np.einsum("mii->mi", normal)
+    extra = np.stack([
+        np.broadcast_to(1e-12 * np.max(diagonal, axis=1, keepdims=True), diagonal.shape),
+        damping[:, None] * np.maximum(scale, 1e-12 * np.max(scale, axis=1, keepdims=True)),
+    ])  # fmt: skip
+    # solved in the free coordinates, scaled to a unit diagonal
+    total = diagonal + extra
+    size_of = np.sqrt(np.maximum(total, 1e-300))
+    matrix = normal / (size_of[..., :, None] * size_of[..., None, :])
+    matrix = np.where(free[:, :, None] & free[:, None, :], matrix, 0.0)
+    each = np.arange(normal.shape[1])
+    matrix[..., each, each] = np.where(free, total / size_of**2, 1.0) + 1e-14
+    pull = np.where(free, gradient, 0.0)
+    best, step = np.linalg.solve(matrix, (pull / size_of)[..., None])[..., 0] / size_of
+    return np.einsum("mi,mi->m", best, pull), step
 
 
-def _usable(normal: Array, gradient: Array) -> Array:
-    """Whether a motion gave numbers at all, and none near the end of floating point."""
-    size = np.max(np.abs(normal), axis=(1, 2), initial=0.0) + np.max(np.abs(gradient), axis=1, initial=0.0)
-    return np.asarray(size < 1e100)
-
-
-def _solved(normal: Array, gradient: Array, free: Array, extra: Array) -> Array:
-    """Solutions of (JᵀJ + extra) step = gradient in the free coordinates, scaled to a unit diagonal."""
-    size = normal.shape[1]
-    size_of = np.sqrt(np.maximum(np.einsum("mii->mi", normal) + extra, 1e-300))
-    matrix = normal / (size_of[:, :, None] * size_of[:, None, :])
-    mask = free[:, :, None] & free[:, None, :]
-    matrix = np.where(mask, matrix, 0.0)
-    step = np.arange(size)
-    matrix[:, step, step] = np.where(free, (np.einsum("mii->mi", normal) + extra) / size_of**2, 1.0)
-    matrix[:, step, step] += 1e-14
-    right = np.where(free, gradient / size_of, 0.0)
-    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0] / size_of)
-
-
-def _step(normal: Array, gradient: Array, free: Array, damping: Array, scale: Array) -> Array:
-    largest = np.max(scale, axis=1, keepdims=True)
-    return _solved(normal, gradient, free, damping[:, None] * np.maximum(scale, 1e-12 * largest))
-
-
-def _expected(normal: Array, gradient: Array, step: Array) -> Array:
-    """How much the sum of squares would fall in a step if the problem were linear."""
-    return np.asarray(2 * np.einsum("mi,mi->m", gradient, step) - np.einsum("mi,mij,mj->m", step, normal, step))
-
-
-def _promise(normal: Array, gradient: Array, free: Array) -> Array:
-    """How much the sum of squares would fall in the best step if the problem were linear."""
-    largest = np.max(np.einsum("mii->mi", normal), axis=1, keepdims=True)
-    step = _solved(normal, gradient, free, 1e-12 * largest)
-    return np.asarray(np.einsum("mi,mi->m", step, np.where(free, gradient, 0.0)))
+def _expected(normal: Array, gradient: Array, steps: Array) -> Array:
+    """How much the sum of squares would fall in steps (k, m, p) if the problem were linear, (k, m)."""
+    fall = gradient - 0.5 * np.matmul(normal, steps[..., None])[..., 0]
+    return np.asarray(2 * np.einsum("kmi,kmi->km", fall, steps))

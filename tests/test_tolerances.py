@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
+from machines import leading, same_block, two_mass
 from rigs_of_theory import SIGMA, rate_state, rig
 
 OWN = rig(friction=rate_state(), stiffness=9e9)
@@ -70,3 +71,48 @@ def test_reports_say_how_sure_the_verdict_is():
     assert "friction.a" in document
     assert "all together" in document
     assert document == ss.report(ss.tolerate(OWN, given), explorer=False).html
+
+
+def test_a_machine_of_one_body_is_tolerated_as_its_slider():
+    block, machine = same_block(7)
+    edge = float(ss.critical_stiffness(block))
+    block, machine = block.with_values({"stiffness": 1.1 * edge}), machine.with_values({"stiffness": 1.1 * edge})
+    given = {"stiffness": "20 %", "friction.a": "10 %"}
+    own = ss.tolerate(block, given)
+    of_machine = {"links.spring.stiffness": "20 %", "contacts.base.friction.a": "10 %"}
+    found = ss.tolerate(machine, of_machine, along="links.spring.stiffness")
+    assert 0 < own.share < 1
+    np.testing.assert_array_equal(found.stable, own.stable)
+    np.testing.assert_allclose(found.edge, own.edge, rtol=1e-10)
+    np.testing.assert_allclose(found.safety, own.safety, rtol=1e-10)
+    np.testing.assert_allclose(found.growth, own.growth, rtol=1e-7, atol=1e-9)
+    assert found.unit == "N/m"
+
+
+def test_growth_rates_tell_how_sure_a_machine_is():
+    """Kp of theory 11 is stable above 2.63."""
+    machine = two_mass(kp=2.8)
+    found = ss.tolerate(machine, {"drive.kp": "20 %", "bodies.table.mass": "1 %"})
+    assert (found.along, found.alone[0].parameter, found.alone[0].stable) == ("", "drive.kp", None)
+    ends = [leading(machine.with_values({"drive.kp": kp})).real for kp in (0.8 * 2.8, 1.2 * 2.8)]
+    assert found.alone[0].growth == pytest.approx(sorted(ends), rel=1e-9)
+    assert np.all(found.stable == (found.growth < 0))
+    assert "growth rate" in str(found)
+    assert found.plot().get_xlabel() == "growth rate of disturbances (1/s)"
+    document = ss.report(machine, explorer=False, tolerances={"drive.kp": "20 %", "bodies.table.mass": "1 %"}).html
+    assert "right of 0 disturbances grow" in document
+    assert document == ss.report(found, explorer=False).html
+
+
+def test_the_safety_of_a_machine_is_that_of_the_parameter_that_is_named():
+    machine = two_mass(kp=4.0)
+    edge = ss.stable_values(machine, "drive.kp")[0, 0]
+    assert ss.safety_factor(machine, along="kp") == pytest.approx(4.0 / edge, rel=1e-12)
+    masses = np.array([5.0, 7.0])
+    found = ss.safety_factor(machine, {"bodies.table.mass": masses}, along="kp")
+    edges = [ss.stable_values(machine.with_values({"bodies.table.mass": m}), "kp")[0, 0] for m in masses]
+    np.testing.assert_allclose(found, 4.0 / np.array(edges), rtol=1e-12)
+    with pytest.raises(ss.ParameterError, match=r"along: missing; name a parameter .* 'links\.screw\.stiffness'"):
+        ss.safety_factor(machine)
+    with pytest.raises(ss.NotAvailable, match="linearly"):
+        ss.tolerate(machine, {"drive.kp": "5 %"}, along="contacts.guide.friction.mu_ref")

@@ -125,9 +125,6 @@ class NoSteadySliding(SteadyslipError, ValueError):
         super().__init__(message)
 
 
-MACHINES_CAN = "machines have analyze, simulate, hopf, cycles, threshold, maps, modes, boundary, margins, stable_values"
-
-
 class NotAvailable(SteadyslipError, ValueError):
     """The question has no answer for this rig; the message says why and what to ask instead."""
 

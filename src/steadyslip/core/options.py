@@ -12,7 +12,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from steadyslip.core.errors import MACHINES_CAN, ParameterError, Problem, one
+from steadyslip.core.errors import ParameterError, Problem, one
 from steadyslip.core.roles import Domain, Names, Option, Role, Text, Whole, below_one, fault, steps, tolerance
 
 LARGEST = 1.7e308  # integers may be larger than any float
@@ -71,23 +71,29 @@ def _all_numbers(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Made(Tested):
-    """An object that a function gives; a machine in place of a slider is told that this is yet to come."""
+    """An object that a function gives; `instead` tells what to ask of a machine where a slider is wanted."""
+
+    instead: str = ""
 
     def refused(self, value: Any) -> ParameterError:
-        if type(value).__name__ == "Machine":
-            return fault(
-                f"this is not offered for a machine yet, {self.words.partition(',')[0]} is allowed; {MACHINES_CAN}"
-            )
+        if type(value).__name__ == "Machine" and "Slider" in self.words:
+            return fault(f"got a Machine; allowed: a Slider, one block on one surface{self.instead}")
         return super().refused(value)
 
 
-def _made(names: str, maker: str) -> Role:
+def _made(names: str, maker: str, instead: str = "") -> Role:
     """An object of one of some classes, by name, which `maker` gives."""
     wanted = names.split(" | ")
     return Made(
         f"{one(' or '.join(wanted))}, such as {maker} gives",
         lambda value: any(kind.__name__ in wanted for kind in type(value).__mro__),
+        f"; {instead}" if instead else "",
     )
+
+
+def slider(instead: str) -> Role:
+    """A slider, in functions of which machines have others: `instead` names them."""
+    return _made("Slider", "read_rig", instead)
 
 
 def whole(least: int, most: int = 2**31) -> Whole:

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.quantities import shown_range
 from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, axes_or_new
-from steadyslip.linear.stiffness import safety_factor
+from steadyslip.linear.stable_values import safety_factor
+from steadyslip.linear.stiffness import STIFFNESS, growth_rate
 from steadyslip.verdict.tolerances import Tolerated
 
 COLOURS = {True: BLUE, False: ORANGE, None: GREY}
@@ -15,7 +16,9 @@ WORDS = {True: "stable throughout", False: "unstable throughout", None: "stable 
 
 
 def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
-    """Draw how far the stiffness over the critical one moves: each parameter alone, and all together.
+    """Draw how far the stiffness over the critical one moves, or what is told in its place: growth rates of a machine.
+
+    Each parameter alone, and all together.
 
     Parameters
     ----------
@@ -26,22 +29,28 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
     """
-    shown = [one for one in found.alone if np.isfinite(one.safety[0])][::-1]
+    edges = bool(found.along)
+    spans = {one.parameter: one.safety if edges else one.growth for one in found.alone}
+    shown = [one for one in found.alone if np.all(np.isfinite(spans[one.parameter]))][::-1]
     ax = axes_or_new(ax, 1.6 + 0.55 * len(shown))
     for place, one in enumerate(shown, start=1):
-        low, high = one.safety
+        low, high = spans[one.parameter]
         label = WORDS[one.stable] if one.stable not in [other.stable for other in shown[: place - 1]] else None
         ax.barh(place, high - low, 0.55, left=low, color=COLOURS[one.stable], label=label)
-    known = found.safety[np.isfinite(found.safety)]
+    values = found.safety if edges else found.growth
+    known = values[np.isfinite(values)]
     if len(known):
         ax.barh(0, known.max() - known.min(), 0.55, left=known.min(), color=SKY, label="all together")
     ranges = [f"{one.parameter}\n{shown_range(one.low, one.high, one.unit, one.area)}" for one in shown]
     ax.set_yticks(
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
     )
+    ax.margins(x=0.06)
     ax.use_sticky_edges = False  # or the widest bar would touch the frame
-    ax.axvline(1.0, color=BLACK, linewidth=1)
-    ax.axvline(float(safety_factor(found.rig)), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")
-    ax.set_xlabel("stiffness over critical stiffness (1)")
+    ax.axvline(1.0 if edges else 0.0, color=BLACK, linewidth=1)
+    own = safety_factor(found.rig, along=found.along) if edges else growth_rate(found.rig)
+    ax.axvline(float(own), color=BLACK, linewidth=1, linestyle=":", label="the rig itself")
+    ratio = "stiffness over critical stiffness" if found.along == STIFFNESS else f"{found.along} over its edge"
+    ax.set_xlabel(f"{ratio} (1)" if edges else "growth rate of disturbances (1/s)")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize="small")
     return ax

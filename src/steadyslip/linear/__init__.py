@@ -8,14 +8,13 @@ from steadyslip.linear.formula import formula
 from steadyslip.linear.modes import Mode, modes
 from steadyslip.linear.response import Response, small_signal
 from steadyslip.linear.search import Boundary
-from steadyslip.linear.stable_values import stable_values
+from steadyslip.linear.stable_values import safety_factor, stable_values
 from steadyslip.linear.state_space import state_space, to_control
 from steadyslip.linear.status import stability
 from steadyslip.linear.stiffness import (
     critical_stiffness,
     eigenvalues,
     growth_rate,
-    safety_factor,
     stable_stiffness,
 )
 

@@ -17,7 +17,7 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import Num, derivative
-from steadyslip.core.options import checked
+from steadyslip.core.options import checked, slider
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
@@ -167,7 +167,7 @@ def contact_coefficients(model: Model) -> tuple[sp.Expr, sp.Expr, sp.Expr, sp.Ex
     return b0, b1, b2, b3
 
 
-@checked()
+@checked(rig=slider("state_space tells how bodies and contacts of a machine answer to forces"))
 @quietly
 def small_signal(rig: Slider, vary: Vary | None = None) -> Response:
     """f, S, r, f1, μ and B0...B3 of a rig as numbers.

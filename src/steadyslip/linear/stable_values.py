@@ -6,7 +6,7 @@ polynomial itself, at three values that are decades apart.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.linear.linear_sets import linear_set, not_linear, sets_of
 from steadyslip.linear.polynomials import Array
-from steadyslip.linear.stiffness import in_chunks
+from steadyslip.linear.stiffness import STIFFNESS, critical_stiffness, in_chunks, own_safety_factor, stable_stiffness
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
@@ -52,11 +52,9 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     oscillation turns more than a hundred times during the delay; the last interval ends there.
     """
     full = rig.resolve(name)
-    value = rig.value(full)
     late = rig.parameters()[full].role.kind == "delay"
-    if not late and (not value or value < 0):
-        message = "has no positive value to start from; give it one first"
-        raise ParameterError([Problem(full, message)])
+    if not late:
+        _require_positive(rig, full)
     point = operating_point(rig, vary, (full,) if late else ())
     if point.shape or vary:
         found = stable_intervals(point, full)
@@ -68,6 +66,91 @@ def stable_values(rig: Slider | Machine, name: str, vary: Vary | None = None) ->
     if own is None:
         raise not_linear(full)
     return np.asarray(own.intervals[np.isfinite(own.intervals[:, 0])])
+
+
+@checked()
+def safety_factor(rig: Slider | Machine, vary: Vary | None = None, *, along: str | None = None) -> Any:
+    """Stiffness over critical stiffness k/k_cr, a controller's gain kp counted with both; or a parameter over its edge.
+
+    Parameters
+    ----------
+    rig : Slider or Machine
+    vary : mapping of str to array_like or xarray.DataArray, optional
+        Parameters to vary, by dotted name, in SI units; they broadcast.
+    along : str, optional
+        Dotted name, or a unique last part, of a positive parameter that enters the equations linearly: a link's
+        stiffness, a gain, a mass, ...; the stiffness of a slider unless given.
+
+    Returns
+    -------
+    float, ndarray or xarray.DataArray
+        The value over the nearest end of an interval of stable values. Sliding is stable above 1 where the edge is a
+        lower limit, as it is of most stiffnesses, and below 1 where it is an upper one; `stable_values` tells. NaN
+        where there is none.
+
+    Raises
+    ------
+    ParameterError
+        If of a machine no parameter is named.
+    NotAvailable
+        If the parameter does not enter linearly.
+    """
+    full = name_along(rig, along)
+    point = operating_point(rig, vary)
+    if is_own_stiffness(rig, full):
+        return point.wrap(own_safety_factor(point), "safety_factor", "1")
+    _require_positive(rig, full)
+    edge, own = edge_along(rig, full, vary)
+    with np.errstate(all="ignore"):
+        return point.wrap(np.asarray(own / edge), "safety_factor", "1")
+
+
+def name_along(rig: Slider | Machine, along: str | None) -> str:
+    """The full name of a parameter whose edge is asked for; the stiffness of a slider unless one is given.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such parameter, or none is given of a machine.
+    """
+    if along is None and isinstance(rig, Machine):
+        known = {name: one for name, one in rig.parameters().items() if one.value and one.role.kind != "delay"}
+        example = next((name for name, one in known.items() if one.role.kind == "stiffness"), next(iter(known)))
+        raise ParameterError([Problem("along", f"missing; name a parameter that the machine has, such as {example!r}")])
+    return rig.resolve(along or STIFFNESS)
+
+
+def is_own_stiffness(rig: Slider | Machine, name: str) -> TypeGuard[Slider]:
+    """Whether a parameter is the stiffness of a slider, for which there are closed forms."""
+    return isinstance(rig, Slider) and name == STIFFNESS
+
+
+def _require_positive(rig: Slider | Machine, name: str) -> None:
+    value = rig.value(name)
+    if not value or value < 0:
+        raise ParameterError([Problem(name, "has no positive value to start from; give it one first")])
+
+
+def edge_along(rig: Slider | Machine, name: str, vary: Vary | None) -> tuple[Array, Array]:
+    """The end of a stable interval of a parameter nearest to its own value, and that value; SI units, (...).
+
+    Raises
+    ------
+    NotAvailable
+        If it does not enter linearly.
+    """
+    point = operating_point(rig, vary)
+    own = np.broadcast_to(np.asarray(point.named()[name], dtype=float), point.shape)
+    if is_own_stiffness(rig, name):
+        return np.asarray(critical_stiffness(rig, vary)), own
+    return nearest_value(stable_intervals(point, name), own), own
+
+
+def intervals_along(rig: Slider | Machine, name: str, vary: Vary | None) -> Array:
+    """Stable intervals of a parameter, SI units, (..., m, 2)."""
+    if is_own_stiffness(rig, name):
+        return np.asarray(stable_stiffness(rig, vary))
+    return stable_intervals(operating_point(rig, vary), name)
 
 
 def stable_intervals(point: OperatingPoint, name: str) -> Array:

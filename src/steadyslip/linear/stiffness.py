@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import ArrayFunction
-from steadyslip.core.options import checked
+from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_late
@@ -31,11 +31,12 @@ from steadyslip.model.range import in_range, quasi, require_range, stacked, sure
 from steadyslip.model.steady import steady_equation
 
 STIFFNESS = "slider.stiffness"
+ONE_STIFFNESS = slider("of a machine's stiffnesses safety_factor and stable_values tell, each by its name")
 _CHUNK = 32768  # rigs at a time, so that intermediate arrays stay in the processor's cache
 _LEAST = 1e-290  # size beneath which a product of numbers is looked at by the general route
 
 
-@checked()
+@checked(rig=ONE_STIFFNESS)
 def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     """Critical stiffness: the edge of the stable set nearest to the rig's own stiffness.
 
@@ -67,31 +68,17 @@ def critical_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     return point.wrap(in_chunks(point, _nearest_edge), "critical_stiffness", "Pa/m")
 
 
-@checked()
-def safety_factor(rig: Slider, vary: Vary | None = None) -> Any:
-    """Stiffness over critical stiffness k/k_cr, a controller's gain kp counted with both.
-
-    Parameters
-    ----------
-    rig, vary
-        As for `critical_stiffness`.
-
-    Returns
-    -------
-    float, ndarray or xarray.DataArray
-        Sliding is stable above 1 where the edge is a lower limit of the stiffness, as it is for most rigs, and below 1
-        where it is an upper one; `stable_stiffness` tells. NaN where there is no critical stiffness.
-    """
-    point = operating_point(rig, vary)
+def own_safety_factor(point: OperatingPoint) -> Array:
+    """Stiffness of sliders over the critical one, a controller's gain kp counted with both, (...)."""
 
     def kernel(part: OperatingPoint) -> Array:
         with np.errstate(all="ignore"):
-            return np.asarray((part.named()["slider.stiffness"] + part.gain) / (_nearest_edge(part) + part.gain))
+            return np.asarray((part.named()[STIFFNESS] + part.gain) / (_nearest_edge(part) + part.gain))
 
-    return point.wrap(in_chunks(point, kernel), "safety_factor", "1")
+    return in_chunks(point, kernel)
 
 
-@checked()
+@checked(rig=ONE_STIFFNESS)
 def stable_stiffness(rig: Slider, vary: Vary | None = None) -> Any:
     """All stiffnesses k > 0 at which steady sliding is stable, as intervals.
 

@@ -183,9 +183,17 @@ def steady_machine(rig: Machine) -> SteadyMachine:
     return SteadyMachine(float(point.drive), speeds, contacts, links, units)
 
 
+@overload
+def steady_states(rig: Slider) -> tuple[SteadySliding, ...]: ...
+
+
+@overload
+def steady_states(rig: Machine) -> tuple[SteadyMachine, ...]: ...
+
+
 @checked()
-def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
-    """All states of steady sliding, by rising normal stress.
+def steady_states(rig: Slider | Machine) -> tuple[SteadySliding, ...] | tuple[SteadyMachine, ...]:
+    """All states of steady sliding, by rising normal stress; of a machine the one that it has.
 
     Raises
     ------
@@ -194,6 +202,8 @@ def steady_states(rig: Slider) -> tuple[SteadySliding, ...]:
     NotAvailable
         If numbers leave the range of floating point.
     """
+    if isinstance(rig, Machine):
+        return (steady_machine(rig),)
     point = operating_point(rig)
     require_range(point)
     stresses = point.all_stresses()

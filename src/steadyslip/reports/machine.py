@@ -11,11 +11,11 @@ from steadyslip.reports.brief import inside
 from steadyslip.reports.document import Parts
 from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, paragraph, table
-from steadyslip.verdict import MachineAnalysis
+from steadyslip.verdict import MachineAnalysis, Tolerated
 from steadyslip.verdict.machine import machine_facts
 
 
-def about(analysis: MachineAnalysis) -> Parts:
+def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Parts:
     """The document of a verdict on a machine."""
     machine = analysis.rig
     drive = machine.parameters()["drive.velocity"]
@@ -24,6 +24,7 @@ def about(analysis: MachineAnalysis) -> Parts:
         heading("The machine"), inside(machine),
         heading("The verdict"), *_verdict(analysis),
         heading("How far is the edge?"), _picture(analysis), *of_rig.edges(analysis),
+        *of_rig.within(tolerated),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
         paragraph(of_rig.SMALL),
     ]  # fmt: skip

@@ -157,9 +157,9 @@ def _rig(
 def _machine(
     result: Machine, branch: int = 0, fit: Fit | None = None, tolerances: Mapping[str, Any] | None = None
 ) -> Parts:  # fmt: skip
-    if branch or fit is not None or tolerances:
-        raise NotAvailable("a report of a machine takes no branch, fit or tolerances yet; leave them out")
-    return of_machine.about(analyze(result))
+    if branch or fit is not None:
+        raise NotAvailable("a machine has one steady sliding, and fits are of a slider; leave branch and fit out")
+    return of_machine.about(analyze(result), tolerate(result, tolerances) if tolerances else None)
 
 
 @parts_of.register
@@ -169,6 +169,8 @@ def _machine_analysis(result: MachineAnalysis) -> Parts:
 
 @parts_of.register
 def _tolerated(result: Tolerated) -> Parts:
+    if isinstance(result.rig, Machine):
+        return of_machine.about(analyze(result.rig), result)
     return of_rig.about(analyze(result.rig), None, result)
 
 

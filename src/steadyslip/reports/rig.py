@@ -11,6 +11,7 @@ from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.linear.formula import formula_in_parts
+from steadyslip.linear.stiffness import STIFFNESS
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
@@ -36,7 +37,7 @@ def about(analysis: Analysis, prediction: Prediction | None = None, tolerated: T
     body = [
         heading("The rig"), figure(sketch(rig)), inputs(rig),
         heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
-        *_confidence(prediction), *_tolerances(tolerated),
+        *_confidence(prediction), *within(tolerated),
         heading("How far is the edge?"), *edges(analysis), *_charts(analysis),
         heading("The formulas"), *formulas(analysis),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings), paragraph(SMALL),
@@ -129,10 +130,14 @@ def _confidence(prediction: Prediction | None) -> Iterator[str]:
     yield figure(drawn(lambda: prediction.plot(), "prediction", 6.0), "What the draws of the fit say about this rig.")
 
 
-def _tolerances(found: Tolerated | None) -> Iterator[str]:
+def within(found: Tolerated | None) -> Iterator[str]:
+    """What tolerances make of a verdict."""
     if found is None:
         return
     yield heading("How sure is that, within the tolerances?")
     yield rows_of(str(found))
-    words = "Each parameter alone within its tolerance, and all of them; left of 1 the stiffness is less than critical."
+    left = "right of 0 disturbances grow"
+    if found.along:
+        left = "left of 1 the stiffness is less than critical" if found.along == STIFFNESS else "1 is the edge"
+    words = f"Each parameter alone within its tolerance, and all of them; {left}."
     yield figure(drawn(lambda: found.plot(), "tolerances", 7.0), words)

@@ -17,8 +17,10 @@ from steadyslip.core.records import Address, resolve
 from steadyslip.core.results import ReadOnly
 from steadyslip.core.roles import Parameter, positive
 from steadyslip.linear.boundary import present_zeros
+from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
-from steadyslip.linear.stiffness import critical_stiffness, safety_factor
+from steadyslip.linear.stiffness import STIFFNESS, growth_rate
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
@@ -37,7 +39,9 @@ class Alone(Displayed):
     low, high : float
         Its range, SI units.
     safety : tuple of float
-        Least and largest stiffness over critical stiffness; NaN where there is none.
+        Least and largest value over its edge of what edges are told of, a slider's stiffness; NaN where there is none.
+    growth : tuple of float
+        Least and largest growth rate of small disturbances, 1/s.
     stable : bool or None
         Whether sliding is stable throughout the range; None if in a part of it only.
     """
@@ -47,6 +51,7 @@ class Alone(Displayed):
     high: float
     unit: str
     safety: tuple[float, float]
+    growth: tuple[float, float]
     stable: bool | None
     area: float | None = field(default=None, repr=False)
 
@@ -57,24 +62,31 @@ class Tolerated(ReadOnly):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     alone : tuple of Alone
         Each parameter by itself, the one that matters most first.
     stable : ndarray of bool (m,)
         Of rigs spread evenly over all ranges at once.
     exists : ndarray of bool (m,)
         Whether they slide steadily at all.
-    critical_stiffness : ndarray (m,)
-        Pa/m; NaN where there is no edge.
+    growth : ndarray (m,)
+        Growth rate of small disturbances, 1/s: of the leading eigenvalue.
+    along : str
+        The parameter whose edge is told, ``slider.stiffness`` for a slider; empty where none is, as of a machine
+        unless one is named.
+    edge : ndarray (m,)
+        The nearest edge of stability in it, SI units; NaN where there is none.
     safety : ndarray (m,)
-        Stiffness over critical stiffness.
+        Its value over that.
     """
 
-    rig: Slider = field(repr=False)
+    rig: Slider | Machine = field(repr=False)
     alone: tuple[Alone, ...]
     stable: Array = field(repr=False)
     exists: Array = field(repr=False)
-    critical_stiffness: Array = field(repr=False)
+    growth: Array = field(repr=False)
+    along: str
+    edge: Array = field(repr=False)
     safety: Array = field(repr=False)
 
     @property
@@ -85,23 +97,39 @@ class Tolerated(ReadOnly):
     def __str__(self) -> str:
         count, share = len(self.stable), self.share
         whole = {1.0: f"Stable in all {count} rigs", 0.0: f"Stable in none of {count} rigs"}
+        wide = max(26, 2 + max(len(one.parameter) for one in self.alone))
         lines = [f"{whole.get(share, f'Stable in {percent(share)} of {count} rigs')} within the tolerances"]
         if not np.all(self.exists):
-            lines.append(f"no steady sliding         in {percent(1 - float(np.mean(self.exists)))} of them")
-        for words, values, unit in (
-            ("critical stiffness", self.critical_stiffness, "Pa/m"),
-            ("stiffness over critical", self.safety, "1"),
-        ):
-            known = values[np.isfinite(values)]
-            if len(known):
-                ends = shown_range(float(known.min()), float(known.max()), unit, self.rig.area)
-                lines.append(f"{words:<26}{ends}")
+            lines.append(f"{'no steady sliding':<{wide}}in {percent(1 - float(np.mean(self.exists)))} of them")
+        own = self.along == STIFFNESS and isinstance(self.rig, Slider)
+        edge, over = (
+            ("critical stiffness", "stiffness over critical") if own else (f"edge in {self.along}", "over its edge")
+        )
+        told = [(edge, self.edge, self.unit), (over, self.safety, "1")] if self.along else []
+        if not self.along or not np.any(np.isfinite(self.edge)):
+            told.append(("growth rate", self.growth, "1/s"))
+        for words, values, unit in told:
+            if (known := _ends(values)) is not None:
+                lines.append(f"{words:<{wide}}{shown_range(*known, unit, self.area)}")
         for one in self.alone:
-            known = "" if np.isnan(one.safety[0]) else f", {one.safety[0]:.4g} to {one.safety[1]:.4g} times critical"
+            if not np.isnan(one.safety[0]):
+                beside = f", {one.safety[0]:.4g} to {one.safety[1]:.4g} times {'critical' if own else 'its edge'}"
+            else:
+                beside = f", growth rate {shown_range(*one.growth, '1/s')}" if not self.along else ""
             word = {True: "stable", False: "unstable", None: "stable in a part of it"}[one.stable]
             ends = shown_range(one.low, one.high, one.unit, one.area)
-            lines.append(f"{one.parameter:<26}{ends} alone: {word}{known}")
+            lines.append(f"{one.parameter:<{wide}}{ends} alone: {word}{beside}")
         return "\n".join(lines)
+
+    @property
+    def unit(self) -> str:
+        """Of the edge."""
+        return self.rig.parameters()[self.along].role.unit if self.along else "1"
+
+    @property
+    def area(self) -> float | None:
+        """Over which the edge is a stress, for whoever speaks of the whole of it."""
+        return self.rig.area_of(self.along) if self.along else None
 
     def plot(self, ax: Any = None) -> Any:
         """Draw what each parameter does alone; see `steadyslip.figures.tolerances`."""
@@ -109,15 +137,18 @@ class Tolerated(ReadOnly):
 
 
 @checked()
-def tolerate(rig: Slider, tolerances: Mapping[str, Any]) -> Tolerated:
+def tolerate(rig: Slider | Machine, tolerances: Mapping[str, Any], *, along: str | None = None) -> Tolerated:
     """The verdicts on all rigs whose parameters lie within tolerances.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     tolerances : mapping of str to float or str
         By dotted name how far a value may be off to either side: a number in SI units, text with a unit, or a share of
         the value such as ``"5 %"``.
+    along : str, optional
+        The parameter whose edge is told, one that enters the equations linearly, by its dotted name; the stiffness of a
+        slider unless given. Of a machine growth rates are told instead unless one is given.
 
     Returns
     -------
@@ -127,45 +158,68 @@ def tolerate(rig: Slider, tolerances: Mapping[str, Any]) -> Tolerated:
     ------
     ParameterError
         If a name or a tolerance is not allowed, or leads out of what the rig can have.
+    NotAvailable
+        If what is named by `along` does not enter linearly.
     """
+    name = "" if along is None and isinstance(rig, Machine) else name_along(rig, along)
     ranges = _ranges(rig, tolerances)
     from scipy.stats import qmc
 
     even = qmc.Sobol(len(ranges), scramble=True, rng=np.random.default_rng(0)).random_base2(POWER)
     varied = {name: low + (high - low) * even[:, i] for i, (name, (low, high)) in enumerate(ranges.items())}
-    exists, stable, critical, safety = _judged(rig, varied)
-    alone = [_alone(rig, name, low, high) for name, (low, high) in ranges.items()]
+    every = _judged(rig, varied, name)
+    alone = [_alone(rig, one, low, high, name) for one, (low, high) in ranges.items()]
     alone.sort(key=lambda one: (one.stable is not None, -_spread(one)))
-    return Tolerated(rig, tuple(alone), stable, exists, critical, safety)
+    return Tolerated(rig, tuple(alone), every.stable, every.exists, every.growth, name, every.edge, every.safety)
+
+
+def _ends(values: Array) -> tuple[float, float] | None:
+    """Least and largest of what is finite; None where nothing is."""
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else None
 
 
 def _spread(one: Alone) -> float:
-    return one.safety[1] - one.safety[0] if np.isfinite(one.safety[0]) else 0.0
+    low, high = one.growth if np.isnan(one.safety[0]) else one.safety
+    return high - low if np.isfinite(high - low) else 0.0
 
 
-def _alone(rig: Slider, name: str, low: float, high: float) -> Alone:
-    _, stable, _, safety = _judged(rig, {name: np.linspace(low, high, ALONE)})
-    known = safety[np.isfinite(safety)]
-    ends = (float(known.min()), float(known.max())) if len(known) else (float("nan"),) * 2
-    whole = bool(stable[0]) if np.all(stable == stable[0]) else None
-    return Alone(name, low, high, rig.parameters()[name].role.unit, ends, whole, rig.area)
+def _alone(rig: Slider | Machine, name: str, low: float, high: float, along: str) -> Alone:
+    found, nothing = _judged(rig, {name: np.linspace(low, high, ALONE)}, along), (float("nan"),) * 2
+    whole = bool(found.stable[0]) if np.all(found.stable == found.stable[0]) else None
+    safety, growth = _ends(found.safety) or nothing, _ends(found.growth) or nothing
+    return Alone(name, low, high, rig.parameters()[name].role.unit, safety, growth, whole, rig.area_of(name))
 
 
-def _judged(rig: Slider, varied: Mapping[str, Array]) -> tuple[Array, Array, Array, Array]:
-    """Whether rigs slide steadily, whether that is stable, critical stiffness, and stiffness over that."""
+@dataclass(frozen=True)
+class _Judged:
+    """Whether rigs slide steadily, whether that is stable, growth rates, an edge and the value over it; (m,)."""
+
+    exists: Array
+    stable: Array
+    growth: Array
+    edge: Array
+    safety: Array
+
+
+def _judged(rig: Slider | Machine, varied: Mapping[str, Array], along: str) -> _Judged:
     found = status(operating_point(rig, varied, present_zeros(rig)))
-    critical, safety = (np.asarray(ask(rig, varied), dtype=float) for ask in (critical_stiffness, safety_factor))
-    return (found != ABSENT) & (found != UNKNOWN), found == STABLE, critical, safety
+    growth = np.asarray(growth_rate(rig, varied), dtype=float)
+    edge = safety = np.full(len(growth), np.nan)
+    if along:
+        edge = np.asarray(edge_along(rig, along, varied)[0], dtype=float)
+        safety = np.asarray(safety_factor(rig, varied, along=along), dtype=float)
+    return _Judged((found != ABSENT) & (found != UNKNOWN), found == STABLE, growth, edge, safety)
 
 
-def _ranges(rig: Slider, tolerances: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+def _ranges(rig: Slider | Machine, tolerances: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     known = {name: one for name, one in rig.parameters().items() if one.value is not None}
     problems: list[Problem] = []
     found: dict[str, tuple[float, float]] = {}
     for given, tolerance in tolerances.items():
         try:
             name = resolve(given, known)
-            half, value = _half(known[name], tolerance, rig.area), float(known[name].value or 0.0)
+            half, value = _half(known[name], tolerance, rig.area_of(name)), float(known[name].value or 0.0)
             for end in (value - half, value + half):
                 rig.with_values({name: end})
             found[name] = (value - half, value + half)

@@ -15,8 +15,9 @@ from steadyslip.core.quantities import outside, percent, shown
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
 from steadyslip.experiments.fitting.result import Fit
+from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
-from steadyslip.linear.stiffness import critical_stiffness, growth_rate, safety_factor
+from steadyslip.linear.stiffness import critical_stiffness, growth_rate
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets

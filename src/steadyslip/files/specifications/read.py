@@ -8,7 +8,6 @@ from os import PathLike
 from typing import Any
 
 from steadyslip.core.errors import (
-    MACHINES_CAN,
     InternalError,
     NotAvailable,
     ParameterError,
@@ -153,7 +152,7 @@ class Specification:
     def refuse_machine(self) -> None:
         """Refuse a machine where only sliders are offered."""
         if self.machine is not None:
-            raise NotAvailable(f"this is not offered for a machine yet; {MACHINES_CAN}")
+            raise NotAvailable("the file describes a machine; allowed: a slider, one block on one surface")
 
     def checked_rig(self, *others: Problem) -> Slider:
         """The slider of a file in which nothing is wrong.

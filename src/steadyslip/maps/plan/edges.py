@@ -14,7 +14,7 @@ from steadyslip.core.roles import Text
 from steadyslip.linear import critical_stiffness, safety_factor, stable_stiffness
 from steadyslip.linear.linear_sets import most_values
 from steadyslip.linear.response import has_closed_form
-from steadyslip.linear.stable_values import nearest_value, stable_intervals
+from steadyslip.linear.stable_values import edge_along, intervals_along, is_own_stiffness, name_along, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.plan.measures import ONSET, Measure, Output, Vary, block_of
@@ -72,16 +72,13 @@ class Along(Measure):
 
     def name_of(self, rig: Slider | Machine) -> str:
         """The full name of the parameter."""
-        return rig.resolve(self.along or "slider.stiffness")
+        return name_along(rig, self.along)
 
     def is_own(self, rig: Slider | Machine) -> bool:
         """Whether it is the stiffness of a slider, for which there are closed forms."""
-        return not isinstance(rig, Machine) and self.name_of(rig) == "slider.stiffness"
+        return is_own_stiffness(rig, self.name_of(rig))
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
-        if self.along is None and isinstance(rig, Machine):
-            yield Problem("along", f"missing; name a parameter that the machine has, such as {_example(rig)!r}")
-            return
         try:
             full = self.name_of(rig)
             if not self.is_own(rig):
@@ -104,21 +101,11 @@ class Along(Measure):
 
     def intervals(self, rig: Slider | Machine, vary: Vary) -> Any:
         """Stable intervals in SI units, (..., m, 2)."""
-        if self.is_own(rig):
-            return stable_stiffness(block_of(rig), vary)
-        return stable_intervals(operating_point(rig, vary), self.name_of(rig))
+        return intervals_along(rig, self.name_of(rig), vary)
 
     def edge(self, rig: Slider | Machine, vary: Vary) -> tuple[Any, Any]:
         """The nearest end of a stable interval, and the rig's own value, SI units."""
-        full = self.name_of(rig)
-        own = operating_point(rig, vary).named()[full]
-        return nearest_value(np.asarray(self.intervals(rig, vary)), own), own
-
-
-def _example(rig: Machine) -> str:
-    """A parameter that a machine has and whose edge is of interest."""
-    known = [name for name, one in rig.parameters().items() if one.value and one.role.kind != "delay"]
-    return next((name for name in known if rig.parameters()[name].role.kind == "stiffness"), known[0])
+        return edge_along(rig, self.name_of(rig), vary)
 
 
 class Edge(Along, name="edge"):
@@ -151,15 +138,7 @@ class SafetyFactor(Along, name="safety_factor"):
         return (Output("safety_factor", "1", what),)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
-        return {"safety_factor": self.factor(rig, vary)}
-
-    def factor(self, rig: Slider | Machine, vary: Vary) -> Any:
-        """Value over edge."""
-        if self.is_own(rig):
-            return safety_factor(block_of(rig), vary)
-        edge, own = self.edge(rig, vary)
-        with np.errstate(all="ignore"):
-            return own / edge
+        return {"safety_factor": safety_factor(rig, vary, along=self.along)}
 
 
 class LogMargin(SafetyFactor, name="margin"):
@@ -171,7 +150,7 @@ class LogMargin(SafetyFactor, name="margin"):
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         with np.errstate(all="ignore"):
-            return {"margin": np.log(self.factor(rig, vary))}
+            return {"margin": np.log(safety_factor(rig, vary, along=self.along))}
 
 
 class OnsetKind(Along, name="onset"):

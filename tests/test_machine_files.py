@@ -105,7 +105,7 @@ def test_everything_that_is_wrong_with_a_file_comes_at_once():
     found = {(p.name, p.line) for p in caught.value.problems}
     assert found == {
         ("bodies.table.mass", 5), ("links.screw.between", 8), ("links.loop.between", 11), ("contacts.guide.body", 14),
-        ("contacts.guide.contact.preload", 22), ("drive.body", 27),
+        ("contacts.guide.contact.preload", 22), ("drive.body", 27), ("bodies.stray", 6),
     }  # fmt: skip
     text = str(caught.value)
     for piece in (

@@ -1,8 +1,9 @@
-"""Names of bodies and links that tables mention and that do not exist, told before there is a machine to ask."""
+"""Names that tables mention and that do not exist, or that nothing mentions: told before there is a machine to ask."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 from steadyslip.core.errors import Problem, unknown_name
@@ -22,9 +23,21 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
         if isinstance(by := touch.get("loaded_by"), str) and by not in links:
             yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", by, links))
     drive = tables.get("drive")
+    driven = drive if isinstance(drive, dict) else {}
     for key in ("body", "measured", "speed_measured"):
-        if isinstance(drive, dict):
-            yield from _unknown(f"drive.{key}", drive.get(key), list(bodies))
+        yield from _unknown(f"drive.{key}", driven.get(key), list(bodies))
+    named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
+    named += [touch.get(key) for touch in contacts.values() for key in ("body", "against")]
+    yield from unnamed(bodies, [*named, driven.get("body")])
+
+
+def unnamed(bodies: Iterable[str], named: Sequence[Any]) -> Iterator[Problem]:
+    """Bodies that float whatever is wrong with names: unless one that does not exist was meant for them."""
+    bodies = list(bodies)
+    meant = {near for end in named if end not in bodies for near in get_close_matches(str(end), bodies, cutoff=0.5)}
+    for name in bodies:
+        if name not in named and name not in meant:
+            yield Problem(f"bodies.{name}", "floats: no link, contact or drive names it")
 
 
 def _tables(raw: Any) -> dict[str, dict[str, Any]]:

@@ -12,6 +12,7 @@ from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.quantities import is_per_area, total_unit
 from steadyslip.core.records import Address, Condition, Members, members, part
 from steadyslip.machine.bodies import Body
+from steadyslip.machine.ends import unnamed
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
     GROUND,
@@ -52,6 +53,10 @@ class Machine(Rig):
         if not faults:
             yield from self._wrong_contacts()
             yield from self._floating()
+        else:
+            ends = [end for link in self.links.values() for end in link.between]
+            ends += [end for touch in self.contacts.values() for end in (touch.body, touch.against)]
+            yield from unnamed(self.bodies, [*ends, self.drive.driven()])
 
     def _nameless(self) -> Iterator[Problem]:
         for name in (GROUND, LOAD_POINT):

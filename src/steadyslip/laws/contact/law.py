@@ -199,7 +199,7 @@ class PreloadedContact(ContactLaw):
 
     def inconsistencies(self) -> Iterator[Problem]:
         if self.preload is None and self.steady_normal_stress is None:
-            yield Problem("preload", "missing; give preload or steady_normal_stress, such as '5 MPa'")
+            yield Problem("preload", "missing; give preload or steady_normal_stress")
         if self.preload is not None and self.steady_normal_stress is not None:
             yield Problem("steady_normal_stress", "given beside preload; give one of the two")
 

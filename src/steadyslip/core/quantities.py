@@ -371,10 +371,12 @@ def stress_name(name: str, area: float | None) -> str:
 
 
 def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
-    """A value for people: prefixed unit and a few digits, angles in degrees, totals where the rig has an `area`.
+    """A value for people: prefixed unit, a few digits, angles in degrees, leads in turns, totals if there is an `area`.
 
     >>> shown(8.72093e9, "Pa/m"), shown(-0.7853981633974483, "rad"), shown(0.0145, "1")
     ('8.721 GPa/m', '-45 deg', '0.0145')
+    >>> shown(0.01 / 6.283185307179586, "m/rad")
+    '10 mm/rev'
     >>> shown(8.72093e9, "Pa/m", area=0.01)
     '87.21 MN/m'
     """
@@ -384,6 +386,8 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
         return f"{value:.{digits}g}"
     if si_unit == "rad":
         return f"{value / units.deg:.{digits}g} deg"
+    if si_unit == "m/rad":
+        value, si_unit = value * 2 * math.pi, "m/rev"
     if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:

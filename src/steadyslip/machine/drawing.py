@@ -351,7 +351,7 @@ class Drawing:
         if link.turning[0] and link.ratio() != 1:
             ratio = next(known[f"links.{name}.{key}"] for key in ("lead", "gear") if f"links.{name}.{key}" in known)
             words[0] += ", " + (
-                f"{shown(float(ratio.value or 0) * 2 * math.pi, 'm')}/rev"
+                shown(float(ratio.value or 0), ratio.role.unit)
                 if ratio.role.unit == "m/rad"
                 else f"gear {float(ratio.value or 0):.3g}"
             )

@@ -34,7 +34,8 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
 def unnamed(bodies: Iterable[str], named: Sequence[Any]) -> Iterator[Problem]:
     """Bodies that float whatever is wrong with names: unless one that does not exist was meant for them."""
     bodies = list(bodies)
-    meant = {near for end in named if end not in bodies for near in get_close_matches(str(end), bodies, cutoff=0.5)}
+    meant = {near for end in named if isinstance(end, str) and end not in bodies
+             for near in get_close_matches(end, bodies, cutoff=0.5)}  # fmt: skip
     for name in bodies:
         if name not in named and name not in meant:
             yield Problem(f"bodies.{name}", "floats: no link, contact or drive names it")

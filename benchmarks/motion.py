@@ -28,18 +28,21 @@ import time
 
 import numpy as np
 import rivals
+from jump import jump
 from numba import njit
 from problems import Problem, problems
 
 import steadyslip as ss
+from steadyslip.kernels import linking
 from steadyslip.kernels.build import machine_code
-from steadyslip.kernels.jump import jump
 from steadyslip.kernels.layout import Final
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.record import Evaluator
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.jobs import Options, prepare
 
+if "--wide" in sys.argv:
+    linking.FEATURES.append("-prefer-256-bit")
 TARGET = 1e-6
 QUICK = "--quick" in sys.argv
 Curve = list[tuple[float, float]]  # (error, seconds per trajectory)

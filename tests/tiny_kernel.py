@@ -30,12 +30,8 @@ def tiny(factor):
 
 
 def ask(factor):
-    """Value of the little kernel, routine and driver, both made anew."""
-    import numba
-
+    """Value of the little kernel, made anew or found in the cache."""
     build._loaded.clear()
     record = np.ones(1)
     called(build.machine_code([tiny(factor)], 1)["step"], record)
-    function = numba.njit(lambda x: x * 1.0)
-    file = build._file(build._key(f"{factor} times"), "advance")
-    return build.compiled_once(function, numba.float64(numba.float64), file)(record[0])
+    return record[0]

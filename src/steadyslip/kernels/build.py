@@ -1,31 +1,28 @@
-"""Programs and drivers to machine code, kept between processes in the user's cache folder.
+"""Programs and the driver to machine code, kept between processes in the user's cache folder.
 
-A driver is compiled by numba once for all models; it reaches a model's routines by their addresses. The routines of a
-model are straight-line programs that go to LLVM as they are. Both are stored under the hash of their text, of all
-versions that matter and of the processor, in one sealed file, written under a temporary name and moved
-into place. It is opened only if it and its folder are this user's and nobody else can write to them, and if its seal
-(`steadyslip.files.sealed`) says that it is of this very function. Anything odd about it (damaged, of another function,
-foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder that cannot be written
-to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none. With ``STEADYSLIP_INTERPRET=1``
-nothing is compiled, and Python runs it all.
+The driver is translated and compiled once for all models; it reaches a model's routines by their addresses. The
+routines of a model are straight-line programs. Both go to LLVM as text. Machine code is stored under the hash of that
+text, or of what it is made of, of all versions that matter and of the processor, in one sealed file, written under a
+temporary name and moved into place. It is opened only if it and its folder are this user's and nobody else can write to
+them, and if its seal (`steadyslip.files.sealed`) says that it is of this very function. Anything odd about it (damaged,
+of another function, foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder
+that cannot be written to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none. With
+``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs it all.
 """
 
 from __future__ import annotations
 
 import contextlib
-import gc
+import ctypes
 import hashlib
-import json
 import os
-import pickle
-import struct
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
@@ -33,47 +30,37 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
-from steadyslip.kernels.driver import lanes, places, states, table
-from steadyslip.kernels.driver_text import numbered, text_of, texts
+from steadyslip.kernels import linking
+from steadyslip.kernels.driver import lanes, states, table
+from steadyslip.kernels.driver_text import text_of, texts
 from steadyslip.kernels.layout import Layout, Routines
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.printers import python
+from steadyslip.kernels.printers.llvm import assembly
+from steadyslip.kernels.printers.native.functions import translated
 
-ENTRIES: dict[str, tuple[ModuleType, str]] = {
+_REALS, _TABLE, _CUBE, _WHOLE = "real[:]", "real[:,:]", "real[:,:,:]", "int[:]"
+ENTRIES: dict[str, tuple[ModuleType, tuple[str, ...]]] = {
     "advance": (
         lanes,
-        "int64(float64[::1], int64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], "
-        "float64[:,:,::1], float64[::1], int64[::1], float64[:,::1], float64[:,::1], float64[:,:,::1], "
-        "float64[:,::1], float64[:,::1], int64)",
+        (_REALS, _WHOLE, _WHOLE, _TABLE, _TABLE, _TABLE, _CUBE, _REALS, _WHOLE, _TABLE, _TABLE, _CUBE, _TABLE, _TABLE,
+         "int"),
     ),
-    "observe": (
-        states,
-        "void(float64[:,::1], float64[:,::1], float64[:,:,::1], float64[:,::1], int64[::1], int64[::1], float64[::1], "
-        "float64[:,::1])",
-    ),
-    "field": (
-        states,
-        "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], int64[::1], float64[:,::1])",
-    ),
+    "observe": (states, (_TABLE, _TABLE, _CUBE, _TABLE, _WHOLE, _WHOLE, _REALS, _TABLE)),
+    "field": (states, (_TABLE, _TABLE, _TABLE, _TABLE, _WHOLE, _TABLE)),
     "through_table": (
         table,
-        "void(int64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1], float64[::1], "
-        "float64[:,:,::1], float64[:,:,:,::1], float64[:,:,::1], float64[:,::1])",
+        (_WHOLE, _TABLE, _TABLE, _TABLE, _CUBE, _REALS, _CUBE, "real[:,:,:,:]", _CUBE, _TABLE),
     ),
-}
-"""What is called from outside: where it is, and its signature behind layout and routines."""
-_FAST: dict[str, Any] = {"fastmath": {"contract", "nsz"}, "error_model": "numpy", "boundscheck": False}
-OPTIONS = {
-    "inner": _FAST | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True},
-    "entry": _FAST | {"nogil": True},
-    "place": _FAST | {"inline": "always"},  # a line each, which would take as long to compile as any
-}
-"""How numba compiles drivers."""
-KERNEL = FileKind("kernel", 3, 2**26, "it is compiled again")
+}  # fmt: skip
+"""What is called from outside: where it is, and the types of its arguments behind layout and routines."""
+KERNEL = FileKind("kernel", 4, 2**26, "it is compiled again")
 _MARK = "THIS"  # stands for the key in the routines' text
 _lock = threading.RLock()
-_drivers: dict[str, Callable[..., Any]] = {}
-_loaded: dict[str, tuple[Any, dict[str, int]]] = {}
+_drivers: dict[str, Callable[..., int]] = {}
+_loaded: dict[str, dict[str, int]] = {}
+_NATIVE = [f"printers.native.{part}" for part in ("functions", "expressions", "lines", "arrays")]
+_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)  # besides the driver's modules
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +81,9 @@ class Code:
     plain: bool
 
     def _bound(self, name: str) -> Callable[..., Any]:
-        entry = getattr(ENTRIES[name][0], name) if self.plain else compiled_driver(name)
         if self.plain:
-            return partial(entry, self.layout, self.routines)
-        return partial(entry, np.array(self.layout, dtype=np.int64), np.array(self.routines, dtype=np.int64))
+            return partial(getattr(ENTRIES[name][0], name), self.layout, self.routines)
+        return partial(driver(name), np.array(self.layout, dtype=np.int64), np.array(self.routines, dtype=np.int64))
 
     @cached_property
     def advance(self) -> Callable[..., int]:
@@ -105,17 +91,17 @@ class Code:
         return self._bound("advance")
 
     @cached_property
-    def observe(self) -> Callable[..., None]:
+    def observe(self) -> Callable[..., object]:
         """`steadyslip.kernels.driver.states.observe` of this model."""
         return self._bound("observe")
 
     @cached_property
-    def field(self) -> Callable[..., None]:
+    def field(self) -> Callable[..., object]:
         """`steadyslip.kernels.driver.states.field` of this model."""
         return self._bound("field")
 
     @cached_property
-    def through_table(self) -> Callable[..., None]:
+    def through_table(self) -> Callable[..., object]:
         """`steadyslip.kernels.driver.table.through_table` of this model."""
         return self._bound("through_table")
 
@@ -157,22 +143,14 @@ def cache_folder() -> Path | None:
 
 @lru_cache(maxsize=1)
 def _surroundings() -> str:
-    """Everything but the source that machine code depends on."""
-    import llvmlite
-    import llvmlite.binding as llvm
-    import numba
-
+    """Everything but the assembly that machine code depends on."""
     from steadyslip import __version__
 
-    switches = sorted(f"{name}={value}" for name, value in os.environ.items() if name.startswith("NUMBA_"))
-    processor = [llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
-    versions = [__version__, sys.version, numba.__version__, llvmlite.__version__, np.__version__]
-    return "\n".join([*versions, *processor, *switches])
+    return "\n".join([__version__, sys.version, np.__version__, *linking.surroundings()])
 
 
 def _key(source: str) -> str:
-    options = json.dumps(OPTIONS, default=sorted, sort_keys=True)
-    return hashlib.sha256(f"{_surroundings()}\n{options}\n{source}".encode()).hexdigest()
+    return hashlib.sha256(f"{_surroundings()}\n{source}".encode()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -208,147 +186,75 @@ def _file(key: str, name: str) -> _Kept:
     return _Kept(None if folder is None else folder / f"{key}-{name}")
 
 
-@contextlib.contextmanager
-def _without_collection() -> Iterator[None]:
-    """Compilation makes millions of objects that live; looking for garbage among them takes a third of its time."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
-
-
 # -- the routines of a model
 
 
 def machine_code(programs: Sequence[Program], lanes: int) -> dict[str, int]:
     """Addresses of programs, by name."""
-    from llvmlite import ir
-
-    from steadyslip.kernels.printers.llvm import assembly
-
-    pointer = str(ir.DoubleType().as_pointer())
-    text = assembly(programs, lanes, {program.name: f"{program.name}.{_MARK}" for program in programs}, pointer)
+    names = [program.name for program in programs]
+    text = assembly(programs, lanes, {name: f"{name}.{_MARK}" for name in names}, linking.pointer())
     key = _key(text)
     with _lock:
         if key not in _loaded:
-            _loaded[key] = _linked(text.replace(f".{_MARK}(", f".{key}("), key, [program.name for program in programs])
-        return _loaded[key][1]
+            _loaded[key] = kept_or_made(lambda: text.replace(f".{_MARK}(", f".{key}("), key, "routines", names)
+        return _loaded[key]
 
 
-def _linked(text: str, key: str, names: Sequence[str]) -> tuple[Any, dict[str, int]]:
-    """The library that owns the code, and where its functions are."""
-    from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.registry import cpu_target
-
-    codegen = cpu_target.target_context.codegen()
-    file = _file(key, "routines")
-    with global_compiler_lock:
-        library = _kept(codegen, file.read(), key)
-        if library is None:
-            library = _assembled(codegen, text, key)
-            _, _, (code, shared) = library.serialize_using_object_code()
-            file.write(struct.pack("<Q", len(code)) + code + shared)
-    return library, {name: int(library.get_pointer_to_function(f"{name}.{key}")) for name in names}
+def kept_or_made(text: Callable[[], str], key: str, what: str, names: Sequence[str]) -> dict[str, int]:
+    """Addresses of functions of some assembly, there ``name.key``: from a file of the cache, or compiled and kept."""
+    file = _file(key, what)
+    symbols = {name: f"{name}.{key}" for name in names}
+    content = file.read()
+    if content is None or not linking.is_machine_code(content, symbols.values()):
+        content = linking.machine_code(text())
+        file.write(content)
+    return linking.linked(content, symbols)
 
 
-def _kept(codegen: Any, content: bytes | None, key: str) -> Any:
-    """The library from a file of the cache, None if there is none or it is not one."""
-    if content is None or len(content) < 8:
-        return None
-    size = struct.unpack("<Q", content[:8])[0]
-    try:
-        return codegen.unserialize_library((key, "object", (content[8 : 8 + size], content[8 + size :])))
-    except Exception:  # whatever a file of another build may raise: compile instead
-        return None
+# -- the driver
 
 
-def _assembled(codegen: Any, text: str, key: str) -> Any:
-    import llvmlite.binding as llvm
-
-    library = codegen.create_library(key)
-    library.enable_object_caching()
-    module = llvm.parse_assembly(f"{library.create_ir_module(key)}\n{text}")
-    module.verify()
-    library.add_llvm_module(module)
-    library.finalize()
-    return library
-
-
-# -- the drivers
-
-
-def compiled_driver(name: str) -> Callable[..., Any]:
-    """One of `ENTRIES` as machine code, that takes addresses for routines."""
+def driver(name: str) -> Callable[..., int]:
+    """One of `ENTRIES` as machine code; its first two arguments are a layout and routines' addresses, as arrays."""
     with _lock:
-        if name not in _drivers:
-            module, signature = ENTRIES[name]
-            _drivers[name] = _compiled_entry(name, module, signature, driver_key(name))
+        if not _drivers:
+            key = driver_key()
+            addresses = kept_or_made(lambda: driver_text(key), key, "driver", tuple(ENTRIES))
+            for entry, (_, types) in ENTRIES.items():
+                _drivers[entry] = callable_at(addresses[entry], entry, (_WHOLE, _WHOLE, *types))
         return _drivers[name]
 
 
-def driver_key(name: str) -> str:
-    """The hash of everything that the machine code of an entry depends on."""
-    module, signature = ENTRIES[name]
-    others = [text_of(f"steadyslip.kernels.{part}") for part in ("layout", "jump", "driver_text", "build")]
-    return _key("\n".join([name, signature, *texts(module.__name__).values(), *others]))
+def driver_text(key: str) -> str:
+    """The driver as assembly."""
+    entries = {name: (_WHOLE, _WHOLE, *types) for name, (_, types) in ENTRIES.items()}
+    return translated(_driver_modules(), entries, {name: f"{name}.{key}" for name in ENTRIES}, 2, linking.opaque())
 
 
-def _compiled_entry(name: str, source: ModuleType, signature: str, key: str) -> Callable[..., Any]:
-    """The functions of a module and of those it needs, for numba, calling addresses instead of routines."""
-    import numba
-    from numba.core.sigutils import normalize_signature
-
-    from steadyslip.kernels.jump import jump
-
-    module = ModuleType(f"steadyslip_driver_{key}")
-    sys.modules[module.__name__] = module  # numba finds a cached function's globals by module name
-    for part, text in texts(source.__name__).items():
-        exec(compile(numbered(text), f"<{part}>", "exec"), module.__dict__)
-    for own, function in list(vars(module).items()):
-        if isinstance(function, FunctionType) and function.__module__ == module.__name__:
-            kind = "entry" if own in ENTRIES else "place" if hasattr(places, own) else "inner"
-            module.__dict__[own] = numba.njit(**OPTIONS[kind])(function)
-    module.__dict__["call"] = jump
-    arguments, result = normalize_signature(signature)  # type: ignore[no-untyped-call]
-    numbers = numba.int64[::1]
-    return compiled_once(module.__dict__[name], result(numbers, numbers, *arguments), _file(key, name))
+def _driver_modules() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for module, _ in ENTRIES.values():
+        found |= texts(module.__name__)
+    return found
 
 
-def compiled_once(function: Any, signature: Any, file: _Kept) -> Callable[..., Any]:
-    """A function of numba compiled for one signature, or loaded from a file."""
-    with _without_collection():
-        function._cache = _NumbaCache(file)
-        function.compile(signature)
-        function.disable_compile()
-    return cast(Callable[..., Any], function)
+@lru_cache(maxsize=1)
+def driver_key() -> str:
+    """The hash of everything that the machine code of the driver depends on."""
+    declared = [f"{name} {types}" for name, (_, types) in ENTRIES.items()]
+    others = [text_of(f"steadyslip.kernels.{part}") for part in _TRANSLATION]
+    return _key("\n".join([*declared, *_driver_modules().values(), *others]))
 
 
-class _NumbaCache:
-    """What a numba dispatcher asks of its cache, for one function in one checked file."""
+def callable_at(address: int, name: str, types: Sequence[str]) -> Callable[..., int]:
+    """A translated function as one of Python, which lets other threads run meanwhile."""
+    kinds = [ctypes.py_object if "[" in one else ctypes.c_int64 for one in types]
+    function = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(address)
 
-    def __init__(self, file: _Kept) -> None:
-        self.file = file
+    def called(*arguments: Any) -> int:
+        found: int = function(*arguments)
+        if found < 0:
+            raise TypeError(f"{name}: argument {-found} is not an array {types[-1 - found]} in one piece")
+        return found
 
-    @property
-    def cache_path(self) -> str:
-        return str(self.file.path)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function, or None if there is no sound file for it."""
-        content = self.file.read()
-        if content is None:
-            return None
-        from numba.core.compiler import CompileResult
-
-        target_context.refresh()
-        try:
-            return CompileResult._rebuild(target_context, *pickle.loads(content))  # type: ignore[no-untyped-call]
-        except Exception:  # whatever a file of another build may raise: compile instead
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Write the file, or do without."""
-        self.file.write(pickle.dumps(data._reduce(), protocol=-1))
+    return called

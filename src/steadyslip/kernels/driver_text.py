@@ -60,7 +60,7 @@ def numbered(text: str) -> ast.Module:
 
 
 class _Numbered(ast.NodeTransformer):
-    """Names of places become their numbers, and `Layout` and `Routines` arrays, which numba compiles twice as fast.
+    """Names of places become their numbers, and `Layout` and `Routines` arrays.
 
     Imports from the driver's own modules go: these are put into one.
     """

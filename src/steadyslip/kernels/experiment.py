@@ -56,7 +56,7 @@ class ExperimentProgram:
         return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
 
     @cached_property
-    def through_table(self) -> Callable[..., None]:
+    def through_table(self) -> Callable[..., object]:
         """`steadyslip.kernels.driver.table.through_table` of this model."""
         return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
 

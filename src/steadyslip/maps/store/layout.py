@@ -30,7 +30,7 @@ FORMAT = 2
 METADATA = 2**26  # bytes
 MOST_CHUNK = 2**30  # bytes of a chunk of one array
 MOST_EXTRA = 1000  # values of a result at one point
-_VERSIONS = ("numpy", "scipy", "numba", "zarr")
+_VERSIONS = ("numpy", "scipy", "llvmlite", "zarr")
 _TEXTS = ("title", "rig", "definition", "dims", "results", "steadyslip", "versions", "coordinates", "seal")
 _ARRAY = {"shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes",
           "dimension_names", "zarr_format", "node_type", "storage_transformers"}  # fmt: skip

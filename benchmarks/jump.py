@@ -1,4 +1,4 @@
-"""A call to an address, for numba: what `steadyslip.kernels.layout.call` is in compiled drivers."""
+"""A call to an address, for numba: steps of other solvers may ask for the rates of compiled kernels."""
 
 from __future__ import annotations
 

@@ -1,0 +1,113 @@
+"""NumPy's arrays as LLVM assembly sees them: where their objects keep what it takes to use them.
+
+The places are part of NumPy's binary interface (``PyArrayObject``, ``PyArray_Descr``), which extension modules rely on.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+
+from steadyslip.kernels.printers.native.lines import MEMORY, ArrayView, Lines, Scalar, Type, Value
+
+HEAD = object.__basicsize__  # bytes of every object of Python
+DATA, INDICES, SIZES, DESCRIPTOR, FLAGS = HEAD, HEAD + 8, HEAD + 16, HEAD + 40, HEAD + 48
+ORDER, NUMBER = HEAD + 10, HEAD + 12  # of a descriptor: order of bytes, number of the type
+USABLE = 0x1 | 0x100 | 0x400  # in one piece, aligned, may be written to
+SWAPPED = ord(">" if sys.byteorder == "little" else "<")
+ELEMENTS = {"real": np.dtype(np.float64), "int": np.dtype(np.int64)}
+
+
+def argument(text: str) -> tuple[str, int]:
+    """Kind and number of indices of what a declaration like ``real[:,:]`` or ``int`` means."""
+    kind, _, rest = text.partition("[")
+    return kind, rest.count(":")
+
+
+def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: int, opaque: bool) -> list[str]:
+    """A function that is called from Python with arrays and whole numbers, and calls another one.
+
+    Parameters
+    ----------
+    symbol : str
+        Its name.
+    called : tuple of str
+        The other's name, and the kind of its result: ``int`` or ``none``.
+    types : sequence of str
+        Of the arguments.
+    constant : int
+        How many of them, from the first on, are arrays that never change.
+    opaque : bool
+        See `Lines`.
+
+    Returns
+    -------
+    list of str
+        Lines. The function returns the other's result, which must not be negative, 0 if it has none, -1 - i if argument
+        i is not as declared.
+    """
+    body, given = Lines(opaque), list[Value]()
+    for i, text in enumerate(types):
+        kind, count = argument(text)
+        given.append(_array(body, i, kind, count, i < constant) if count else Scalar(kind, f"%a{i}"))
+    found = body.call(called[0], called[1], given)
+    body.add(f"ret i64 {found.text or 0}")
+    heads = ", ".join(f"i64 %a{i}" for i in range(len(types)))
+    return [f"define i64 {symbol}({heads}) nounwind {{", "entry:", *body.lines, "}"]
+
+
+def types_of(types: Sequence[str], constant: int) -> tuple[Type, ...]:
+    """Types of the arguments as a function sees them that is translated."""
+    declared = [argument(text) for text in types]
+    return tuple(ArrayView(kind, "", ("",) * count, i < constant).type if count else kind
+                 for i, (kind, count) in enumerate(declared))  # fmt: skip
+
+
+def _array(body: Lines, place: int, kind: str, count: int, is_constant: bool) -> ArrayView:
+    """The array at the address that an argument is, if it is as declared; else the function ends."""
+
+    def at(address: str, offset: int, what: str) -> str:
+        moved = body.name(f"add i64 {address}, {offset}")
+        pointer = body.name(f"inttoptr i64 {moved} to {body.pointer(what)}")
+        return body.name(f"load {what}, {body.pointer(what)} {pointer}")
+
+    def check(condition: str) -> None:
+        good = body.label("good")
+        body.fork(condition, good, f"bad{place}")
+        body.begin(good)
+
+    owner = f"%a{place}"
+    check(body.name(f"icmp eq i32 {at(owner, INDICES, 'i32')}, {count}"))
+    usable = body.name(f"and i32 {at(owner, FLAGS, 'i32')}, {USABLE}")
+    check(body.name(f"icmp eq i32 {usable}, {USABLE}"))
+    descriptor = at(owner, DESCRIPTOR, "i64")
+    check(body.name(f"icmp eq i32 {at(descriptor, NUMBER, 'i32')}, {ELEMENTS[kind].num}"))
+    check(body.name(f"icmp ne i8 {at(descriptor, ORDER, 'i8')}, {SWAPPED}"))
+    good = body.label("good")
+    body.jump(good)
+    body.begin(f"bad{place}")
+    body.add(f"ret i64 {-1 - place}")
+    body.begin(good)
+    pointer = body.name(f"inttoptr i64 {at(owner, DATA, 'i64')} to {body.pointer(kind)}")
+    sizes = at(owner, SIZES, "i64")
+    return ArrayView(kind, pointer, tuple(at(sizes, 8 * i, "i64") for i in range(count)), is_constant)
+
+
+def made(body: Lines, sizes: Sequence[str], room: str) -> ArrayView:
+    """A new array of zeros; where it is kept is written down in `room`, for `ended`."""
+    total = sizes[0]
+    for size in sizes[1:]:
+        total = body.name(f"mul nsw i64 {total}, {size}")
+    pointer = body.pointer("real")
+    found = body.name(f"call {pointer} @{MEMORY[0]}(i64 {total}, i64 8)")
+    body.add(f"store {pointer} {found}, {body.pointer(pointer)} {room}")
+    return ArrayView("real", found, tuple(sizes))
+
+
+def ended(body: Lines, room: str) -> None:
+    """Give back what `made` took."""
+    pointer = body.pointer("real")
+    found = body.name(f"load {pointer}, {body.pointer(pointer)} {room}")
+    body.add(f"call void @{MEMORY[1]}({pointer} {found})")

@@ -83,7 +83,7 @@ class Visit:
 
 def edges_of(visit):
     """The list of nearest edges as it is read: name and value."""
-    return dict(re.findall(r"(\S+) → (\S+)", visit.page.inner_text(".edges")))
+    return dict(re.findall(r"([\w.-]+) → (\S+)", " ".join(visit.page.locator(".edges button").all_text_contents())))
 
 
 def middle(element):

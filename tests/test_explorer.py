@@ -174,13 +174,13 @@ def test_shortened_code_says_the_same():
         "/**\n * Many\n * lines.\n */\n"
         "let c = (/** @type {any} */ (b)).d;\n"
     )
-    assert narrow(text) == 'const a=1;\nconst b="// @ /** x */";\nlet c=((b)).d;\n'
+    assert narrow(text) == 'const a=1;const b="// @ /** x */";let c=((b)).d;'
     nested = "const t = `a ${b ? `- ${c} ` : \" ; \"} , d`, r = e.replace(/ , \\//g, ' - ') + + 1 - -f;\n"
-    assert narrow(nested) == "const t=`a ${b ? `- ${c} ` : \" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ + 1 - -f;\n"
+    assert narrow(nested) == "const t=`a ${b ? `- ${c} ` : \" ; \"} , d`,r=e.replace(/ , \\//g,' - ')+ +1- -f;"
     sums = "    var t2 = ((R[0] * x) + R[1]);\n    var t3 = ((t2 - (x * x)) < (t2 * (x + 1)));\n"
-    assert dense(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));\n"
+    assert dense(sums) == "var t2=R[0]*x+R[1],t3=t2-x*x<(t2*(x+1));"
     generated = "function f(R, x, y) {\n    var t1 = R[0] - (-2.5e-07);\n    y[0] = (t1 >= 0) ? t1 : (1 / x);\n}\n"
-    assert dense(generated) == "function f(R,x,y){\nvar t1=R[0]-(-2.5e-07);\ny[0]=(t1>=0)?t1:1/x;\n}\n"
+    assert dense(generated) == "function f(R,x,y){var t1=R[0]-(-2.5e-07);y[0]=(t1>=0)?t1:1/x;}\n"
 
 
 def test_names_of_generated_code_are_as_short_as_may_be():

@@ -26,6 +26,9 @@ def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
         reason = visit.page.locator(".verdict p").first.inner_text()
         assert reason.lower() == f"{analysis.reason}.".lower()
         assert analysis.mode.words() in visit.page.locator(".mode").inner_text()
+        first = analysis.margins[0].parameter
+        assert first in visit.page.locator(".bar").get_attribute("aria-label"), "the bar begins with the nearest edge"
+        visit.page.get_by_label("parameter of the bar").select_option("drive.kp")
         bar = visit.page.locator(".bar").get_attribute("aria-label")
         assert "drive.kp" in bar
         assert "above 436.2 kN/m" in bar

@@ -153,3 +153,20 @@ STOP = """() => new Promise((done) => {
   };
   look();
 })"""
+
+
+def test_the_run_of_a_page_is_one_of_the_command_line(browser, moved, tmp_path):
+    """The protocol that it tells gives the run that it shows."""
+    with Visit(browser, moved["explorer"]) as visit:
+        visit.page.get_by_label("disturbance", exact=True).select_option("pull")
+        told = visit.told("slip event")
+        visit.page.locator(".motion .hint", has_text="pull on the block").wait_for()
+        told, block = visit.page.inner_text(".told"), visit.page.locator(".motion pre").text_content()
+    ss.write_rig(MOVED, tmp_path / "rig.toml")
+    (tmp_path / "rig.toml").write_text(
+        (tmp_path / "rig.toml").read_text(encoding="utf-8") + "\n" + block, encoding="utf-8"
+    )
+    protocol = ss.read_protocol(tmp_path / "rig.toml")
+    run = ss.simulate(ss.read_rig(tmp_path / "rig.toml"), protocol, rtol=1e-6)
+    assert told.startswith(f"{len(run.slip_events)} slip events")
+    assert f"{run.slip_events[-1].recurrence:.3g} s apart" in told

@@ -62,12 +62,16 @@ def test_axe_finds_nothing_serious(browser, moved, kind):
     script = Path(core.__file__).with_name("axe.min.js").read_text(encoding="utf-8")
     with Visit(browser, moved[kind], viewport={"width": 360, "height": 900}, color_scheme="dark") as visit:
         visit.told("slip event")
-        visit.page.locator(".events summary").click()
         visit.page.evaluate(script)
-        for width, scheme in ((360, "dark"), (1280, "light")):
-            visit.page.set_viewport_size({"width": width, "height": 900})
-            visit.page.emulate_media(color_scheme=scheme)
-            assert visit.page.evaluate(AXE) == []
+        for part in ("values", "chart", "numbers", "motion"):
+            visit.page.locator(".tabs").get_by_text(part).click()
+            if part == "motion":
+                visit.page.locator(".events summary").click()
+            if kind == "explorer" or part == "motion":
+                assert visit.page.evaluate(AXE) == []
+        visit.page.set_viewport_size({"width": 1280, "height": 900})
+        visit.page.emulate_media(color_scheme="light")
+        assert visit.page.evaluate(AXE) == []
 
 
 def test_reports_ask_for_nothing_fit_every_width_and_print_without_the_explorer(browser, moved):
@@ -96,7 +100,7 @@ def test_two_pages_live_in_one_document(browser, file, tmp_path):
             "Stable: steady sliding at 1 µm/s",
         ]
         ids = visit.page.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
-        assert len(ids) == len(set(ids)) == 2
+        assert len(ids) == len(set(ids)) > 2
 
 
 def test_hostile_titles_are_text(browser, tmp_path):

@@ -43,7 +43,7 @@ def explained(visit):
         "now, grows",
         "now, dies out",
         "at the edge of stability",
-        "at other stiffnesses, the larger the stiffer",
+        "at other values of what the bar shows, the larger the higher",
     ):
         assert words in marks.inner_text()
     assert marks.locator("svg path").count() == 5

@@ -223,7 +223,7 @@ def explore(
 
     if output is not None:
         check_output([output], [".html"])
-    found = run(read_rig(rig, changes or ()), title=rig.stem, branch=branch)
+    found = run(read_rig(rig, changes or ()), title=rig.stem, branch=branch, source=rig)
     if output is None:
         say(f"opened {found.open()}")
         return

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.quantities import outside
-from steadyslip.core.records import Address, twin
+from steadyslip.core.records import Address
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.motion import DRIVER, driver, motion_part
 from steadyslip.explorer.narrow import dense, functions_of, narrow, narrow_style, renamed
+from steadyslip.explorer.own_file import outside_of, own_file
 from steadyslip.explorer.sketch import sketch
-from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.linear_sets import linear_set
@@ -35,8 +34,8 @@ from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
 
 MODULES = (
-    "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "banner", "controls", "map",
-    "locus", "facts", "mover", "sketch", "disturbances", "course", "leaving", "page",
+    "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "edges", "banner",
+    "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view", "leaving", "page",
 )  # fmt: skip
 """Modules of the page, each after those that it imports."""
 USUAL = {"factor": 1.0, "low": None, "high": None, "lowAllowed": False, "highAllowed": False, "whole": False}
@@ -50,12 +49,11 @@ POLICY = (
     "base-uri 'none'; form-action 'none'"
 )
 """What the page may ask for: nothing but itself; workers and pictures are made of its own text."""
-_SENTINEL = 1.2345678901e-211  # first of the numbers that stand for values in the template of a rig file
 
 
-def page(rig: Slider | Machine, title: str, branch: int) -> str:
-    """The text of the file."""
-    return document(f"{title} – steadyslip", style(), fragment(rig, title, branch))
+def page(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
+    """The text of the file; `text` is that of the file which the rig came from, if there is one."""
+    return document(f"{title} – steadyslip", style(), fragment(rig, title, branch, text))
 
 
 def document(title: str, styles: str, body: str) -> str:
@@ -74,15 +72,18 @@ def style() -> str:
     return narrow_style(_web("style.css"))
 
 
-def fragment(rig: Slider | Machine, title: str, branch: int) -> str:
+def fragment(rig: Slider | Machine, title: str, branch: int, text: str = "") -> str:
     """The explorer as a part of a document; several may be in one.
+
+    With the `text` of the file that the rig came from, it shows values in the units of that, and saves it with its
+    comments.
 
     Raises
     ------
     NotAvailable
         If an equation contains what cannot be printed as JavaScript, or numbers leave the range of floating point.
     """
-    code, known = parts(rig, title, branch)
+    code, known = parts(rig, title, branch, text)
     return (
         '<div class="steadyslip-root"></div>\n'
         f'<script type="application/json" class="steadyslip-data">{safe(known)}</script>\n'
@@ -101,7 +102,7 @@ def safe(known: Mapping[str, Any]) -> str:
     return data
 
 
-def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str, Any]]:
+def parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -> tuple[str, dict[str, Any]]:
     """The code of a page, which declares ``mount``, ``render``, ``programs`` and ``library``, and its data."""
     text, facts = linear_part(rig)
     machine, driven, moving, still = "null", "const advance = null, observe = null;", None, ""
@@ -116,7 +117,7 @@ def parts(rig: Slider | Machine, title: str, branch: int) -> tuple[str, dict[str
     library = [_web(f"{name}.js") for name in LIBRARY]
     script = narrow(javascript.as_script(javascript.runtime(), *modules))
     worker = narrow(javascript.as_script(javascript.runtime(), *library)) + _short(driven, DRIVER)
-    known = _data(rig, title, branch, facts) | {
+    known = _data(rig, title, branch, facts, file) | {
         "motion": moving,
         "still": still,
         "sketch": sketch(rig) if isinstance(rig, Slider) else machine_sketch(rig),
@@ -138,26 +139,26 @@ def _web(name: str) -> str:
     return files("steadyslip.explorer.web").joinpath(name).read_text(encoding="utf-8")
 
 
-def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any]) -> dict[str, Any]:
+def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, Any], text: str) -> dict[str, Any]:
     """Everything about a rig but its equations."""
     from steadyslip import __version__
 
     names = list(_varied(rig, facts))
     places = [names.index(name) if name in names else -1 for name in facts["parameters"]]
     point = operating_point(rig, None, present_zeros(rig), branch)
-    axial = "slider.axial_stiffness"
+    axial, file = "slider.axial_stiffness", own_file(rig, names, text)
     return {
         "title": title,
         "version": __version__,
         "branch": branch,
         "area": rig.area if isinstance(rig, Slider) else None,
-        "parameters": [_parameter(rig, name, branch) for name in names],
+        "parameters": [_parameter(rig, name, branch) | file.told(name) for name in names],
         "facts": dict(facts),
         "places": places,
         "fixed": [float(np.asarray(value)) for value in point.arguments],
         "axial": names.index(axial) if axial in names else -1,
         "speed": "drive.velocity",
-        "toml": _template(rig, names),
+        "toml": file.pieces,
         **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else {"stiffness": _stiffness(rig, names)}),
         "checks": _checks(rig, names, branch),
     }
@@ -170,30 +171,20 @@ def _stiffness(rig: Slider, names: list[str]) -> str | None:
 
 
 def _of_machine(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dict[str, Any]:
-    """What a page says of machines alone: the parameters that its bar can be about, areas of contacts, phrases."""
-    bars, first = _bars(rig, names)
+    """What a page says of machines alone: the parameter by which it is checked, areas of contacts, phrases."""
     areas = [f"contacts.{name}.area" for name in rig.contacts]
     return {
-        "stiffness": first,
-        "bars": bars,
+        "stiffness": _checked(rig, names),
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
         "phrases": {**PHRASES, "absent": ABSENT},
     }
 
 
-def _bars(rig: Machine, names: list[str]) -> tuple[list[str], str | None]:
-    """Parameters that enter linearly, and of the stiffnesses and gains among them that with the nearest edge."""
-    point, ends = operating_point(rig), {}
-    if not point.exists:
-        return [], None
-    for name in names:
-        found = linear_set(point, name)
-        if found is not None:
-            own = float(rig.value(name) or 0.0)
-            edges = found.edges[found.changes]
-            ends[name] = float(np.min(np.abs(np.log(edges / own)), initial=np.inf))
-    stiff = {name: ends[name] for name in rig.of_kind("stiffness") if name in ends}
-    return list(ends), min(stiff or ends, key=lambda name: (stiff or ends)[name], default=None)
+def _checked(rig: Machine, names: list[str]) -> str | None:
+    """The first stiffness or gain that enters linearly: the page compares its stable values with Python's."""
+    point = operating_point(rig)
+    stiff = (name for name in rig.of_kind("stiffness") if name in names)
+    return next((name for name in stiff if linear_set(point, name) is not None), None) if point.exists else None
 
 
 def _varied(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Address]:
@@ -213,15 +204,10 @@ def _varied(rig: Slider | Machine, facts: Mapping[str, Any]) -> dict[str, Addres
     }
 
 
-def _outside(rig: Slider | Machine, unit: str) -> tuple[float, str]:
-    """Factor and unit in which a page tells a parameter; areas of a machine may vary, so that stresses stay those."""
-    return outside(unit, rig.area) if isinstance(rig, Slider) else (1.0, unit)
-
-
 def _parameter(rig: Slider | Machine, name: str, branch: int) -> dict[str, Any]:
     one = rig.parameters()[name]
     domain, value = one.role.domain, float(one.value or 0.0)
-    factor, unit = _outside(rig, one.role.unit)
+    factor, unit = outside_of(rig, one.role.unit)
     natural = Search(rig, name, present_zeros(rig), branch).natural_size() if value == 0 else abs(value)
     group, label = _group(rig, name)
     told = {
@@ -263,24 +249,9 @@ def _label(name: str, names: Iterable[str]) -> str:
     return last if len(alike) == 1 else rest
 
 
-def _template(rig: Slider | Machine, names: list[str]) -> str:
-    """The rig file with a place for each value, in SI units per unit area, so that every digit comes back."""
-    marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
-    lines = rig_to_text(twin(rig, marks)).splitlines()
-    for i, name in enumerate(names):
-        one = rig.parameters()[name].role
-        factor, _ = outside(one.unit, rig.area_of(name))
-        written = {repr(marks[name]), repr(marks[name] * factor), f'"{marks[name]!r} {one.unit}"'}
-        for k, line in enumerate(lines):
-            key, _, value = line.partition(" = ")
-            if value.partition("  #")[0] in written:
-                lines[k] = f"{key} = {{{{{i}}}}}" if one.unit == "1" else f'{key} = "{{{{{i}}}}} {one.unit}"'
-    return "\n".join(lines) + "\n"
-
-
 def _checks(rig: Slider | Machine, names: list[str], branch: int) -> list[dict[str, Any]]:
     """Answers of Python at the rig's own numbers and at some others, for the page to compare."""
-    stiff = _stiffness(rig, names) if isinstance(rig, Slider) else _bars(rig, names)[1]
+    stiff = _stiffness(rig, names) if isinstance(rig, Slider) else _checked(rig, names)
     changes: list[dict[str, float]] = [{}]
     for name, factor in ((stiff, 0.1), (stiff, 10.0), ("drive.velocity", 3.0)):
         if name in names:

@@ -31,6 +31,9 @@ from steadyslip.model.linearisation import characteristic_coefficients, stiffnes
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, SOLVED, joint_equation
 
+SLIP_RATE = "slip_rate"
+"""What pages call the velocity of a contact in steady sliding."""
+
 
 def model_of(rig: Slider | Machine) -> Model:
     """The rig's Model with what a page can vary from zero kept in it."""
@@ -96,7 +99,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
         "solved": SOLVED,
-        "observed": [[name, model.observables[name][1], meanings.get(name, "")] for name in names],
+        "observed": [[name, _unit(model, name), meanings.get(name, "")] for name in names],
     } | further
     programs += edges
     text = "".join(javascript.text(one) for one in programs)
@@ -117,7 +120,13 @@ def _observed(model: Model) -> tuple[list[str], list[sp.Expr]]:
     unseen = {f"{one.name}.x" for one in model.coordinates}
     unseen |= {f"{one.name}.v" for one in model.coordinates if one.speed == 0}
     kept = [(name, value) for name, value in zip(names, values, strict=True) if name not in unseen]
-    return [name for name, _ in kept], [value for _, value in kept]
+    contacts = () if model.is_slider else model.contacts
+    slips = [(f"{one.name}.{SLIP_RATE}", model.steady[one.velocity]) for one in contacts]
+    return [name for name, _ in (*slips, *kept)], [sp.sympify(value) for _, value in (*slips, *kept)]
+
+
+def _unit(model: Model, name: str) -> str:
+    return model.observables[name][1] if name in model.observables else "m/s"
 
 
 def _static_terms(model: Model) -> list[sp.Expr]:

@@ -14,6 +14,8 @@ _OTHER = re.compile(
 _PRODUCT = re.compile(r"(?<=[-+(,=?:<>&|])\(([\w.\[\]]+(?:[*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|])")
 _SUM = re.compile(r"(?<=[\[(,=?:])\(([\w.\[\]]+(?:[-+*/][\w.\[\]]+)+)\)(?=[-+),;?:<>&|\]])")
 """Products within sums, and sums at the begin of sums, in brackets that change nothing: not even the order."""
+_LINE = re.compile(r"([;{,\n])\n+")
+"""Ends of lines that end no statement."""
 _SPACE = re.compile(r" *([-+*/%<>=!?:;,&|(){}\[\]]+) *")
 
 
@@ -22,7 +24,7 @@ def narrow(text: str) -> str:
     bare = re.sub(r"^ *(//.*|/\*\*[^\n]*\*/|/\*\*\n(?:.*\n)*?.*\*/) *\n", "", text, flags=re.M)
     bare = re.sub(r"/\*\* @\w[^\n]*?\*/ ?", "", bare)  # types within a line
     bare = re.sub(r"(?<=[;{},)]) // [^\n]*$|^ +", "", bare, flags=re.M)
-    return "".join(_SPACE.sub(_close, part) if code else part for part, code in _parts(bare))
+    return _LINE.sub(r"\1", "".join(_SPACE.sub(_close, part) if code else part for part, code in _parts(bare)))
 
 
 def _parts(text: str) -> Iterator[tuple[str, bool]]:
@@ -56,10 +58,10 @@ def _template_end(text: str, at: int) -> int:
 
 def _close(found: re.Match[str]) -> str:
     """Signs without the spaces around, but for two that would be another sign together."""
-    signs, whole = found[1], found[0]
-    before = " " if whole[0] == " " and signs[0] in "+-" else ""
-    after = " " if whole[-1] == " " and signs[-1] in "+-" else ""
-    return before + signs + after
+    signs, whole, text = found[1], found[0], found.string
+    before = whole[0] == " " and signs[0] in "+-" and text[: found.start()].endswith(signs[0])
+    after = whole[-1] == " " and signs[-1] in "+-" and text[found.end() :].startswith(signs[-1])
+    return " " * before + signs + " " * after
 
 
 def dense(text: str) -> str:
@@ -73,7 +75,7 @@ def dense(text: str) -> str:
     for declared, lines in groupby(bare.split("\n"), lambda line: line.startswith("var ") and line.endswith(";")):
         own = list(lines)
         rows += ["var " + ",".join(line[4:-1] for line in own) + ";"] if declared else own
-    return "\n".join(rows)
+    return _LINE.sub(r"\1", "\n".join(rows))
 
 
 _NAME = re.compile(r"(?<![\w.$])[A-Za-z_]\w*")

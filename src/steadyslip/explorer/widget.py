@@ -11,7 +11,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 
-def widget(rig: Slider | Machine, title: str, branch: int) -> Any:
+def widget(rig: Slider | Machine, title: str, branch: int, text: str = "") -> Any:
     """A widget of a rig.
 
     Returns
@@ -26,7 +26,7 @@ def widget(rig: Slider | Machine, title: str, branch: int) -> Any:
         If anywidget is not installed.
     """
     made = _kind()
-    code, known = parts(rig, title, branch)
+    code, known = parts(rig, title, branch, text)
     module = (
         f"{code}const data = {safe(known)};\n"
         "export default { render: ({ model, el }) => render(model, el, data, programs, library) };\n"

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from steadyslip.core.errors import NotAvailable
+from steadyslip.core.errors import NotAvailable, RigFileError
 from steadyslip.explorer.assembly import document, fragment, style
+from steadyslip.files.specifications.read import text_of
 from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -72,7 +73,7 @@ def put_together(parts: Parts, title: str, explorer: bool, source: Path | None) 
     live, still = "", ""
     if explorer and parts.rig is not None:
         try:
-            live = fragment(parts.rig, title, parts.branch)
+            live = fragment(parts.rig, title, parts.branch, _text_of(source))
         except NotAvailable as refused:
             still = paragraph(f"There is no explorer at the end: {refused}.", "small")
     shown = heading("Try other values") + paragraph("Below, everything is computed in this page.") if live else ""
@@ -84,6 +85,14 @@ def put_together(parts: Parts, title: str, explorer: bool, source: Path | None) 
         f'<div class="on-screen">{shown}</div></article>\n'
     )
     return document(f"{title} – steadyslip", _PAGE + STYLE + (style() if live else ""), article + live)
+
+
+def _text_of(source: Path | None) -> str:
+    """The rig file that a document was made of; empty where that is another file, such as a table of results."""
+    try:
+        return "" if source is None or source.suffix != ".toml" else text_of(source)
+    except RigFileError:
+        return ""
 
 
 def _provenance(text: str, source: Path | None) -> str:

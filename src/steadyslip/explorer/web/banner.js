@@ -1,12 +1,14 @@
-// The verdict: a sentence, why, and a bar of the stable stiffnesses.
+// The verdict: a sentence, why, and a bar of the stable values of one parameter.
 import { make, put, svg, tell } from "./dom.js";
-import { ABSENT } from "./linear.js";
+import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
-import { digits, display, shown } from "./quantities.js";
-import { headline, kindBeyond, kindOf, machineReason, reason } from "./words.js";
+import { digits, shown, told, unitFor } from "./quantities.js";
+import { asStiffness, headline, kindBeyond, kindOf, machineReason, reason } from "./words.js";
 
 const DECADE = Math.log(10); // on both sides of what is marked
 const ASUNDER = 1e3; // between marks that share a unit
+const TOLD_OF = 3; // contacts in a sentence
+const LETTER = 7.4; // width of one on the bar
 
 /** Marks or labels of a bar: class, place in per cent and text; only what is new is written. */
 function placed(box, rows, name) {
@@ -33,70 +35,99 @@ export class Banner {
     this.bar = make("div", { className: "bar", role: "img" }, svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none" }, ...this.paths), this.marks, this.labels);
     this.notice = make("p", { className: "notice", role: "status" });
     if (differs.length) this.notice.textContent = `This browser computes otherwise than Python did (${differs.slice(0, 3).join("; ")}): do not rely on this page.`;
-    const { bars, parameters, stiffness } = this.data;
-    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...(bars ?? []).map((name) => make("option", { value: name, textContent: name, selected: name === stiffness })));
-    this.choice.addEventListener("change", () => page.tell(parameters.findIndex((one) => one.name === this.choice.value)));
-    this.values = make("p", { className: "values", hidden: !bars?.length }, make("label", {}, "stable values of ", this.choice));
+    this.choice = make("select", { "aria-label": "parameter of the bar" }, ...this.data.parameters.map((one, i) => make("option", { value: String(i), textContent: one.name, selected: i === page.rig.bar })));
+    this.choice.addEventListener("change", () => page.tell(Number(this.choice.value)));
+    this.values = make("p", { className: "values" }, make("label", {}, "stable values of ", this.choice));
     this.box = make("section", { className: "verdict", "aria-label": "verdict" }, make("div", { "aria-live": "polite" }, this.sentence, this.reason), make("div", {}, this.values, this.bar), this.notice);
   }
 
   show(answer) {
-    const { parameters, speed, phrases } = this.data, { values } = this.page.rig, drive = parameters.findIndex((one) => one.name === speed);
+    const { phrases } = this.data;
     this.box.dataset.kind = kindOf(answer);
-    tell(this.sentence, headline(answer, shown(values[drive], parameters[drive].unit)));
+    tell(this.sentence, headline(answer, this.speed(answer)));
     if (!phrases || !this.page.tracks) tell(this.reason, phrases ? this.told(answer) : reason(answer, this.data));
     this.showBar(answer);
   }
 
-  /** The reason of a machine with its nearest edge, once that is known. @param {any} answer @param {any} [first] */
-  showNearest(answer, first) {
+  /** How fast it slides: contacts of machines by name where they do not slide as fast as the drive goes. */
+  speed({ observed }) {
+    const { parameters, speed, facts } = this.data, i = parameters.findIndex((one) => one.name === speed), drive = this.page.rig.values[i], text = told(parameters[i], drive);
+    const slips = facts.contacts.map((name) => [name, observed[`${name}.slip_rate`]]).filter(([, v]) => v !== undefined);
+    if (!slips.length || slips.every(([, v]) => v === drive)) return `at ${text}`;
+    const many = slips.length > TOLD_OF, same = slips.every(([, v]) => v === slips[0][1]);
+    const each = same ? `${many ? "all contacts" : slips.map(([name]) => name).join(", ")} at ${shown(slips[0][1], "m/s")}` : slips.slice(0, TOLD_OF).map(([name, v]) => `${name} at ${shown(v, "m/s")}`).join(", ");
+    return `of ${each}${many && !same ? ", …" : ""} (drive ${text})`;
+  }
+
+  /** What edges decide: the reason of a machine with the nearest, and the bar. @param {any} answer @param {any} [first] */
+  follow(answer, first) {
     if (this.data.phrases) tell(this.reason, this.told(answer, first));
+    this.choice.value = String(this.page.rig.bar);
+    this.showBar(answer);
   }
 
   told(answer, first) {
     const { rig } = this.page, own = Array.from(rig.set(rig.values).R);
     if (!first) return machineReason({ ...answer, own }, this.data);
-    const one = this.data.parameters[first.i], kind = kindBeyond(rig.assess(this.page.with(first.i, first.landing)));
-    const edge = { name: one.name, side: first.at > rig.values[first.i] ? "above" : "below", value: shown(first.at * one.factor, one.unit), kind };
+    const one = this.data.parameters[first.i], kind = kindBeyond(rig.assess(this.page.with(first.i, first.behind)));
+    const edge = { name: one.name, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at), kind };
     return machineReason({ ...answer, own }, this.data, edge);
   }
 
-  /** The stable stiffnesses, controller's gain included, on a logarithmic bar, with the rig's own. */
+  /** What the bar shows, as it is exactly or as the track has it: where it is stable, the own value, a scale from 0 to 1. */
+  drawn(answer) {
+    const { page, data } = this, { rig } = page, one = data.parameters[rig.bar], own = answer.stiffness + answer.gain;
+    const whole = data.phrases || one?.name === data.stiffness;
+    if (whole && answer.intervals && answer.status !== ABSENT && (!data.phrases || own > 0)) {
+      const { gain } = answer, told = data.phrases ? one : asStiffness(data);
+      const intervals = answer.intervals.map(({ low, high }) => ({ low: low + gain, high: high + gain }));
+      const ends = answer.intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k)).map((k) => k + gain);
+      const marks = [...ends, own, gain].filter((k) => k > 0);
+      if (!marks.length) return null;
+      const low = Math.log(Math.min(...marks)) - DECADE, high = Math.log(Math.max(...marks)) + DECADE;
+      const x = (k) => (k > 0 ? (Math.log(k) - low) / (high - low) : 0);
+      return { told, intervals, ends, own, gain, x, range: [Math.exp(low), Math.exp(high)], logarithmic: true };
+    }
+    if (!page.tracks || rig.bar < 0) return null;
+    const scale = page.scale(rig.bar), range = page.ranges[rig.bar], parts = page.tracks[rig.bar], logarithmic = range[0] > 0 && range[1] / range[0] > 30;
+    const intervals = parts.flatMap(({ status, at }, n) => (status === STABLE ? [{ low: n ? parts[n - 1].at : -Infinity, high: n + 1 < parts.length ? at : Infinity }] : []));
+    return { told: one, intervals, ends: parts.slice(0, -1).map(({ at }) => at), own: rig.values[rig.bar], gain: 0, x: (v) => (Number.isFinite(v) ? scale.of(v) : Number(v > 0)), range, logarithmic };
+  }
+
+  /** Stable values of what is chosen, a controller's gain counted with a stiffness, with the rig's own. */
   showBar(answer) {
-    const { gain } = answer, own = answer.stiffness + gain; // a controller's gain counts as the sentence counts it
-    const { phrases, parameters, area } = this.data, chosen = parameters[this.page.rig.bar];
-    const [per, si] = phrases ? [chosen.factor, chosen.unit] : area === null ? [1, "Pa/m"] : [area, "N/m"];
-    if (answer.intervals === null || (phrases && !(own > 0))) {
-      this.bar.hidden = true;
-      put(this.bar, "aria-label", "it does not enter linearly here");
-      return;
-    }
-    const intervals = answer.intervals.map(({ low, high }) => ({ low: low + gain, high: high + gain }));
-    const ends = answer.intervals.flatMap(({ low, high }) => [low, high]).filter((k) => k > 0 && Number.isFinite(k)).map((k) => k + gain);
-    const marks = [...ends, own, gain].filter((k) => k > 0);
-    if (!marks.length || answer.status === ABSENT) {
-      this.bar.hidden = true;
-      this.bar.setAttribute("aria-label", "no stiffness is stable");
-      return;
-    }
-    this.bar.hidden = false;
-    const most = Math.max(...marks), [factor, name] = display(own * per, si), one = most < ASUNDER * Math.min(...marks);
-    const stiffness = (k) => (one ? `${digits((k * per) / factor)} ${name.replace("^2", "²")}`.trim() : shown(k * per, si)); // one unit on one bar, unless decades lie between
-    const low = Math.log(Math.min(...marks)) - DECADE, high = Math.log(Math.max(...marks)) + DECADE;
-    const x = (k) => 100 * Math.min(1, Math.max(0, k > 0 ? (Math.log(k) - low) / (high - low) : 0));
+    const found = this.drawn(answer);
+    this.bar.hidden = !found;
+    if (!found) return put(this.bar, "aria-label", "no stiffness is stable");
+    const { told: one, intervals, ends, own, gain, logarithmic } = found, { phrases, parameters, stiffness: named } = this.data, { bar } = this.page.rig;
+    const whole = !phrases && parameters[bar]?.name === named, marks = [...ends, own, gain].filter((v) => v > 0), [factor, name] = unitFor(one, own || marks[0] || 1);
+    const together = logarithmic && Math.max(...marks) < ASUNDER * Math.min(...marks);
+    const value = (v) => (together ? `${digits(v / factor)} ${name}`.trim() : told(one, v)); // one unit on one bar, unless decades lie between
+    const x = (v) => 100 * Math.min(1, Math.max(0, found.x(v)));
     const least = gain > 0 ? `M0 0H${x(gain)}V10H0Z` : ""; // less than the gain alone is not to be had
-    const drawn = `M0 0H100V10H0Z|${least}|${intervals.map((one) => `M${x(one.low)} 0H${x(one.high)}V10H${x(one.low)}Z`).join("")}`.split("|");
+    const drawn = `M0 0H100V10H0Z|${least}|${intervals.map(({ low, high }) => `M${x(low)} 0H${x(high)}V10H${x(low)}Z`).join("")}`.split("|");
     this.paths.forEach((path, n) => put(path, "d", drawn[n]));
-    const within = (k) => Math.min(80, Math.max(20, x(k))), begins = new Set(intervals.map((one) => one.low));
-    const scale = ticks(Math.exp(low) * per, Math.exp(high) * per, true, 4).map((k) => k / per).filter((k) => x(k) > 6 && x(k) < 94);
-    const marked = [...scale.map((k) => ["tick", x(k), ""]), ["own", x(own), ""], ...ends.map((k) => ["edge", x(k), ""])];
-    const labels = [...scale.map((k) => ["tick", x(k), stiffness(k)]), ["now", within(own), `${phrases ? "" : gain > 0 ? "gain" : "stiffness"}${gain > 0 && own > gain ? " and stiffness" : ""} now ${stiffness(own)}`.trim()],
-      ...(own > gain && gain > 0 && !ends.length ? [["", within(gain), `the gain alone ${stiffness(gain)}`]] : []),
-      ...ends.map((k) => ["", within(k), `${begins.has(k) ? "stable from" : "to"} ${stiffness(k)}`])];
+    const [size] = unitFor(one, found.range[1]), scale = ticks(found.range[0] / size, found.range[1] / size, logarithmic, 4).map((v) => v * size).filter((v) => x(v) > 6 && x(v) < 94);
+    const marked = [...scale.map((v) => ["tick", x(v), ""]), ["own", x(own), ""], ...ends.map((v) => ["edge", x(v), ""])];
+    const begins = new Set(intervals.map(({ low }) => low)), closes = new Set(intervals.map(({ high }) => high)), words = whole ? (gain > 0 ? `gain${own > gain ? " and stiffness" : ""} ` : "stiffness ") : "";
+    const labels = [...ends].sort((a, b) => Math.abs(x(a) - x(own)) - Math.abs(x(b) - x(own))).map((v) => ["", x(v), `${begins.has(v) ? "stable from" : closes.has(v) ? "to" : "from"} ${value(v)}`]);
+    if (own > gain && gain > 0 && !ends.length) labels.push(["", x(gain), `the gain alone ${value(gain)}`]);
     placed(this.marks, marked, "i");
-    placed(this.labels, labels, "span");
-    const words = intervals.map(({ low: a, high: b }) => (b < Infinity ? `${stiffness(a)} to ${stiffness(b)}` : a > gain ? `above ${stiffness(a)}` : "any"));
-    const what = phrases ? `values of ${chosen.name}` : gain > 0 ? `stiffness and gain together, of which the gain is ${stiffness(gain)}` : "stiffness";
-    put(this.bar, "aria-label", `stable ${what}: ${words.join(", or ") || "none"}`);
+    placed(this.labels, [...this.fitted(scale.map((v) => ["tick", x(v), value(v)])), ...this.fitted([["now", x(own), `${words}now ${value(own)}`]]), ...this.fitted(labels)], "span");
+    const starts = (low) => low > (whole || phrases ? gain : -Infinity) && low > -Infinity; // else it is stable down to the least there is
+    const said = intervals.map(({ low, high }) => (high < Infinity ? (starts(low) ? `${value(low)} to ${value(high)}` : `below ${value(high)}`) : starts(low) ? `above ${value(low)}` : "any"));
+    const what = whole ? (gain > 0 ? `stiffness and gain together, of which the gain is ${value(gain)}` : "stiffness") : `values of ${parameters[bar].name}`;
+    put(this.bar, "aria-label", `stable ${what}: ${said.join(", or ") || "none"}`);
+  }
+
+  /** Labels of one row, the first the most important: within the bar, and those that would lie on others left out. */
+  fitted(labels) {
+    const wide = this.page.wide, taken = /** @type {[number, number][]} */ ([]);
+    return labels.flatMap(([kind, at, text]) => {
+      const half = Math.min(50, (50 * LETTER * text.length) / wide), place = Math.min(100 - half, Math.max(half, at));
+      if (taken.some(([from, to]) => place + half > from && place - half < to)) return [];
+      taken.push([place - half, place + half]);
+      return [[kind, place, text]];
+    });
   }
 }

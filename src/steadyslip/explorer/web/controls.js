@@ -1,8 +1,9 @@
 // A slider and a typed value for each parameter; every slider's track is painted with what would be.
 import { CLASSES } from "./chart.js";
 import { make, put, tell } from "./dom.js";
-import { display, parse, shown } from "./quantities.js";
+import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
+import { named } from "./words.js";
 
 const ROOM = 15; // letters that a field has room for
 const STEPS = 1000, NEAR = 0.005, FAR = 0.05;
@@ -12,7 +13,7 @@ export class Controls {
   /** @param {import("./page.js").Page} page */
   constructor(page) {
     this.page = page;
-    this.box = make("section", { className: "controls", "aria-label": "parameters" });
+    this.box = make("section", { className: "controls", "aria-label": "parameters" }, make("p", { className: "hint", textContent: "Type a value with its unit, as 2.5 kN; a bare number counts in the unit that stands in its field." }));
     let group = "";
     this.rows = page.rig.data.parameters.map((one, i) => {
       if (one.group !== group) this.box.append(make("h2", { textContent: one.group }));
@@ -24,10 +25,11 @@ export class Controls {
   }
 
   row(one, i) {
-    const label = `${one.name}: ${one.doc}`, { page } = this;
+    const label = `${one.name}: ${named(one.doc, one.unit)}`, { page } = this, id = `taken-${Math.random().toString(36).slice(2)}`; // several pages may share a document
     const slider = make("input", { type: "range", min: "0", max: String(STEPS), step: "any", "aria-label": label });
-    const text = make("input", { type: "text", "aria-label": `${label}, value with unit`, spellcheck: false, autocomplete: "off" });
-    const fault = make("span", { className: "fault", role: "alert" });
+    const text = make("input", { type: "text", "aria-label": `${label}, value with unit`, spellcheck: false, autocomplete: "off", "aria-describedby": id });
+    const fault = make("span", { className: "fault", role: "alert" }), taken = make("span", { className: "taken hint", id });
+    const row = { box: /** @type {any} */ (null), slider, text, fault, taken, name: /** @type {any} */ (null), refused: NaN };
     slider.addEventListener("input", () => page.slide(i, Number(slider.value) / STEPS, true));
     slider.addEventListener("change", () => page.rest());
     slider.addEventListener("keydown", (event) => {
@@ -37,35 +39,65 @@ export class Controls {
       event.stopPropagation(); // notebooks take keys away from sliders
       page.slide(i, Number(slider.value) / STEPS + step, false);
     });
-    text.addEventListener("change", () => this.typed(i, text.value, fault));
-    const name = make("span", { className: "name" }, make("b", { textContent: one.label.replace(/[_.]/g, "$&\u200b") }), " ", make("small", { textContent: one.doc }));
-    return { box: make("div", { className: "row" }, name, text, slider, fault), slider, text, fault, name };
+    text.addEventListener("change", () => this.typed(i));
+    text.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      this.forget(i);
+      this.show();
+    });
+    text.addEventListener("focus", () => tell(taken, this.unit(i) === "1" ? "" : `a bare number counts in ${this.unit(i)}`));
+    text.addEventListener("input", () => tell(taken, this.taken(i)));
+    text.addEventListener("blur", () => tell(taken, ""));
+    const name = make("span", { className: "name" }, make("b", { textContent: one.label.replace(/[_.]/g, "$&\u200b") }), " ", make("small", { textContent: named(one.doc, one.unit) }));
+    return Object.assign(row, { box: make("div", { className: "row" }, name, text, slider, taken, fault), name });
   }
 
-  typed(i, text, fault) {
-    const { rig } = this.page, one = rig.data.parameters[i];
+  /** The unit that a bare number counts in. @param {number} i */
+  unit(i) {
+    const { rig } = this.page;
+    return unitFor(rig.data.parameters[i], rig.values[i])[1] || "1";
+  }
+
+  /** What a number without a unit is taken for. @param {number} i */
+  taken(i) {
+    const { value } = this.rows[i].text, unit = this.unit(i);
+    return unit === "1" || unitIn(value) || !unitIn(`${value} s`) ? "" : `taken as ${value.trim()} ${unit}`;
+  }
+
+  /** @param {number} i */
+  typed(i) {
+    const { rig } = this.page, one = rig.data.parameters[i], row = this.rows[i];
     try {
-      const [, unit] = display(rig.values[i] * one.factor, one.unit);
-      const value = parse(text, one.unit, unit || "1") / one.factor;
+      const value = parse(row.text.value, one.unit, this.unit(i), [one.own[0], one.own[1]]) / one.factor;
       if (!inside(one, value)) throw new Error(`allowed: ${one.allowed}`);
-      fault.textContent = "";
+      this.forget(i);
       this.page.place(i, value);
     } catch (error) {
-      fault.textContent = error instanceof Error ? error.message : String(error);
+      row.refused = rig.values[i];
+      row.text.setAttribute("aria-invalid", "true");
+      tell(row.fault, `${error instanceof Error ? error.message : error}; Esc brings ${told(one, rig.values[i], 6)} back`);
     }
+  }
+
+  /** What was refused makes room for the value of now. @param {number} i */
+  forget(i) {
+    const { text, fault } = this.rows[i];
+    this.rows[i].refused = NaN;
+    text.removeAttribute("aria-invalid");
+    tell(fault, "");
   }
 
   /** Values and tracks as they are now. */
   show() {
     const { rig, tracks } = this.page;
-    this.rows.forEach(({ slider, text, fault, name }, i) => {
-      const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = display(value * one.factor, one.unit);
-      const place = String(STEPS * this.page.scale(i).of(value)), told = (many) => `${Number(((value * one.factor) / factor).toPrecision(many))} ${unit.replace("^2", "²")}`.trim(), words = told(told(6).length > ROOM ? 4 : 6);
+    this.rows.forEach(({ slider, text, name, refused }, i) => {
+      const one = rig.data.parameters[i], value = rig.values[i], [factor, unit] = unitFor(one, value);
+      const place = String(STEPS * this.page.scale(i).of(value)), typed = (many) => `${Number((value / factor).toPrecision(many))} ${unit}`.trim(), words = typed(typed(6).length > ROOM ? 4 : 6);
       if (slider.value !== place) slider.value = place;
-      put(slider, "aria-valuetext", shown(value * one.factor, one.unit));
-      if (document.activeElement !== text || !fault.textContent) {
+      put(slider, "aria-valuetext", told(one, value));
+      if (!Object.is(refused, value)) {
+        if (!Number.isNaN(refused)) this.forget(i);
         if (text.value !== words) text.value = words;
-        tell(fault, "");
       }
       name.classList.toggle("changed", !Object.is(value, one.value));
       const stops = tracks[i].flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));

@@ -1,16 +1,17 @@
 // What the rig does after a disturbance: curves over time, phase plane, events, the mechanism; one time for all of them.
-import { DISTURBANCES, asked } from "./disturbances.js";
-import { button, make, svg } from "./dom.js";
+import { DISTURBANCES, Refused, asked, called } from "./disturbances.js";
+import { button, copy, make, svg, tell } from "./dom.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Mover } from "./mover.js";
 import { plane, straight, strip } from "./plot.js";
 import { shown, unitIn } from "./quantities.js";
 import { MachineSketch, Sketch } from "./sketch.js";
-import { outcome, quantity } from "./words.js";
+import { dropped, outcome, slow } from "./words.js";
 
 /** @typedef {{times: any, shown: [any, string, string][], plane: [number, number]}} View series with unit and label; those of the phase plane */
 
 const AWAY = 1e6; // times the velocity of steady sliding, beyond which a run away is not drawn
+const STILL = 1e-15, LOOSE = 1e-3; // shares of the slip rate and of the normal force of steady sliding, below which it stands still and nothing presses
 const HIGH = 105, PLANE = { left: 62, top: 8, width: 290, height: 220 }, LISTED = 200, FILM = 9000; // ms of the whole when it is played
 
 export class Course {
@@ -41,14 +42,15 @@ export class Course {
   }
 
   build() {
-    this.disturbance = make("select", { "aria-label": "disturbance" }, ...Object.entries(DISTURBANCES).map(([value, { words }]) => make("option", { value, textContent: words })));
-    this.size = make("input", { type: "text", "aria-label": "size of the disturbance", size: 9 });
-    this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself" });
+    this.taken = make("p", { className: "bare", id: `bare-${Math.random().toString(36).slice(2)}`, textContent: "A bare number counts in the unit that its field shows." });
+    this.disturbance = make("select", { "aria-label": "disturbance" }, ...Object.keys(DISTURBANCES).map((value) => make("option", { value, textContent: called(value, this.page.rig.data) })));
+    this.size = make("input", { type: "text", "aria-label": "size of the disturbance", size: 9, "aria-describedby": this.taken.id });
+    this.length = make("input", { type: "text", "aria-label": "length of the run", size: 9, placeholder: "by itself", "aria-describedby": this.taken.id });
     this.halt = make("button", { type: "button", textContent: "stop", disabled: true, onclick: () => this.mover.stop() });
     const { motion } = this.page.rig.data, { contacts, bodies, shares } = motion, named = [...contacts, ...bodies.map(([name]) => name)].filter(Boolean);
     this.on = make("select", { "aria-label": "where it acts", onchange: () => this.forget() });
     this.where = make("label", {}, "on ", this.on);
-    this.view = make("select", { "aria-label": "contact or body", onchange: () => this.draw() }, ...named.map((name, n) => make("option", { value: String(n), textContent: `${n < contacts.length ? "contact" : "body"} ${name}` })));
+    this.view = make("select", { "aria-label": "contact or body", onchange: () => (this.draw(), this.page.note()) }, ...named.map((name, n) => make("option", { value: String(n), textContent: `${n < contacts.length ? "contact" : "body"} ${name}` })));
     this.shown = make("label", { hidden: !named.length }, "shown: ", this.view);
     this.choose = () => {
       const names = Object.keys(shares[this.disturbance.value] ?? {}).filter(Boolean);
@@ -60,7 +62,14 @@ export class Course {
       this.choose();
       this.forget();
     });
-    for (const name of ["size", "length"]) this[name].addEventListener("change", () => this.typed(name));
+    for (const name of ["size", "length"]) {
+      this[name].addEventListener("change", () => this.typed(name));
+      this[name].addEventListener("keydown", (event) => {
+        if (event.key !== "Escape") return;
+        this[name].value = this.units[name] = "";
+        this.soon();
+      });
+    }
     this.strips = svg("svg", { class: "chart strips", role: "img" });
     this.strips.addEventListener("pointermove", (event) => this.point(event));
     this.strips.addEventListener("pointerdown", (event) => this.point(event));
@@ -74,10 +83,25 @@ export class Course {
     const heads = [...(phrases ? ["contact"] : []), "begins", "lasts", "peak velocity", drop, "since the last"];
     this.list = make("details", { className: "events" }, make("summary", { textContent: "Slip events" }),
       make("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": "slip events" }, make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", { textContent: text, scope: "col" })))), this.events)));
+    this.file = make("pre", { tabIndex: 0 });
+    this.same = make("details", {}, make("summary", { textContent: "The same run with steadyslip simulate" }),
+      make("p", { className: "bare", textContent: "Put this at the end of the rig file, in place of its own [protocol]:" }), this.file,
+      button("copy", "copy the protocol", () => copy(this.file.textContent).then(() => this.page.say("The protocol is copied."), () => this.page.say("This browser copies nothing; select the text."))));
     this.box.append(
       make("p", { className: "pick" }, make("label", {}, "after a ", this.disturbance), this.where, make("label", {}, "of ", this.size), make("label", {}, "for ", this.length), this.halt),
-      this.told, this.done, make("p", { className: "pick" }, this.shown), this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
-      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", { className: motion.bodies.length ? "wide" : "" }, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)), this.list);
+      this.taken, this.told, this.done, make("p", { className: "pick" }, this.shown), this.strips, make("p", { className: "clock" }, this.player, this.time, this.reading),
+      make("div", { className: "pair" }, make("figure", {}, make("figcaption", { textContent: "Phase plane" }), this.phase), make("figure", { className: motion.bodies.length ? "wide" : "" }, make("figcaption", { textContent: this.sketch.caption }), this.sketch.canvas)), this.list, this.same);
+  }
+
+  /** What is shown, by name. */
+  viewed() {
+    return this.view.selectedOptions[0]?.textContent ?? "";
+  }
+
+  /** Show a contact or body, if there is one of that name. @param {string} name */
+  look(name) {
+    const found = [...this.view.options].find((one) => one.textContent === name);
+    if (found) this.view.value = found.value;
   }
 
   /** Something else is done to the rig: sizes and curves are not those of before. */
@@ -118,21 +142,26 @@ export class Course {
       this.none(`No motion: ${refused}.`);
       return;
     }
+    for (const field of [this.size, this.length]) field.removeAttribute("aria-invalid");
     try {
       this.mover.forget();
       const wanted = asked(this.page, this.mover.own, { kind: this.disturbance.value, on: this.on.value, size: this.size.value, length: this.length.value });
       [this.size.placeholder, this.length.placeholder] = wanted.usual;
+      tell(this.file, wanted.file);
+      this.page.note();
       this.halt.disabled = false;
       this.late = setTimeout(() => (this.told.textContent = "Computing the motion …"), 100);
       const told = (time) => (this.told.textContent = `Computing the motion … ${shown(time, "s", 3)} of ${shown(wanted.until, "s", 3)} so far; curves are those of before.`);
       const found = await this.mover.run(this.model, this.page.answer.sigmas, wanted, told);
       clearTimeout(this.late);
+      this.mover.own.sliding.forEach(({ rate, area: own }, n) => Object.assign(found.contacts[n], { floor: STILL * Math.abs(rate), pressed: LOOSE * this.page.answer.sigmas[n] * own }));
       this.course = { ...found, until: found.status === "done" ? wanted.until : found.end, disturbance: wanted.disturbance + wanted.on, at: wanted.from };
       this.told.textContent = outcome(this.course, this.page.rig.data);
       this.done.textContent = wanted.words;
       this.draw();
     } catch (error) {
       clearTimeout(this.late);
+      if (error instanceof Refused) this[error.field].setAttribute("aria-invalid", "true");
       this.none(error instanceof Error ? error.message : String(error));
     }
     this.halt.disabled = true;
@@ -170,14 +199,15 @@ export class Course {
       const { unit, x, v } = course.bodies[n - course.contacts.length];
       return { times, shown: [[cut(v), `${unit}/s`, "velocity"], [cut(x), unit, "ahead"]], plane: [1, 0] };
     }
-    const { v, tau, sigma } = course.contacts[n], friction = cut(tau).map((one, i) => one / sigma[i]), normal = area ? cut(sigma).map((one) => one * area) : cut(sigma);
-    return { times, shown: [[cut(v), "m/s", "velocity"], [friction, "1", "friction"], [normal, area === null && !phrases ? "Pa" : "N", "normal"]], plane: [0, 1] };
+    const { v, tau, sigma, floor, pressed } = course.contacts[n], friction = cut(tau).map((one, i) => (sigma[i] > pressed ? one / sigma[i] : NaN)), normal = area ? cut(sigma).map((one) => one * area) : cut(sigma);
+    const moving = cut(v).map((one) => (Math.abs(one) < floor ? floor : one)), si = area === null && !phrases ? "Pa" : "N"; // what is slower stands still
+    return { times, shown: [[moving, "m/s", "velocity"], [friction, "1", "friction"], [normal, si, `normal ${si === "N" ? "force" : "stress"}`]], plane: [0, 1] };
   }
 
   draw() {
     if (!this.mover) return;
     const { course } = this, shows = course ? "" : "none";
-    for (const part of [this.done, this.strips, this.phase.parentElement, this.time.parentElement, this.list]) part.style.display = shows;
+    for (const part of [this.done, this.strips, this.phase.parentElement, this.time.parentElement, this.list, this.same]) part.style.display = shows;
     if (!course) return;
     const past = this.before && this.before !== course && this.before.disturbance === course.disturbance ? [this.series(this.before)] : [], now = this.series(course), all = [...past, now];
     const { left, width } = this.page.size, { plane: [across, up] } = now, steady = (values) => values.every((one) => Math.abs(one - values[0]) <= 1e-6 * Math.abs(values[0]));
@@ -208,7 +238,7 @@ export class Course {
     this.list.firstChild.textContent = `${events.length} slip event${events.length === 1 ? "" : "s"}${from ? `, the last ${LISTED} of them` : ""}`;
     this.events.replaceChildren(...events.slice(from).map((one, n) => {
       const go = button(shown(one.begin, "s"), `go to ${shown(one.begin, "s")}`, () => this.show(one.begin / this.course.until)), before = events.slice(0, from + n).findLast((other) => other.contact === one.contact);
-      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? shown(one.drop, "N") : quantity(one.drop, "Pa", area), before ? shown(one.begin - before.begin, "s", 3) : ""];
+      const cells = [...(phrases ? [one.contact] : []), go, shown(one.end - one.begin, "s", 3), shown(one.peak, "m/s", 3), phrases ? dropped(one.drop, "N") : dropped(one.drop, "Pa", area), before ? shown(one.begin - before.begin, "s", 3) : ""];
       return make("tr", {}, ...cells.map((cell) => make("td", {}, cell)));
     }));
   }
@@ -246,7 +276,8 @@ export class Course {
     this.mark.setAttribute("cx", (PLANE.left + drawn.across.of(between(series[across][0])) * PLANE.width).toFixed(1));
     this.mark.setAttribute("cy", (PLANE.top + (1 - drawn.up.of(between(series[up][0]))) * PLANE.height).toFixed(1));
     this.sketch.place(between, this.course);
-    const now = series.map(([values, unit, label]) => (unit === "1" ? `friction ${between(values).toPrecision(4)}` : `${label === "ahead" ? "ahead by " : ""}${shown(between(values), unit, unit === "N" || unit === "Pa" ? 4 : 3)}`));
+    const { floor = 0 } = this.course.contacts[Number(this.view.value || 0)] ?? {};
+    const now = series.map(([values, unit, label]) => (unit === "1" ? `friction ${Number.isNaN(between(values)) ? "–" : between(values).toPrecision(4)}` : label === "velocity" && floor ? `velocity ${slow(between(values), 1.5 * floor)}` : `${label === "ahead" ? "ahead by" : label} ${shown(between(values), unit, unit === "N" || unit === "Pa" ? 4 : 3)}`));
     this.reading.textContent = `${shown(at, "s")}: ${now.join(", ")}`;
   }
 

@@ -26,6 +26,9 @@ export function button(text, label, action) {
   return make("button", { type: "button", textContent: text, title: label, "aria-label": label, onclick: action });
 }
 
+/** Text for the clipboard. @param {string} text */
+export const copy = async (text) => navigator.clipboard.writeText(text);
+
 /** Write only what is not there yet: a browser does work for each write. @param {any} element @param {string} name @param {string} value */
 export function put(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);

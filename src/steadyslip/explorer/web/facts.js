@@ -1,11 +1,12 @@
 // Steady sliding in numbers, eigenvalues with their locus, and the list of nearest edges.
 import { make, put, svg, tell } from "./dom.js";
+import { BESIDE, REMOTE } from "./edges.js";
 import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
 import { Locus } from "./locus.js";
 import { words } from "./modes.js";
-import { digits, shown } from "./quantities.js";
+import { digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
-import { quantity } from "./words.js";
+import { named, quantity } from "./words.js";
 
 const BECOMES = { [ABSENT]: "no steady sliding", [STABLE]: "becomes stable", [UNSTABLE]: "becomes unstable", [UNKNOWN]: "no such rig" };
 
@@ -22,11 +23,10 @@ function rewrite(list, rows, row, many) {
   rows.forEach((words, n) => words.forEach((text, k) => tell(many === 1 ? list.children[n].children[k] : list.children[many * n + k], text)));
 }
 
-/** @param {string} others what the dots of the locus are drawn for */
-function legend(others) {
+function legend() {
   const key = (words, ...drawn) => make("span", {}, svg("svg", { class: "locus", viewBox: "0 0 14 14", "aria-hidden": "true" }, ...drawn), words);
   const dots = [svg("path", { class: "dot", d: DOTS, "stroke-width": 1.8 }), svg("path", { class: "dot", d: LARGER, "stroke-width": 4.2 })];
-  return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key(others === "values" ? "at other values of what the bar shows, the larger the higher" : "at other stiffnesses, the larger the stiffer", ...dots));
+  return make("p", { className: "key" }, ...MARKS.map(([d, name, words]) => key(words, svg("path", { d, class: name }))), key("at other values of what the bar shows, the larger the higher", ...dots));
 }
 
 export class Facts {
@@ -37,12 +37,13 @@ export class Facts {
     this.eigenvalues = make("tbody", {});
     this.locus = new Locus();
     this.near = make("ol", { className: "edges" });
+    this.far = make("details", {}, make("summary", {}), make("ol", { className: "edges" }));
     const head = make("thead", {}, make("tr", {}, ...["growth rate", "oscillation", "size"].map((text) => make("th", { textContent: text, scope: "col" }))));
     this.box = make("section", { className: "facts", "aria-label": "details" },
-      make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: "one parameter changed, the others as they are; press to go there" }), this.near),
+      make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: `one parameter changed, the others as they are; press to go ${100 * BESIDE} % to its stable side` }), this.near, this.far),
       this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
       this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas,
-        this.shape = make("p", { className: "mode" }), legend(page.rig.data.phrases ? "values" : "stiffnesses")));
+        this.shape = make("p", { className: "mode" }), legend()));
   }
 
   /** Numbers. @param {any} answer */
@@ -51,7 +52,7 @@ export class Facts {
     this.sliding.hidden = this.swings.hidden = absent;
     tell(this.shape, answer.mode ? `In the leading mode ${words(answer.mode, rig.data.facts.shape)}.` : "");
     const facts = [...(phrases ? [] : [["normal stress", answer.sigma, "Pa", ""]]), ...rig.data.facts.observed.map(([name, unit, meaning]) => [name.replace(/^links\./, "").replace(/\.(?=\w+$)/, ": ").replace(/_/g, " "), answer.observed[name], unit, meaning])];
-    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [(area && unit === "Pa" ? name.replace("stress", "force") : name) + (meaning && `: ${meaning}`), quantity(value, unit, area)]),
+    rewrite(this.steady, absent ? [] : facts.map(([name, value, unit, meaning]) => [named(name, area && unit === "Pa" ? "N" : unit) + (meaning && `: ${meaning}`), quantity(value, unit, area)]),
       () => [make("dt", {}), make("dd", {})], 2);
     const modes = answer.eigenvalues.filter((s) => s.im >= 0);
     rewrite(this.eigenvalues, modes.map((s) => {
@@ -60,18 +61,25 @@ export class Facts {
       return row.map((text) => text.replace(/ (?=\S+$)/, "\u00a0")); // a number stays with its unit
     }), () => [make("tr", {}, make("td", {}), make("td", {}), make("td", {}))], 1);
     modes.forEach((s, n) => put(this.eigenvalues.children[n], "class", s.re > 0 ? "grows" : ""));
-    this.locus.show(answer);
+    const linear = answer.intervals && (rig.data.phrases || rig.data.parameters[rig.bar]?.name === rig.data.stiffness);
+    this.locus.show(answer, linear || !this.page.tracks ? undefined : this.page.others());
   }
 
   /** The list, as the tracks are now. */
   showEdges() {
     const { page } = this;
-    this.near.replaceChildren(...page.edges().map((edge) => {
-      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", textContent: `${one.name} → ${shown(edge.at * one.factor, one.unit)}` });
+    const rows = (edges) => edges.map((edge) => {
+      const one = page.rig.data.parameters[edge.i], go = make("button", { type: "button", textContent: `${one.name} → ${told(one, edge.at)}` });
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.change(page.with(edge.i, edge.landing));
       });
       return make("li", {}, go, ` ${BECOMES[edge.beyond]}`);
-    }));
+    });
+    const found = page.edges(), far = found.filter((edge) => edge.far);
+    this.near.replaceChildren(...rows(found.filter((edge) => !edge.far)));
+    this.far.hidden = !far.length;
+    if (far.length === found.length) this.far.open = true;
+    tell(this.far.firstChild, `${far.length} further off than a factor of ${REMOTE}`);
+    this.far.lastChild.replaceChildren(...rows(far));
   }
 }

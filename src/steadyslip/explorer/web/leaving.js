@@ -1,5 +1,5 @@
 // What leaves the page: links, rig files, tables, pictures.
-import { button, make } from "./dom.js";
+import { button, copy, make } from "./dom.js";
 
 const LOOK = ["fill", "stroke", "stroke-width", "font-size", "font-family", "opacity", "stroke-opacity", "stroke-dasharray", "display"];
 const PIXELS = 2; // of a picture to one of the page
@@ -14,7 +14,7 @@ export function leaving(page) {
   };
   const canvas = () => page.chart.canvas;
   return [
-    ...(page.told ? [] : [button("link", "copy a link to these values", () => link(page))]),
+    ...(page.told ? [] : [button("link", "copy a link to what is shown", () => link(page))]),
     button("rig file", "save as a rig file", () => save("rig.toml", "text/plain", page.rig.toml())),
     button("chart SVG", "save the chart as a drawing", () => save("chart.svg", "image/svg+xml", drawing(canvas()))),
     button("chart PNG", "save the chart as a picture", () => picture(canvas()).then((blob) => save("chart.png", "image/png", blob), () => (page.banner.notice.textContent = "This browser cannot make a picture of the chart; save the drawing (SVG)."))),
@@ -23,11 +23,8 @@ export function leaving(page) {
 }
 
 function link(page) {
-  const text = location.href.split("#")[0] + page.rig.hash(), { notice } = page.banner;
-  const done = () => page.say("The link is copied.");
-  const failed = () => (notice.textContent = text);
-  if (navigator.clipboard) navigator.clipboard.writeText(text).then(done, failed);
-  else failed();
+  const text = location.href.split("#")[0] + page.hash(), { notice } = page.banner;
+  copy(text).then(() => page.say("The link is copied."), () => (notice.textContent = text));
 }
 
 /** An SVG with its colours written out. @param {any} canvas */

@@ -142,6 +142,11 @@ export class Linear {
     };
   }
 
+  /** Eigenvalues alone; none where there is no steady sliding. */
+  roots(branch = 0) {
+    return this.settle(branch) === STABLE ? roots(this.ask("coefficients", this.facts.degree + 1)) : [];
+  }
+
   /** Why there is no steady sliding: the contact, and the numbers that say so. */
   absence(status) {
     const { facts: { contacts, searched, joint }, R, y, count } = this;

@@ -31,12 +31,12 @@ export class Locus {
     this.half = 0;
   }
 
-  /** @param {any} answer */
-  show(answer) {
+  /** @param {any} answer @param {{along: any[], beyond: any[]}} [others] eigenvalues at other values, where p + k q has none */
+  show(answer, others) {
     const { eigenvalues, p, q } = answer, display = eigenvalues.length ? "" : "none";
     if (this.canvas.style.display !== display) this.canvas.style.display = display;
     if (!eigenvalues.length) return;
-    const at = (k) => roots(p.map((v, i) => v + k * q[i])), beyond = answer.ends.map(at), sizes = [eigenvalues[0], ...beyond.map(([s]) => s)].map((s) => Math.hypot(s.re, s.im));
+    const at = (k) => roots(p.map((v, i) => v + k * q[i])), beyond = others?.beyond ?? answer.ends.map(at), sizes = [eigenvalues[0], ...beyond.flatMap(([s]) => s ?? [])].map((s) => Math.hypot(s.re, s.im));
     const half = rounded(VIEW * Math.max(...sizes.filter(Number.isFinite), 1e-300));
     const across = straight(-half, half), ratio = BOX.height / BOX.width, up = straight(-half * ratio * 1.3, half * ratio * 1.3);
     this.frame(half, across, up);
@@ -44,7 +44,8 @@ export class Locus {
     const shows = (s) => across.of(s.re) >= 0 && across.of(s.re) <= 1 && up.of(s.im) >= 0 && up.of(s.im) <= 1;
     const drawn = (all, mark) => all.filter(shows).map((s) => `M${x(s).toFixed(1)} ${y(s).toFixed(1)}${mark}`).join("");
     const dots = SIZES.map(() => "");
-    stiffnesses(answer).forEach((k, n) => (dots[Math.floor((n * SIZES.length) / POINTS)] += drawn(at(k), "h0")));
+    const along = others?.along ?? stiffnesses(answer).map(at);
+    along.forEach((all, n) => (dots[Math.floor((n * SIZES.length) / along.length)] += drawn(all, "h0")));
     dots.forEach((d, n) => put(this.dots[n], "d", d));
     put(this.crossings, "d", drawn(beyond.flat(), "m-5 0l5 -5l5 5l-5 5z"));
     const cross = "m-5 -5l10 10m0 -10l-10 10";
@@ -59,7 +60,7 @@ export class Locus {
     this.half = half;
     this.canvas.replaceChildren(
       svg("rect", { class: "stable left", x: BOX.left, y: BOX.top, width: BOX.width / 2, height: BOX.height }),
-      axis(BOX, across, [-half, half], 1, "1/s", "growth rate", false), axis(BOX, up, [up.at(0), up.at(1)], 1, "rad/s", "frequency", true),
+      axis(BOX, across, [-half, half], { unit: "1/s" }, "growth rate", false), axis(BOX, up, [up.at(0), up.at(1)], { unit: "rad/s" }, "frequency", true),
       svg("line", { class: "zero", x1: BOX.left + BOX.width / 2, x2: BOX.left + BOX.width / 2, y1: BOX.top, y2: BOX.top + BOX.height }),
       svg("rect", { x: BOX.left, y: BOX.top, width: BOX.width, height: BOX.height, class: "frame" }),
       ...this.dots, this.crossings, this.decays, this.grows);

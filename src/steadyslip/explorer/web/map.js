@@ -2,7 +2,7 @@
 import { CLASSES, regions } from "./chart.js";
 import { make, put, svg } from "./dom.js";
 import { axis } from "./plot.js";
-import { shown } from "./quantities.js";
+import { told } from "./quantities.js";
 
 const ROWS = 60, ROWS_SEARCHED = 24; // where steady sliding has to be searched for, each point takes long
 const KEY = { stable: "stable", unstable: "unstable", none: "no steady sliding (locks up or lifts off)", unknown: "no such rig is possible" };
@@ -25,6 +25,7 @@ export class Chart {
       select.addEventListener("change", () => {
         this.put(which, Number(select.value));
         this.show();
+        page.note();
       });
       return select;
     });
@@ -64,6 +65,7 @@ export class Chart {
   }
 
   show() {
+    if (this.page.root.dataset.width === "narrow" && this.page.part !== "chart") return; // nobody sees it
     const [i, j] = this.axes, { rig, size: box, ranges } = this.page, { parameters, facts } = rig.data;
     const x = this.page.scale(i), y = this.page.scale(j);
     this.choices.forEach((select, which) => (select.value = String(this.axes[which])));
@@ -82,7 +84,7 @@ export class Chart {
     const at = [x.of(rig.values[i]), y.of(rig.values[j])].map((one) => Math.min(1, Math.max(0, one)));
     this.point.setAttribute("cx", String(box.left + at[0] * box.width));
     this.point.setAttribute("cy", String(box.top + (1 - at[1]) * box.height));
-    const words = [i, j].map((n) => `${parameters[n].name} ${shown(rig.values[n] * parameters[n].factor, parameters[n].unit)}`);
+    const words = [i, j].map((n) => `${parameters[n].name} ${told(parameters[n], rig.values[n])}`);
     this.canvas.setAttribute("aria-label", `stability over ${words.join(" and ")}: ${this.page.banner.sentence.textContent}. Arrow keys move the point.`);
   }
 
@@ -100,7 +102,6 @@ export class Chart {
     this.point = svg("circle", { r: 8, class: "point" });
     this.canvas.setAttribute("viewBox", `0 0 ${box.left + box.width + 14} ${box.top + box.height + 46}`);
     this.canvas.replaceChildren(inner,
-      axis(box, x, ranges[i], parameters[i].factor, parameters[i].unit, parameters[i].name, false),
-      axis(box, y, ranges[j], parameters[j].factor, parameters[j].unit, parameters[j].name, true), this.point);
+      axis(box, x, ranges[i], parameters[i], parameters[i].name, false), axis(box, y, ranges[j], parameters[j], parameters[j].name, true), this.point);
   }
 }

@@ -2,20 +2,26 @@
 import { Banner } from "./banner.js";
 import { Controls } from "./controls.js";
 import { Course } from "./course.js";
-import { button, make } from "./dom.js";
+import { button, make, put } from "./dom.js";
+import { edgesOf } from "./edges.js";
 import { Facts } from "./facts.js";
 import { leaving } from "./leaving.js";
 import { Chart } from "./map.js";
-import { display } from "./quantities.js";
+import { unitFor } from "./quantities.js";
 import { Rig, inside, rangeOf, scaleOf } from "./rig.js";
+import { all, choose, chosen, chosenIn } from "./view.js";
+import { kindOf } from "./words.js";
 
 /** Where the chart's axes are, on a narrow page and on a wide one: its letters stay as large as the others. */
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
 const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
 const PARTS = 60; // of a track, at whose ends the status is asked for
+const OTHERS = 40; // values of the bar at which eigenvalues are drawn
 const SOUGHT = 30; // tenths of a decade outside a range in which a change is sought
-const BEYOND = 1e-4; // how far behind an edge one lands that goes there, of its value
+const ROUNDED = 1e-12; // share of a value that is zero but for rounding
+const OPENED = { values: "values", chart: "chart", motion: "motion", numbers: "numbers" }; // parts of a narrow page, one of which is seen
 const SAID = 4000, NAMED = 4; // ms for which a word stands; parts of a link that are named
+const WORDS = { stable: "stable", unstable: "unstable", edge: "on the edge", none: "no steady sliding", unknown: "no such rig" };
 const DRAWN = 1e150; // numbers beyond that, and below its inverse, lie off every scale
 
 export class Page {
@@ -30,6 +36,9 @@ export class Page {
   /** @type {Course} */ course;
   /** @type {any} */ tools;
   size = WIDE;
+  wide = 0; // of the bar, in pixels
+  part = OPENED.values; // what a narrow page shows
+  first = /** @type {Record<string, string>} */ ({}); // what is chosen before anybody has
 
   /**
    * @param {HTMLElement} root @param {any} data @param {any} programs @param {() => any} library
@@ -47,7 +56,10 @@ export class Page {
     if (!told) this.rig.values = this.fromAddress();
     root.classList.add("steadyslip");
     this.measure();
-    root.replaceChildren(this.head(), this.banner.box);
+    this.tabs = Object.entries(OPENED).map(([part, words]) => make("button", { type: "button", textContent: words, onclick: () => this.open(part) }));
+    this.word = make("b", {});
+    root.replaceChildren(this.head(), this.banner.box, make("nav", { className: "tabs", "aria-label": "parts of the page" }, this.word, ...this.tabs));
+    this.open(this.part);
     this.judge();
     requestAnimationFrame(() => setTimeout(() => this.furnish(library))); // the verdict is to be seen first
   }
@@ -59,11 +71,13 @@ export class Page {
     this.home = data.parameters.map((_, i) => rangeOf(rig, i));
     this.fit(rig.values);
     this.tracks = data.parameters.map((_, i) => this.track(i));
-    const k = Math.max(0, rig.bar), [first] = this.edges().filter((edge) => edge.i !== k);
+    const near = this.edges().filter((edge) => !edge.far && edge.at).map((edge) => edge.i);
+    if (data.phrases && near.length) [rig.bar] = near; // the parameter whose edge is nearest
+    const k = Math.max(0, rig.bar), across = near.find((i) => i !== k) ?? (k === 0 ? 1 % data.parameters.length : 0);
     rig.values = values;
     this.fit(values);
     this.controls = new Controls(this);
-    this.chart = new Chart(this, [first ? first.i : k === 0 ? 1 % data.parameters.length : 0, k]); // the edge that is nearest
+    this.chart = new Chart(this, [across, k]);
     this.facts = new Facts(this);
     this.course = new Course(this, library);
     root.append(make("main", {}, this.controls.box, make("div", { className: "middle" }, this.chart.box, this.course.box), this.facts.box), this.foot());
@@ -71,6 +85,8 @@ export class Page {
       const dark = getComputedStyle(root).colorScheme.includes("dark");
       root.dataset.theme = dark ? "light" : "dark";
     }));
+    this.first = all(this);
+    if (!this.told) choose(this, chosenIn(location.hash));
     this.redraw();
     new ResizeObserver(() => {
       if (!this.measure()) return;
@@ -78,9 +94,23 @@ export class Page {
       this.course.draw();
     }).observe(root);
     window.addEventListener("hashchange", () => {
-      if (!this.told && location.hash !== rig.hash()) this.put(this.fromAddress());
+      if (this.told || location.hash === this.hash()) return;
+      const values = this.fromAddress();
+      choose(this, chosenIn(location.hash));
+      this.put(values);
+      this.redraw();
     });
     root.dataset.ready = "yes";
+  }
+
+  /** Another part, where one is seen at a time. @param {string} part */
+  open(part) {
+    this.part = part in OPENED ? part : OPENED.values;
+    this.root.dataset.part = this.part;
+    this.tabs.forEach((tab, n) => put(tab, "aria-pressed", String(Object.keys(OPENED)[n] === this.part)));
+    if (!this.chart) return;
+    this.chart.show();
+    this.note();
   }
 
   /** A word that needs no answer, over the page for some seconds. @param {string} words */
@@ -103,6 +133,7 @@ export class Page {
     const width = this.root.clientWidth, before = this.size;
     this.root.dataset.width = width < MIDDLE ? "narrow" : width < WIDE_FROM ? "middle" : "wide";
     this.size = width < 600 ? NARROW : WIDE;
+    this.wide = width < MIDDLE ? width - 60 : 0.38 * Math.min(width, 1500); // of the bar
     return this.size !== before;
   }
 
@@ -111,7 +142,11 @@ export class Page {
     this.redoButton = button("↷", "redo", () => this.step(this.future, this.past));
     const { title, version, parameters } = this.rig.data;
     this.tools = make("div", { className: "tools", role: "toolbar", "aria-label": "page" }, this.undoButton, this.redoButton,
-      button("reset", "back to the rig of the file", () => this.put(parameters.map((one) => one.value))));
+      button("reset", "back to the rig of the file", () => {
+        parameters.forEach((_, i) => this.controls.forget(i));
+        this.put(parameters.map((one) => one.value));
+        this.controls.show();
+      }));
     this.said = make("p", { className: "said", role: "status" });
     return make("header", {}, this.said, make("p", { className: "brand" }, make("b", { textContent: title }), ` explored with steadyslip ${version}`), this.tools);
   }
@@ -155,7 +190,7 @@ export class Page {
 
   /** The slider of the stiffness reaches to the critical one, which other parameters move. */
   follow() {
-    const { answer, rig: { data, values, bar: i } } = this;
+    const { answer, rig: { data, values, bar } } = this, i = data.phrases ? bar : data.parameters.findIndex((one) => one.name === data.stiffness);
     if (i < 0 || answer.critical === null) return;
     if (data.phrases) return this.reach(i, answer.critical);
     const { critical, share, gain, stiffness } = answer, { name } = data.parameters[i];
@@ -235,9 +270,14 @@ export class Page {
 
   /** Four digits are enough for what a hand sets. */
   tidy(i, value) {
-    const one = this.rig.data.parameters[i], [factor] = display(value * one.factor, one.unit);
-    const unit = factor / one.factor, round = one.whole ? Math.round(value) : Number((value / unit).toPrecision(4)) * unit;
-    return inside(one, round) ? Number(round.toPrecision(15)) : value;
+    const round = this.rounded(i, value, 4);
+    return inside(this.rig.data.parameters[i], round) ? round : value;
+  }
+
+  /** A value of so many digits in the unit in which it is shown. */
+  rounded(i, value, many) {
+    const one = this.rig.data.parameters[i], [unit] = unitFor(one, value);
+    return one.whole ? Math.round(value) : Number((Number((value / unit).toPrecision(many)) * unit).toPrecision(15));
   }
 
   // -- what follows from the values
@@ -249,7 +289,8 @@ export class Page {
     for (let n = 1; n <= PARTS; n++) {
       const high = scale.at(n / PARTS), next = this.rig.status(i, high);
       if (next !== before) {
-        const at = this.rig.narrowed(i, low, high), to = scale.of(at);
+        const narrowed = this.rig.narrowed(i, low, high), own = this.rig.data.parameters[i], zero = low < 0 && Math.abs(narrowed) < ROUNDED * Math.max(Math.abs(own.value), own.natural);
+        const at = zero ? 0 : narrowed, to = scale.of(at);
         parts.push({ from, to, at, status: before });
         [from, before] = [to, next];
       }
@@ -261,32 +302,37 @@ export class Page {
 
   /** The nearest change of every parameter inside its range, the most urgent first. */
   edges() {
-    const found = [];
-    this.rig.data.parameters.forEach((one, i) => {
-      const first = this.scale(i).at(0), value = this.rig.values[i], parts = this.tracks[i];
-      let best = null;
-      parts.slice(0, -1).forEach((part, n) => {
-        const { at } = part, other = parts[n + 1].status, away = at > value;
-        const beyond = away ? other : part.status, distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
-        const width = away ? parts[n + 1].at - at : at - (n ? parts[n - 1].at : first);
-        const landing = at + (away ? 1 : -1) * Math.min(BEYOND * Math.abs(at) || width, 0.5 * width);
-        if (best === null || distance < best.distance || (!value && at < best.at)) best = { i, at, distance: value ? distance : 1e6, beyond, landing };
-      });
-      if (best) found.push(best);
-    });
-    return found.sort((a, b) => a.distance - b.distance);
+    return edgesOf(this);
   }
 
   judge() {
     this.answer = this.rig.assess();
     this.banner.show(this.answer);
+    const kind = kindOf(this.answer);
+    put(this.word.parentElement ?? this.word, "data-kind", kind);
+    this.word.textContent = WORDS[kind];
   }
 
-  /** The values in the address. */
-  address() {
-    try {
-      history.replaceState(null, "", this.rig.hash() || location.pathname + location.search);
-    } catch { /* a frame without an address of its own */ }
+  /** Values, and what is chosen, as a link has them. */
+  hash() {
+    return this.rig.hash(this.course ? chosen(this) : []);
+  }
+
+  /** Eigenvalues at other values of what the bar shows, where they follow from no formula: over its range, and at its edges. */
+  others() {
+    const { rig } = this, i = rig.bar, at = (value) => rig.set(this.with(i, value)).roots(rig.data.branch), scale = this.scale(i), many = this.sliding ? OTHERS / 2 : OTHERS;
+    return { along: Array.from({ length: many }, (_, n) => at(scale.at((n + 0.5) / many))), beyond: this.tracks[i].slice(0, -1).map((part) => at(part.at)) };
+  }
+
+  /** The same in the address, soon: browsers take long over it. */
+  note() {
+    clearTimeout(this.addressed);
+    if (this.told || this.sliding) return;
+    this.addressed = setTimeout(() => {
+      try {
+        history.replaceState(null, "", this.hash() || location.pathname + location.search);
+      } catch { /* a frame without an address of its own */ }
+    }, 100);
   }
 
   /** Another parameter on the bar. @param {number} i */
@@ -304,18 +350,14 @@ export class Page {
     if (!this.controls) return;
     this.tracks = this.rig.data.parameters.map((_, i) => this.track(i));
     if (!this.sliding) this.tracks.forEach((track, i) => track.length > 1 || this.seek(i));
-    this.banner.showNearest(this.answer, this.edges()[0]);
+    this.banner.follow(this.answer, this.edges()[0]);
     this.controls.show();
     this.chart.show();
     this.facts.show(this.answer);
     if (!this.sliding) this.facts.showEdges();
     this.course.soon();
-    if (this.told) {
-      if (!this.sliding) this.told(this.rig.values);
-      return;
-    }
-    clearTimeout(this.addressed);
-    if (!this.sliding) this.addressed = setTimeout(() => this.address(), 100); // browsers take long over it
+    if (this.told && !this.sliding) this.told(this.rig.values);
+    this.note();
   }
 }
 

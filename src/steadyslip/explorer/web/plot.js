@@ -1,6 +1,7 @@
 // Axes and curves as SVG: positions run from 0 to 1, boxes are in units of the drawing.
 import { svg } from "./dom.js";
-import { digits, display } from "./quantities.js";
+import { digits, unitFor } from "./quantities.js";
+import { NEW } from "./rig.js";
 
 /**
  * @typedef {{left: number, top: number, width: number, height: number}} Box
@@ -11,7 +12,7 @@ import { digits, display } from "./quantities.js";
 /** Round numbers between two, positions of ticks. */
 export function ticks(low, high, logarithmic, most) {
   const found = [];
-  if (logarithmic) {
+  if (logarithmic && low > 0 && high < Infinity) {
     const every = Math.max(1, Math.ceil(Math.log10(high / low) / most));
     const steps = Math.log10(high / low) < 1.5 ? [1, 2, 5] : [1];
     for (let n = Math.floor(Math.log10(low)); n <= Math.log10(high); n++) {
@@ -29,16 +30,15 @@ export function ticks(low, high, logarithmic, most) {
   return found;
 }
 
-/** One axis: lines, numbers and label, in a unit that reads well; `area` is what values are shown times. */
-export function axis(box, scale, range, area, unit, label, upright) {
-  const low = range[0] * area, high = range[1] * area;
-  const logarithmic = low > 0 && high / low > 30 && scale.of((0.5 * (low + high)) / area) > 0.6;
-  const [factor, name] = display(Math.max(Math.abs(low), Math.abs(high)) / (logarithmic ? Math.sqrt(high / low) : 1), unit);
+/** One axis: lines, numbers and label, in a unit that reads well, or that `one` has of its own. @param {any} one with its unit and factor */
+export function axis(box, scale, [low, high], one, label, upright) {
+  const logarithmic = low > 0 && high / low > 30 && scale.of(0.5 * (low + high)) > 0.6;
+  const [factor, name] = unitFor({ factor: 1, own: NEW, ...one }, Math.max(Math.abs(low), Math.abs(high)) / (logarithmic ? Math.sqrt(high / low) : 1));
   const group = svg("g", { class: "axis" }), length = upright ? box.height : box.width;
   const marks = ticks(low / factor, high / factor, logarithmic, length / (upright ? 40 : 80));
   const many = Math.min(12, Math.max(3, Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (Math.abs(high - low) || 1))) + 3)); // digits that tell marks apart
   for (const value of marks) {
-    const at = scale.of((value * factor) / area);
+    const at = scale.of(value * factor);
     if (at < -1e-9 || at > 1 + 1e-9) continue;
     const x = box.left + (upright ? 0 : at * box.width), y = box.top + (upright ? (1 - at) * box.height : box.height);
     group.append(
@@ -46,7 +46,7 @@ export function axis(box, scale, range, area, unit, label, upright) {
       svg("text", { x: upright ? x - 6 : x, y: upright ? y + 4 : y + 16, "text-anchor": upright ? "end" : "middle" }, digits(value, logarithmic ? 3 : many)),
     );
   }
-  const text = name ? `${label} (${name.replace("^2", "²")})` : label;
+  const text = name ? `${label} (${name})` : label;
   const where = upright ? { transform: `translate(13 ${box.top + box.height / 2}) rotate(-90)` } : { x: box.left + box.width / 2, y: box.top + box.height + 34 };
   group.append(svg("text", { ...where, "text-anchor": "middle", class: "label" }, text));
   return group;
@@ -64,9 +64,9 @@ export function extent(...all) {
   return low <= high ? [low, high] : [0, 1];
 }
 
-/** A scale on which values from low to high fill the box with some room: logarithmic where they span decades. @returns {Span} */
-export function spanning(low, high) {
-  if (low > 0 && high / low > 30) {
+/** A scale on which values from low to high fill the box with some room: of velocities logarithmic where they span decades. @returns {Span} */
+export function spanning([low, high], label) {
+  if (label === "velocity" && low > 0 && high / low > 30) {
     const a = low / 1.15, b = high * 1.15;
     return { scale: { at: (t) => a * (b / a) ** t, of: (v) => Math.log(v / a) / Math.log(b / a) }, range: [a, b], logarithmic: true };
   }
@@ -81,12 +81,19 @@ const frame = (box) => svg("rect", { x: box.left, y: box.top, width: box.width, 
 
 /** The path of a series over rising times: of many points, the lowest and highest of each column of the box. */
 export function pathOver(box, times, values, along, up) {
-  let path = "", column = -1, least = 0, most = 0;
-  const put = (x, y) => (path += `${path ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`);
+  let path = "", column = -1, least = 0, most = 0, pen = "M";
+  const put = (x, y) => {
+    path += `${pen}${x.toFixed(1)} ${y.toFixed(1)}`;
+    pen = "L";
+  };
   const few = times.length < 3 * box.width, clipped = (y) => Math.min(box.top + box.height, Math.max(box.top, y));
   for (let i = 0; i < times.length; i++) {
     const x = box.left + along.of(times[i]) * box.width, y = clipped(box.top + (1 - up.of(values[i])) * box.height);
     if (x > box.left + box.width + 0.1) break;
+    if (Number.isNaN(y)) { // a gap
+      [pen, column] = ["M", -1];
+      continue;
+    }
     if (Math.floor(x) !== column) {
       if (column >= 0 && most > least) put(column + 0.5, least), put(column + 0.5, most);
       [column, least, most] = [Math.floor(x), y, y];
@@ -101,9 +108,9 @@ export function pathOver(box, times, values, along, up) {
 
 /** One strip of series over time: axes and, from the faint to the strong, curves. @param {{times: any, values: any}[]} curves */
 export function strip(box, curves, until, unit, label, last) {
-  const up = spanning(...extent(...curves.map((one) => one.values))), along = straight(0, until);
-  const group = svg("g", {}, axis(box, up.scale, up.range, 1, unit, label, true));
-  if (last) group.append(axis(box, along, [0, until], 1, "s", "time", false));
+  const up = spanning(extent(...curves.map((one) => one.values)), label), along = straight(0, until);
+  const group = svg("g", {}, axis(box, up.scale, up.range, { unit }, label, true));
+  if (last) group.append(axis(box, along, [0, until], { unit: "s" }, "time", false));
   group.append(frame(box));
   curves.forEach((one, n) => group.append(svg("path", { class: n + 1 < curves.length ? "curve before" : "curve", d: pathOver(box, one.times, one.values, along, up.scale) })));
   return { group, up: up.scale };
@@ -136,10 +143,10 @@ export function pathThrough(box, xs, ys, across, up) {
   return path;
 }
 
-/** Series over series: the phase plane. @param {{x: any, y: any}[]} curves @param {[string, string]} acrossIs unit and label */
-export function plane(box, curves, acrossIs, upIs) {
-  const across = spanning(...extent(...curves.map((one) => one.x))), up = spanning(...extent(...curves.map((one) => one.y)));
-  const group = svg("g", {}, axis(box, across.scale, across.range, 1, ...acrossIs, false), axis(box, up.scale, up.range, 1, ...upIs, true), frame(box));
+/** Series over series: the phase plane. @param {{x: any, y: any}[]} curves @param {[string, string]} upIs */
+export function plane(box, curves, [unit, label], upIs) {
+  const across = spanning(extent(...curves.map((one) => one.x)), label), up = spanning(extent(...curves.map((one) => one.y)), upIs[1]);
+  const group = svg("g", {}, axis(box, across.scale, across.range, { unit }, label, false), axis(box, up.scale, up.range, { unit: upIs[0] }, upIs[1], true), frame(box));
   curves.forEach((one, n) => group.append(svg("path", { class: n + 1 < curves.length ? "curve before" : "curve", d: pathThrough(box, one.x, one.y, across.scale, up.scale) })));
   return { group, across: across.scale, up: up.scale };
 }

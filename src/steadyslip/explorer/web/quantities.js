@@ -5,17 +5,20 @@ const TABLE = {
   g: [1e-3, [1, 0, 0, 0]], kg: [1, [1, 0, 0, 0]], t: [1e3, [1, 0, 0, 0]], min: [60, [0, 0, 1, 0]],
   h: [3600, [0, 0, 1, 0]], day: [86400, [0, 0, 1, 0]], days: [86400, [0, 0, 1, 0]], yr: [31557600, [0, 0, 1, 0]],
   bar: [1e5, [1, -1, -2, 0]], rad: [1, [0, 0, 0, 1]], deg: [Math.PI / 180, [0, 0, 0, 1]], rev: [2 * Math.PI, [0, 0, 0, 1]], turn: [2 * Math.PI, [0, 0, 0, 1]], rpm: [Math.PI / 30, [0, 0, -1, 1]],
+  hour: [3600, [0, 0, 1, 0]], year: [31557600, [0, 0, 1, 0]], degree: [Math.PI / 180, [0, 0, 0, 1]], degrees: [Math.PI / 180, [0, 0, 0, 1]],
   "°": [Math.PI / 180, [0, 0, 0, 1]], "%": [0.01, [0, 0, 0, 0]], 1: [1, [0, 0, 0, 0]],
 };
 /** @type {[string, number[]][]} */
 const BASES = [["Pa", [1, -1, -2, 0]], ["N", [1, 1, -2, 0]], ["m", [0, 1, 0, 0]], ["s", [0, 0, 1, 0]], ["Hz", [0, 0, -1, 0]]];
 for (const [name, exponents] of BASES) {
   TABLE[name] = [1, exponents];
-  const prefixes = { G: 1e9, M: 1e6, k: 1e3, c: 1e-2, m: 1e-3, u: 1e-6, n: 1e-9 };
+  const prefixes = { G: 1e9, M: 1e6, k: 1e3, c: 1e-2, m: 1e-3, u: 1e-6, n: 1e-9, p: 1e-12 };
   for (const [letter, factor] of Object.entries(prefixes)) TABLE[letter + name] ??= [factor, exponents];
 }
 const WORD = /\s*([/*·])?\s*([A-Za-z%°]+|1)\s*(?:\^\s*(-?\d)|(\d))?/y;
-const NUMBER = /^\s*([-+−]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+−]?\d+)?)\s*(.*?)\s*$/;
+const NUMBER = /^\s*([-+−]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+−]?\d+)?)\s*(.*?)\s*$/;
+const EITHER = /^[-+−]?[1-9]\d{0,2},\d{3}$/; // a comma that may be a decimal one or part thousands
+const PREFIXED = /^(?:[GMkcmunp]?(?:Pa|N|m|s|rad)(?:\^?\d)?[\s*/·]*)+$/, SCALED = /^(Pa|N|m|s)(?![a-z^])/;
 /** @type {[number, string][]} */
 const SHOWN = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 /** @type {[number, string][]} */
@@ -38,22 +41,36 @@ export function unitOf(text) {
   return [factor, exponents];
 }
 
+/** Mantissa and power of ten of a number that is written out. @param {string} text @returns {[bigint, number]} */
+function decimal(text) {
+  const [, sign, whole, part = "", power = "0"] = /^([-+]?)(\d*)\.?(\d*)(?:e([-+]?\d+))?$/i.exec(text) ?? [];
+  return [BigInt((sign === "-" ? sign : "") + (whole + part || "0")), Number(power) - part.length];
+}
+
+/** Digits times a factor, rounded once, as Python reads a quantity: "10 um" is 1e-05. @param {string} digits @param {number} factor */
+export function exactly(digits, factor) {
+  const [a, m] = decimal(digits), [b, n] = decimal(factor.toExponential());
+  return Number(`${a * b}e${m + n}`);
+}
+
 /**
  * A quantity in SI units; a bare number counts in the unit that is shown.
  * @param {string} text
  * @param {string} si expected unit
  * @param {string} unit shown now
+ * @param {[string, number]} [own] a unit that needs no look-up, and its size
  */
-export function parse(text, si, unit) {
+export function parse(text, si, unit, own = ["", 1]) {
   const found = NUMBER.exec(text.slice(0, 200));
-  if (!found) throw new Error(`“${text.slice(0, 40)}” is not a number with a unit`);
-  const name = found[2] || unit, [factor, exponents] = unitOf(name), expected = unitOf(si)[1];
+  if (!found) throw new Error(`“${text.slice(0, 40)}” is not a number with a unit, such as 2.5 ${unit === "1" ? "" : printed(unit)}`.trim());
+  if (EITHER.test(found[1])) throw new Error(`“${found[1]}” may be ${found[1].replace(",", ".")} or ${found[1].replace(",", "")}: write it without a comma`);
+  const name = found[2] || unit, [factor, exponents] = own[0] && printed(name) === printed(own[0]) ? [own[1], unitOf(si)[1]] : unitOf(name), expected = unitOf(si)[1];
   if (exponents.some((e, i) => e !== expected[i])) throw new Error(`“${name}” has the wrong dimension; expected ${si}`);
-  const digits = found[1].replace(/−/g, "-");
-  const power = Math.log10(factor); // one rounding where the factor is a power of ten: "10 um" is 1e-05
-  if (Number.isInteger(power) && !/e/i.test(digits)) return Number(`${digits}e${power}`);
-  return Number(digits) * factor;
+  return exactly(found[1].replace(/−/g, "-").replace(",", "."), factor);
 }
+
+/** A unit as it is set in print: µm, m². @param {string} name */
+export const printed = (name) => name.replace(/(?<![A-Za-z])[uμ](?=[A-Za-z])/g, "µ").replace(/\^?2(?!\d)/g, "²").replace(/\^?3(?!\d)/g, "³");
 
 /** The unit in a text of a number and a unit; empty where there is none. @param {string} text */
 export const unitIn = (text) => NUMBER.exec(text.slice(0, 200))?.[2] ?? "";
@@ -70,7 +87,7 @@ export function digits(value, many = 4) {
 export function display(value, si) {
   if (si === "1") return [1, ""];
   if (si === "rad") return [Math.PI / 180, "deg"];
-  const first = /^(Pa|N|m|s)(?![a-z^])/.exec(si), size = Math.abs(value);
+  const first = SCALED.exec(si), size = Math.abs(value);
   if (si === "s" && Number.isFinite(size)) for (const [factor, name] of LONG) if (size >= Math.max(600, 2 * factor)) return [factor, name];
   if (!first || !(size > 0) || !Number.isFinite(size)) return [1, si];
   const large = first[0] === "Pa" || first[0] === "N";
@@ -78,8 +95,26 @@ export function display(value, si) {
   return size / factor >= 1e-3 && size / factor < 1e5 ? [factor, letter + si] : [1, si];
 }
 
+/**
+ * What a page's number is divided by, and the unit in which it then is: that of the user's file, unless that has prefixes
+ * and the number would be too long in it; else the one in which it reads best.
+ * @param {{unit: string, factor: number, own: [string, number, string]}} one @param {number} value @returns {[number, string]}
+ */
+export function unitFor({ unit, factor, own: [name, own] }, value) {
+  const size = Math.abs((value * factor) / own);
+  if (name && (!(size < 1e-3 || size >= 1e5) || !value || !PREFIXED.test(name) || !SCALED.test(unit))) return [own / factor, printed(name)];
+  const [best, found] = display(value * factor, unit);
+  return [best / factor, printed(found)];
+}
+
+/** A parameter's value for people. @param {any} one @param {number} value */
+export function told(one, value, many = 4) {
+  const [size, name] = unitFor(one, value);
+  return `${digits(value / size, many)} ${name}`.trim();
+}
+
 /** A value for people, with its unit. @param {number} value @param {string} si */
 export function shown(value, si, many = 4) {
   const [factor, name] = display(value, si);
-  return `${digits(value / factor, many)} ${name.replace("^2", "²")}`.trim();
+  return `${digits(value / factor, many)} ${printed(name)}`.trim();
 }

@@ -1,17 +1,19 @@
 // The rig of a page: its values, where they may lie, what follows from them, and how they leave the page.
 import { Linear, UNKNOWN } from "./linear.js";
+import { exactly } from "./quantities.js";
 
 /**
  * @typedef {{name: string, group: string, label: string, unit: string, factor: number, value: number, natural: number, doc: string,
  *   low: number | null, high: number | null, lowAllowed: boolean, highAllowed: boolean, whole: boolean,
- *   allowed: string}} Parameter
+ *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its size and the text in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
- *   axial: number, toml: string, branch: number, checks: any[], speed: string, area: number | null,
- *   stiffness: string | null, bars?: string[], areas?: number[], phrases?: any, motion: any, still: string, sketch: string}} Data
+ *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
+ *   stiffness: string | null, areas?: number[], phrases?: any, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 
-const USUAL = { factor: 1, low: null, high: null, lowAllowed: false, highAllowed: false, whole: false }; // unless a parameter says otherwise
+export const NEW = /** @type {[string, number, string]} */ (["", 1, ""]); // of what the user's file leaves out
+const USUAL = { own: NEW, factor: 1, low: null, high: null, lowAllowed: false, highAllowed: false, whole: false }; // unless a parameter says otherwise
 
 export class Rig {
   /** @param {Data} data @param {any} programs */
@@ -97,21 +99,39 @@ export class Rig {
     return found;
   }
 
-  /** The rig file with the values of now: a template in which each value has its place. */
+  /** The rig file with the values of now: that of the user, of which only they are written anew (see own_file.py). */
   toml() {
-    return this.data.toml.replace(/\{\{(\d+)\}\}/g, (_, i) => String(this.values[Number(i)]));
+    const line = ([i, before, behind, end = ""]) => (end && Object.is(this.values[i], this.data.parameters[i].value) ? "" : before + this.values[i] + behind + end);
+    return this.data.toml.map((piece) => {
+      if (typeof piece === "string") return piece;
+      if (!piece.head && piece.head !== "") return piece.length > 1 ? line(piece) : this.written(piece[0]);
+      const lines = piece.lines.map(line).join("");
+      return lines && piece.head + lines;
+    }).join("");
   }
 
-  /** What differs from the rig that the page was made of, for a link. */
-  hash() {
+  /** A value as the user's file has it: in the unit there if that brings it back to the last digit. @param {number} i */
+  written(i) {
+    const one = this.data.parameters[i], { own: [unit, size, text], factor, si, was = one.value } = one, value = this.values[i];
+    if (Object.is(value, was)) return text;
+    for (let many = 1; many <= 17 && !one.whole; many++) {
+      const digits = String(Number(((value * factor) / size).toPrecision(many)));
+      if (exactly(digits, size) / factor === value) return unit ? `"${digits} ${unit}"` : digits;
+    }
+    return one.whole || (si ?? one.unit) === "1" ? String(value) : `"${value} ${si ?? one.unit}"`;
+  }
+
+  /** What differs from the rig that the page was made of, for a link, and what else is chosen. @param {string[]} [chosen] */
+  hash(chosen = []) {
     const changed = this.data.parameters.flatMap((one, i) => (Object.is(this.values[i], one.value) ? [] : [`${encodeURIComponent(one.name)}=${this.values[i]}`]));
-    return changed.length ? `#${changed.join("&")}` : "";
+    return changed.length + chosen.length ? `#${[...changed, ...chosen].join("&")}` : "";
   }
 
   /** Values from a link: only names that the rig has, numbers, and inside their domains; the rest is left, in words. */
   fromHash(text) {
     const values = this.data.parameters.map((one) => one.value), left = /** @type {string[]} */ ([]);
     for (const part of text.slice(0, 10000).replace(/^#/, "").split("&")) {
+      if (part.startsWith("~")) continue; // what is chosen, see view.js
       const [name, number, ...more] = part.split("=");
       const i = this.data.parameters.findIndex((one) => encodeURIComponent(one.name) === name);
       const value = number && /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(number) ? Number(number) : NaN;

@@ -17,8 +17,9 @@ _WORDS = {"and": "&&", "or": "||"}
 _IMPORT = re.compile(r"^import\b[^;]*;\n", re.M)
 _EXPORT = re.compile(r"^export (?=const|let|class|function|async)", re.M)
 _DECLARED = re.compile(r"^(?:export )?(?:const|let|class|function\*?|async function) (\w+)", re.M)
+_FURTHER = re.compile(r"^(?:export )?const .*", re.M), re.compile(r", ([A-Z][A-Z_]+) = ")
 _EXPORTED = re.compile(r"(?:^export (?:const|function)|,) (\w+)(?= =|\()", re.M)
-_OWN = {"abs": "Math.abs", "sqrt": "Math.sqrt"}
+_OWN = {"abs", "sqrt"}
 
 
 def runtime() -> str:
@@ -40,6 +41,7 @@ def as_script(*modules: str) -> str:
         If two modules declare the same name at their outermost level.
     """
     names = [name for module in modules for name in _DECLARED.findall(module)]
+    names += [name for module in modules for line in _FURTHER[0].findall(module) for name in _FURTHER[1].findall(line)]
     if twice := {name for name in names if names.count(name) > 1}:
         raise InternalError(f"several JavaScript modules declare {', '.join(sorted(twice))}")
     return "\n".join(_EXPORT.sub("", _IMPORT.sub("", module)) for module in modules)
@@ -75,6 +77,13 @@ class _JavaScript(Writer):
     def select(self, condition: str, value: str, other: str) -> str:
         return f"({condition} ? {value} : {other})"
 
+    def _written(self, node: Node) -> str:
+        if node.op == "select":
+            return self.select(*map(self.bare, node.operands))
+        if node.op in _OWN or node.op in PRIMITIVES:
+            return self.operation(node, list(map(self.bare, node.operands)))
+        return super()._written(node)
+
     def operation(self, node: Node, arguments: Sequence[str]) -> str:
         if node.op in _WORDS and node.kind == "bool":
             return f"({arguments[0]} {_WORDS[node.op]} {arguments[1]})"
@@ -82,7 +91,7 @@ class _JavaScript(Writer):
             return f"(!{arguments[0]})"
         if node.op not in _OWN and node.op not in PRIMITIVES:
             raise InternalError(f"{node.op} has no counterpart in JavaScript, which has no integers of 64 bits")
-        return f"{_OWN.get(node.op, node.op)}({', '.join(arguments)})"
+        return f"{node.op}({', '.join(arguments)})"
 
     def named(self, name: str, value: str) -> str:
         return f"var {name} = {value};"

@@ -28,7 +28,7 @@ export function rough_log(x) {
 /** ln x; NaN below zero, about -708 at 0. @param {number} x */
 export const log = (x) => (x >= 0 ? Math.log(x > 2.2250738585072014e-308 ? x : 2.2250738585072014e-308) : NaN);
 
-export const log1p = Math.log1p, sinh = Math.sinh, cosh = Math.cosh, tanh = Math.tanh;
+export const abs = Math.abs, sqrt = Math.sqrt, log1p = Math.log1p, sinh = Math.sinh, cosh = Math.cosh, tanh = Math.tanh;
 export const asinh = Math.asinh, sin = Math.sin, cos = Math.cos, sign = Math.sign, power = Math.pow;
 
 /** e^x - 1; saturates as exp does. @param {number} x */

@@ -124,6 +124,10 @@ class Writer(ABC):
             return self.select(*a)
         return f"(-{a[0]})" if node.op == "neg" else self.operation(node, a)
 
+    def bare(self, node: Node) -> str:
+        """A value without the brackets that it needs beside signs."""
+        return self.known[node.order][1:-1] if node.order in self.signs else self.known[node.order]
+
     def _beside(self, node: Node) -> tuple[str, str]:
         """Both operands, without brackets that change nothing, not even the order of operations."""
         signs = [self.signs.get(operand.order, "") for operand in node.operands]

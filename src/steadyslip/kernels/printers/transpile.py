@@ -20,7 +20,7 @@ from steadyslip.kernels.printers.javascript import literal
 _BINARY: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 _COMPARE: dict[type, str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "===", ast.NotEq: "!=="}
 _BUILTIN = {
-    "abs": ("Math.abs", 1),
+    "abs": ("abs", 1),
     "min": ("smaller", 2),
     "max": ("larger", 2),
     "int": ("Math.trunc", 1),

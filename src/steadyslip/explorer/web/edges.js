@@ -1,0 +1,40 @@
+// The nearest edge of every parameter, and where one lands that goes there.
+import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
+import { inside } from "./rig.js";
+
+export const BESIDE = 1e-3; // how far from an edge one lands that goes there, of its value
+export const REMOTE = 100; // times a value, beyond which an edge is of little use
+
+/**
+ * The nearest change of every parameter inside its range, the most urgent first: where, what is behind it, whether it is
+ * far off, and values close to it: the landing on its stable side (on the one that slides steadily, where none is
+ * stable), and one behind it.
+ * @param {import("./page.js").Page} page
+ */
+export function edgesOf(page) {
+  const found = /** @type {{i: number, at: number, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
+  page.rig.data.parameters.forEach((one, i) => {
+    const first = page.scale(i).at(0), value = page.rig.values[i], parts = page.tracks[i];
+    let best = null;
+    parts.slice(0, -1).forEach((part, n) => {
+      const { at } = part, other = parts[n + 1].status, away = at > value;
+      if (part.status === UNKNOWN || other === UNKNOWN) return; // there is no rig to go to
+      const [here, beyond] = away ? [part.status, other] : [other, part.status];
+      const distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
+      if (best !== null && distance >= best.distance && (value || at >= best.at)) return;
+      const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < REMOTE && times > 1 / REMOTE);
+      const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // whether that side is behind the edge
+      const room = away === across ? parts[n + 1].at - at : (n ? parts[n - 1].at : first) - at;
+      const ahead = away ? parts[n + 1].at - at : (n ? parts[n - 1].at : first) - at;
+      best = { i, at, distance: value ? distance : 1e6, beyond, far, landing: beside(page, i, at, room), behind: beside(page, i, at, ahead) };
+    });
+    if (best) found.push(best);
+  });
+  return found.sort((a, b) => a.distance - b.distance);
+}
+
+/** A value close to an edge, on the side that has so much room: written with few digits, if it is there so. */
+function beside(page, i, at, room) {
+  const own = Math.abs(at || page.rig.values[i]), near = at + Math.sign(room) * Math.min(BESIDE * own || Math.abs(room), 0.5 * Math.abs(room)), round = page.rounded(i, near, 5);
+  return Math.abs(round - near) < 0.5 * Math.abs(near - at) && inside(page.rig.data.parameters[i], round) ? round : near;
+}

@@ -13,17 +13,12 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.quantities import shown
 from steadyslip.core.roles import Parameter, positive
+from steadyslip.experiments.measured.clean import cleaned, without_stand_ins
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
 from steadyslip.experiments.measured.formats import read_columns
-from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen, seconds
+from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
 
 Array = np.ndarray
-GAP = 10.0  # times the usual spacing
-RESTART = 0.02  # of the rows: so many on end whose time goes back are a clock that begins anew
-COARSE, EVEN = 0.6, 1.25  # share of rows with a time of their own; ticks by which even rows may miss their stamps
-AROUND = 25  # rows before and behind, from which that is told
-HUGEST = 1e60  # of a number in SI units
-PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
 
 
 @checked()
@@ -56,8 +51,8 @@ def read_record(
     normal_stress : float or str, optional
         A constant normal stress, Pa, where there is no column of it.
     table : str, optional
-        Group of an HDF5 or TDMS file, variable of a MATLAB file (``p1``, or ``p1.data`` in a structure), or sheet of a
-        workbook.
+        Group of an HDF5 or TDMS file, variable of a MATLAB file (``p1``, ``p1.data`` in a structure, ``p(2)`` in an
+        array of them), or sheet of a workbook.
     between : (start, end), optional
         Part to use, s.
     skip_bad_lines : bool, optional
@@ -101,7 +96,8 @@ def read_record(
     size = 1.0 if area is None else _checked("area", "m^2", area)
     si: dict[str, Array] = {}
     for role, column in found.items():
-        si[role] = raw.values[column.place] * (column.factor / (size if column.force else 1.0))
+        own = without_stand_ins(raw.values[column.place], column.name, notes)
+        si[role] = own * (column.factor / (size if column.force else 1.0))
         notes.append(f"{role}: column {column.name!r}" + _said_unit(column, size, area is None))
     if normal_stress is not None:
         level = _checked("normal_stress", "Pa", normal_stress)
@@ -113,7 +109,7 @@ def read_record(
     lines = raw.lines
     if between is not None:
         si, lines = _cut(si, lines, between, notes)
-    return _cleaned(si, str(path), [*raw.notes, *notes], lines)
+    return cleaned(si, str(path), [*raw.notes, *notes], lines)
 
 
 def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Array], int], tuple[Array, str]] | None:
@@ -211,185 +207,4 @@ def record_from_arrays(
         problems.append(Problem("friction", "missing; give friction, or shear and normal"))
     if problems:
         raise ParameterError(problems, title=source)
-    return _cleaned(si, source, [], np.arange(1, count + 1))
-
-
-# -- cleaning
-
-
-def _cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) -> Record:
-    """Rows in order of time, each whole, with a note of every one that is not."""
-    si, lines = _without_gaps_in_rows(si, lines, notes)
-    _check_sizes(si, source, lines)
-    if len(lines) >= FEWEST_ROWS:
-        si, lines = _in_order(si, lines, notes, source)
-    if len(lines) < FEWEST_ROWS:
-        message = f"{len(lines)} usable rows are left; a record needs {FEWEST_ROWS} or more"
-        raise ParameterError([Problem("file", message)], title=source)
-    _check_stress(si, source, lines)
-    if "friction" not in si:
-        si["friction"] = si["shear"] / si["normal"]
-        notes.append("friction computed as shear over normal stress")
-    _check_friction(si["friction"], source)
-    spacing = np.diff(si["time"])
-    usual = float(np.median(spacing))
-    wide = np.flatnonzero(spacing > GAP * np.maximum(_local_median(spacing), 1e-300))
-    if len(wide):
-        shown_gaps = ", ".join(f"{si['time'][i]:.6g} s ({spacing[i]:.3g} s long)" for i in wide[:3])
-        notes.append(f"{len(wide)} gaps in time, the first at {shown_gaps}; inputs are taken as linear across")
-    if spacing.max() > 1.5 * spacing.min():
-        notes.append(
-            f"sampling is not uniform: every {spacing.min():.3g} to {spacing.max():.3g} s, usually {usual:.3g} s"
-        )
-    if "displacement" in si:
-        back = np.diff(si["displacement"]) < 0
-        if np.any(back):
-            most = float(-np.min(np.diff(si["displacement"])))
-            notes.append(
-                f"the load point steps back {int(back.sum())} times, by up to {shown(most, 'm')}; kept as measured"
-            )
-        if "velocity" in si:
-            notes.append("the load point's displacement drives the model; its velocity column is only shown")
-    integrated = "displacement" not in si and "velocity" in si
-    if integrated:
-        steps = 0.5 * (si["velocity"][1:] + si["velocity"][:-1]) * spacing
-        si["displacement"] = np.concatenate([[0.0], np.cumsum(steps)])
-        notes.append("displacement of the load point integrated from its velocity")
-    normal, shear, displacement, velocity = (
-        None if name not in si else frozen(si[name]) for name in ("normal", "shear", "displacement", "velocity")
-    )
-    time, friction = frozen(si["time"]), frozen(si["friction"])
-    return Record(time, friction, normal, shear, displacement, velocity, source, tuple(notes), integrated)
-
-
-def _without_gaps_in_rows(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
-    bad = ~np.all([np.isfinite(values) for values in si.values()], axis=0)
-    if not np.any(bad):
-        return si, lines
-    which = [role for role, values in si.items() if not np.all(np.isfinite(values))]
-    where = ", ".join(map(str, lines[bad][:5]))
-    more = ", ..." if bad.sum() > 5 else ""
-    notes.append(f"{int(bad.sum())} rows without a number in {', '.join(which)} left out (lines {where}{more})")
-    return {role: values[~bad] for role, values in si.items()}, lines[~bad]
-
-
-def _in_order(si: dict[str, Array], lines: Array, notes: list[str], source: str) -> tuple[dict[str, Array], Array]:
-    """Rows whose time goes back are left out, rows of one time told apart: see `_stamped`."""
-    time = si["time"]
-    high = np.maximum.accumulate(time)
-    back = time < high
-    if np.any(back):
-        _check_clock(time, high, back, lines, source)
-        where = ", ".join(map(str, lines[back][:5]))
-        notes.append(
-            f"{int(back.sum())} rows whose time goes back left out (lines {where}{', ...' if back.sum() > 5 else ''})"
-        )
-        si, lines, time = {role: values[~back] for role, values in si.items()}, lines[~back], time[~back]
-    return _stamped(si, lines, notes)
-
-
-def _check_clock(time: Array, high: Array, back: Array, lines: Array, source: str) -> None:
-    """Refuse a clock that begins anew: what follows would be left out, or be taken for a jump of everything."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], back, [False]]).astype(int)))
-    begin, end = ends.reshape(-1, 2)[int(np.argmax(ends[1::2] - ends[::2]))]
-    if end - begin > max(RESTART * len(time), FEWEST_ROWS):
-        message = (
-            f"line {lines[begin]}: the clock begins anew, {time[begin]:.6g} s after {high[begin]:.6g} s, for "
-            f"{end - begin} rows; give each part as a file of its own, or mend the time"
-        )
-        raise ParameterError([Problem("time", message)], title=source)
-
-
-def _even(time: Array) -> Array | None:
-    """Times of rows that were taken evenly and stamped by a clock coarser than that; None if they were not."""
-    rows = np.arange(len(time), dtype=float)
-    tick = float(np.min(np.diff(np.unique(time))))
-    slope, origin = np.polyfit(rows, time, 1)
-    rest = time - (origin + slope * rows)
-    if not (slope > 0 and float(np.ptp(rest)) < EVEN * tick):
-        return None
-    return np.asarray(time[0] + slope * rows)
-
-
-def _stamped(si: dict[str, Array], lines: Array, notes: list[str]) -> tuple[dict[str, Array], Array]:
-    """Rows of one time: a clock that is coarser than the sampling, or rows too many.
-
-    Where a group takes the place of so many samples at the usual spacing around it, its rows are spread evenly over
-    the time to the next stamp. Else it is one sample, its mean: another time for one of its rows would be an invention.
-    """
-    time = si["time"]
-    unique, first, counts = np.unique(time, return_index=True, return_counts=True)
-    if len(unique) == len(time):
-        return si, lines
-    uneven = len(unique) < COARSE * len(time) and np.ptp(counts[1:-1]) > 0  # groups of equal size are spread exactly
-    if uneven and (even := _even(time)) is not None:
-        notes.append(
-            f"the clock is coarser than the sampling ({len(unique)} times for {len(time)} rows); rows taken as even, "
-            f"every {even[1] - even[0]:.4g} s"
-        )
-        return si | {"time": even}, lines
-    gaps = np.diff(unique, append=2 * unique[-1] - unique[-2])
-    around = np.clip(first[:, None] + np.array([-AROUND, AROUND]), 0, len(time) - 1)
-    usual = (time[around[:, 1]] - time[around[:, 0]]) / np.maximum(np.diff(around, axis=1)[:, 0], 1)
-    with np.errstate(divide="ignore"):
-        spread = (counts > 1) & (np.abs(np.log(gaps / (counts * usual))) < np.abs(np.log(gaps / usual)))
-    own = np.repeat(np.arange(len(unique)), counts)
-    place = np.arange(len(time)) - first[own]
-    time = np.where(spread[own], unique[own] + place * gaps[own] / counts[own], time)
-    starts = np.unique(time, return_index=True)[1]
-    sizes = np.diff(starts, append=len(time))
-    if np.any(spread):
-        rows = int(np.sum(counts[spread]))
-        notes.append(f"{rows} rows share a time with others; spread evenly to the next, as the usual spacing has it")
-    if len(starts) < len(time):
-        rows = len(time) - len(starts)
-        notes.append(f"{rows} rows repeat the time of the row before; each such group became its mean")
-    si = {role: np.add.reduceat(values, starts) / sizes for role, values in si.items()}
-    si["time"] = time[starts]
-    return si, lines[starts]
-
-
-def _local_median(spacing: Array) -> Array:
-    """Usual spacing in blocks, so that a change of sampling rate is no row of gaps."""
-    block = 51
-    if len(spacing) < 2 * block:
-        return np.full(len(spacing), np.median(spacing))
-    count = len(spacing) // block
-    medians = np.median(spacing[: count * block].reshape(count, block), axis=1)
-    return np.asarray(medians[np.minimum(np.arange(len(spacing)) // block, count - 1)])
-
-
-def _check_sizes(si: dict[str, Array], source: str, lines: Array) -> None:
-    """Refuse numbers that no experiment gives and whose squares or ratios are none, and a clock that stands still."""
-    problems = []
-    for role, values in si.items():
-        if np.any(huge := np.abs(values) > HUGEST):
-            i = int(np.argmax(huge))
-            message = f"line {lines[i]}: {values[i]:.4g} in SI units; allowed: sizes up to {HUGEST:g}"
-            problems.append(Problem(role, message))
-    time = si["time"]
-    if len(time) and not np.ptp(time) > 1 / HUGEST:
-        message = f"all {len(time)} rows lie within {1 / HUGEST:g} s of {time[0]:.4g} s; was the clock running?"
-        problems.append(Problem("time", message))
-    if problems:
-        raise ParameterError(problems, title=source)
-
-
-def _check_stress(si: dict[str, Array], source: str, lines: Array) -> None:
-    if "normal" in si and not np.all(si["normal"] > 0):
-        i = int(np.argmin(si["normal"] > 0))
-        message = (
-            f"line {lines[i]}: normal stress is {si['normal'][i]:.4g} Pa; it must be > 0 (compression) in the part "
-            "that is used; cut it with between = [start, end]"
-        )
-        raise ParameterError([Problem("normal", message)], title=source)
-
-
-def _check_friction(friction: Array, source: str) -> None:
-    usual = float(np.median(np.abs(friction)))
-    if not PLAUSIBLE[0] <= usual <= PLAUSIBLE[1]:
-        message = (
-            f"the friction coefficient is about {usual:.3g}, which no contact has; are shear and normal in the units "
-            "that their names say, or is the friction column a stress?"
-        )
-        raise ParameterError([Problem("friction", message)], title=source)
+    return cleaned(si, source, [], np.arange(1, count + 1))

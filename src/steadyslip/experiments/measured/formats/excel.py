@@ -22,6 +22,7 @@ from steadyslip.experiments.measured.formats.table import (
 )
 
 MOST_COLUMNS = 1000
+SPARSE = 0.05  # of the numbers of the fullest column: one of fewer belongs to something beside the record
 SHORT = 20  # rows: a sheet of fewer is none of a record
 Cells = list[Any]
 
@@ -31,7 +32,7 @@ def read(path: Path, table: str | None) -> Table:
     book = load_workbook(path, read_only=True, data_only=True)
     try:
         part = chosen_part(path, "sheet", table, book.sheetnames)
-        sheets = [book[name] for name in (book.sheetnames if part is None else [part])]
+        sheets = [sheet for sheet in book.worksheets if part is None or sheet.title == part]
         found = {sheet.title: one for sheet in sheets if (one := _sheet(path, sheet)) is not None}
     finally:
         book.close()
@@ -66,7 +67,7 @@ def _check_formulas(path: Path, sheet: str, found: Table) -> None:
 
 
 def _sheet(path: Path, sheet: Any) -> Table | None:
-    rows = list(_rows(path, sheet))
+    rows, dropped = _without_side_tables(list(_rows(path, sheet)))
     first = next((k for k, (_, cells) in enumerate(rows) if _is_numbers(cells)), None)
     if first is None:
         return None
@@ -93,9 +94,33 @@ def _sheet(path: Path, sheet: Any) -> Table | None:
             faults += value is None
             values[k, i] = np.nan if value is None else value
     notes += [f"{faults} cells that are no numbers were left empty"] if faults else []
+    if dropped:
+        notes.append(f"columns of hardly any numbers were left out: {', '.join(dropped)}")
     found = Table(names, values, np.array([line for line, _ in body]), units, notes)
     _count_all_moments(found, [cells for _, cells in body])
     return found
+
+
+def _without_side_tables(rows: list[tuple[int, Cells]]) -> tuple[list[tuple[int, Cells]], list[str]]:
+    """The same rows without columns that have but a few numbers, beside those of a record; which these are."""
+    width = max((len(cells) for _, cells in rows), default=0)
+    counts = [0] * width
+    for _, cells in rows:
+        for k, cell in enumerate(cells):
+            counts[k] += cell not in (None, "") and (_number(cell, None) is not None or str(cell).startswith("="))
+    few = {k for k, count in enumerate(counts) if count < SPARSE * max(counts)}
+    sparse = [k for k in sorted(few) if any(k < len(cells) and _number(cells[k], None) == _number(cells[k], None)
+              and _number(cells[k], None) is not None for _, cells in rows)]  # fmt: skip
+    if not sparse or max(counts) < SHORT:
+        return rows, []
+    kept = [(line, [None if k in few else cell for k, cell in enumerate(cells)]) for line, cells in rows]
+    return [row for row in kept if any(cell not in (None, "") for cell in row[1])], [_letter(k) for k in sparse]
+
+
+def _letter(place: int) -> str:
+    from openpyxl.utils import get_column_letter
+
+    return str(get_column_letter(place + 1))
 
 
 def _higher(above: list[list[str]], place: int) -> str:

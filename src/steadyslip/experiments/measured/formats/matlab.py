@@ -1,42 +1,153 @@
-"""MATLAB files: vectors, matrices and structures of them, however deep; version 7.3 is HDF5."""
+"""MATLAB files: vectors, matrices, structures and arrays of them, cells, however deep; version 7.3 is HDF5.
+
+Whatever the version, a structure becomes a dictionary, an array of structures or a cell array a list. Of an array of
+structures, ``p(2)`` is the second, as in MATLAB; where each holds a name and one vector, they are channels.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.io import loadmat, whosmat
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
 
+Array = np.ndarray
 DEEPEST = 8
-Numbers = dict[str, tuple[Any, None]]
+MOST_MEMBERS = 100_000
+CLASS = "MATLAB_class"
+NAMES, UNITS = ("name", "label", "channel", "title"), ("unit", "units", "dimension")
+Numbers = dict[str, tuple[Any, str | None]]
 
 
 def read(path: Path, table: str | None) -> Table:
-    """Numeric vectors of a file, or of one of its variables: ``p1``, or ``p1.data`` within a structure."""
+    """Numeric vectors of a file, or of one of its variables: ``p1``, ``p1.data`` within a structure, ``p(2)``."""
     try:
         check_size(path, sum(math.prod(shape) for _, shape, _ in whosmat(path)))
         found = loadmat(path, squeeze_me=True, struct_as_record=True)
+        variables = {name: _plain(value, DEEPEST) for name, value in found.items() if not name.startswith("__")}
     except NotImplementedError:  # version 7.3
-        from steadyslip.experiments.measured.formats import hdf5
+        variables = _of_version_73(path)
+        if not variables:  # HDF5 of another program
+            from steadyslip.experiments.measured.formats import hdf5
 
-        return hdf5.read(path, table)
+            return hdf5.read(path, table)
     parts: dict[str, Any] = {}
-    for name, value in found.items():
-        if not name.startswith("__"):
-            parts |= dict(_parts(name, value, DEEPEST))
-    part = chosen_part(path, "variable", table, list(parts))
-    inside = {
-        name: np.asarray(value) for name, value in parts.items() if part is None or f"{name}.".startswith(f"{part}.")
-    }
-    numeric = {name: (value, None) for name, value in inside.items() if value.dtype.kind in "iuf"}
+    for name, value in variables.items():
+        parts |= dict(_parts(name, value))
+    part = chosen_part(path, "variable", None if table is None else table.replace("/", "."), list(parts))
+    inside = {name: value for name, value in parts.items() if part is None or _is_inside(name, part)}
+    numeric: Numbers = {name: (one, None) for name, one in inside.items() if _is_numbers(one)}
+    if channels := next((own for one in inside.values() if (own := _channels(one))), None):
+        return from_vectors(path, channels)
     check_apart(path, list(numeric), "structure")
-    named: dict[str, tuple[Any, str | None]] = {**_shortened(_with_header(numeric, inside))}
-    return from_vectors(path, named)
+    return from_vectors(path, _shortened(_with_header(numeric, inside)))
+
+
+def _is_inside(name: str, part: str) -> bool:
+    return name == part or name.startswith((f"{part}.", f"{part}("))
+
+
+# -- what is in a file, in Python's terms
+
+
+def _plain(value: Any, deep: int) -> Any:
+    """What SciPy read, in dictionaries and lists."""
+    array = np.asarray(value)
+    if not deep or array.dtype.kind not in "OV":
+        return str(value) if array.dtype.kind == "U" and array.size == 1 else array
+    if not array.dtype.names:
+        own = array.ravel().tolist()
+        return _plain(own[0], deep - 1) if array.ndim == 0 else [_plain(one, deep - 1) for one in own]
+    members = [{field: _plain(one[field], deep - 1) for field in array.dtype.names} for one in array.ravel()]
+    return members[0] if array.size == 1 else members
+
+
+def _of_version_73(path: Path) -> dict[str, Any]:
+    """Variables of a file of version 7.3; none if another program wrote it."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        own = {name: item for name, item in file.items() if not name.startswith("#")}
+        if not any(CLASS in item.attrs for item in own.values()):
+            return {}
+        sizes: list[int] = []
+        file.visititems(lambda _, item: sizes.append(item.size or 0) if isinstance(item, h5py.Dataset) else None)
+        check_size(path, sum(sizes))
+        return {name: _unfolded(file, item, DEEPEST) for name, item in own.items()}
+
+
+def _unfolded(file: Any, item: Any, deep: int) -> Any:
+    """An object of an HDF5 file as what it was in MATLAB, whose matrices lie there with rows for columns."""
+    import h5py
+
+    if isinstance(item, h5py.Group):
+        fields = {name: _unfolded(file, one, deep - 1) for name, one in item.items()} if deep else {}
+        folded = [name for name, one in item.items() if isinstance(one, h5py.Dataset) and CLASS not in one.attrs]
+        sizes = {len(fields[name]) for name in folded if isinstance(fields.get(name), list)}
+        if not folded or len(sizes) != 1 or len(folded) != len(fields):
+            return fields
+        members = [dict(zip(fields, values, strict=True)) for values in zip(*fields.values(), strict=True)]
+        return members[0] if len(members) == 1 else members
+    if item.is_virtual or item.external:
+        raise NotAvailable(f"{item.name!r} takes its numbers from another file; copy them into this one")
+    if h5py.check_ref_dtype(item.dtype) is not None:
+        if item.size > MOST_MEMBERS:
+            raise NotAvailable(f"{item.name!r} has {item.size} members; allowed: up to {MOST_MEMBERS}")
+        return [_unfolded(file, file[one], deep - 1) for one in item[()].ravel()] if deep else []
+    numbers = np.squeeze(np.asarray(item[()]).T)
+    kind = item.attrs.get(CLASS, b"")
+    if "MATLAB_empty" in item.attrs:
+        return "" if kind == b"char" else np.empty(0)
+    return "".join(map(chr, numbers.T.ravel())) if kind == b"char" else numbers
+
+
+# -- columns
+
+
+def _parts(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """A variable and everything in it that can be named."""
+    yield name, value
+    if isinstance(value, Mapping):
+        for field, one in value.items():
+            yield from _parts(f"{name}.{field}", one)
+    if not isinstance(value, list) or not value:
+        return
+    if all(isinstance(one, Mapping) for one in value):
+        for field in value[0]:
+            cells = [one.get(field) for one in value]
+            if all(_is_numbers(one) and one.size == 1 for one in cells):  # a row in each
+                yield f"{name}.{field}", np.array([one.item() for one in cells])
+        if any(isinstance(one, dict | list) or one.size > 1 for member in value for one in member.values()
+               if not isinstance(one, str)):  # fmt: skip
+            for k, one in enumerate(value, start=1):
+                yield from _parts(f"{name}({k})", one)
+    elif all(_is_numbers(one) and one.ndim == 1 for one in value) and len({len(one) for one in value}) == 1:
+        yield f"{name}.columns", np.column_stack(value)
+
+
+def _is_numbers(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
+
+
+def _channels(value: Any) -> Numbers | None:
+    """Channels of an array of structures that hold a name, one vector, and perhaps a unit; None if it is none."""
+    if not isinstance(value, list) or len(value) < 2 or not all(isinstance(one, Mapping) for one in value):
+        return None
+    found: Numbers = {}
+    for one in value:
+        words = {field.lower(): text.strip() for field, text in one.items() if isinstance(text, str)}
+        name = next((words[key] for key in NAMES if words.get(key)), None)
+        vectors = [values for values in one.values() if _is_numbers(values) and values.size > 1]
+        if name is None or name in found or len(vectors) != 1:
+            return None
+        found[name] = (vectors[0], next((words[key] for key in UNITS if words.get(key)), None))
+    return found
 
 
 def _with_header(numeric: Numbers, inside: dict[str, Any]) -> Numbers:
@@ -45,23 +156,17 @@ def _with_header(numeric: Numbers, inside: dict[str, Any]) -> Numbers:
     if len(matrices) != 1:
         return numeric
     matrix = numeric[matrices[0]][0]
-    headers = [
-        words for value in inside.values() if value.dtype.kind in "OU" and value.size in matrix.shape
-        and len(words := [one.strip() for one in value.ravel().tolist() if isinstance(one, str)]) == value.size > 1
-    ]  # fmt: skip
+    headers = [words for one in inside.values() if len(words := _words(one)) > 1 and len(words) in matrix.shape]
     if not headers or any(words != headers[0] for words in headers):
         return numeric
     columns = matrix.T if matrix.shape[1] == len(headers[0]) else matrix
     return {name: (column, None) for name, column in zip(headers[0], columns, strict=True)}
 
 
-def _parts(name: str, value: Any, deep: int) -> Iterator[tuple[str, Any]]:
-    """A variable and, of a structure, its fields: everything that can be named."""
-    array = np.asarray(value)
-    yield name, array
-    if array.dtype.names and array.size == 1 and deep:
-        for field in array.dtype.names:
-            yield from _parts(f"{name}.{field}", array[field].item(), deep - 1)
+def _words(value: Any) -> list[str]:
+    own = value.ravel().tolist() if isinstance(value, np.ndarray) and value.dtype.kind == "U" else value
+    is_list = isinstance(own, list) and all(isinstance(one, str) for one in own)
+    return [one.strip() for one in own] if is_list else []
 
 
 def _shortened(found: Numbers) -> Numbers:

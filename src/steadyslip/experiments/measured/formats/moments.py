@@ -10,6 +10,7 @@ import numpy as np
 Array = np.ndarray
 DAY = 86_400.0
 _CLOCK = re.compile(r"^(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)(?: ?([AaPp])\.?[Mm]\.?)?$")
+_STOPWATCH = re.compile(r"^(\d{1,3}):([0-5]\d[.,]\d+)$")  # 1:30.5, with a fraction: not hours and minutes
 _DAYS = (
     (re.compile(r"^(\d{1,2})\.(\d{1,2})\.(\d{4})$"), (3, 2, 1)),  # 31.12.2024
     (re.compile(r"^(\d{1,2})/(\d{1,2})/(\d{4})$"), (3, 1, 2)),  # 12/31/2024, or 31/12/2024 where no month is 31
@@ -28,6 +29,8 @@ def moment(text: str) -> float | None:
         hours, minutes, seconds, half = match.groups()
         hour = int(hours) if half is None else int(hours) % 12 + 12 * (half in "Pp")
         return 3600.0 * hour + 60.0 * int(minutes) + float(seconds.replace(",", "."))
+    if match := _STOPWATCH.match(text):
+        return 60.0 * int(match[1]) + float(match[2].replace(",", "."))
     first, _, rest = text.partition(" ")
     if (begin := day(first)) is not None and rest and (clock := moment(rest.strip())) is not None and clock < 2 * DAY:
         return begin + clock

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +15,14 @@ from steadyslip.experiments.measured.columns import known_unit
 from steadyslip.experiments.measured.formats.moments import from_the_first
 
 Array = np.ndarray
+ENDED = 0.03  # of a column: what the last block of an acquisition may lack in some
 MOST_VALUES = 2**26
 """Numbers of a file."""
-MISSING = {"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf", "nat", "#n/a", "-nan"}
+MISSING = {
+    "", "nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "nat", "#n/a", "-nan", "missing",
+    "#div/0!", "#value!", "#ref!", "#num!", "#name?", "#null!", "*", "**", "***", "?", ".",
+    "1.#qnan", "1.#inf", "-1.#ind",
+}  # fmt: skip
 """What stands in a cell that has no number."""
 
 
@@ -108,6 +114,17 @@ def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes:
         raise NotAvailable(f"{str(path)!r} has no columns of numbers in it")
     lengths = [len(values) for values, _ in vectors.values()]
     usual = max(set(lengths), key=lambda n: (lengths.count(n), n))
+    ended = [n for n in lengths if n != usual and abs(n - usual) <= max(ENDED * usual, 1)]
+    if ended:  # written to the very end of an acquisition
+        notes = [
+            *notes,
+            f"columns are {min([*ended, usual])} to {max([*ended, usual])} values long; cut to the shortest",
+        ]
+        usual = min([*ended, usual])
+        vectors = {
+            name: (one[:usual] if usual < len(one) <= usual * (1 + 2 * ENDED) + 2 else one, unit)
+            for name, (one, unit) in vectors.items()
+        }
     left = [name for name, (values, _) in vectors.items() if len(values) != usual]
     said = [*notes, f"left out, not {usual} values long: {', '.join(left)}"] if left else list(notes)
     kept = {name: pair for name, pair in vectors.items() if name not in left}
@@ -121,11 +138,21 @@ def names_and_units(lines: Sequence[Sequence[str]], count: int) -> tuple[list[st
     """Names of the columns, and units from a line of their own, from lines above the numbers; else numbers as names."""
     if not lines:
         return [str(i) for i in range(1, count + 1)], [None] * count
-    *above, last = ([*cells] for cells in lines)
-    as_units = [known_unit(cell.strip("()[] ") or "1") for cell in last]
-    if above and all(unit is not None for unit in as_units):
-        return above[-1], as_units
-    return last, [None] * count
+    rows = [([*cells], _as_units(cells)) for cells in lines]
+    named = [cells for cells, units in rows if units is None] or [rows[-1][0]]
+    names = named[-1]
+    if len(set(names)) <= count / 2:  # such as raw, raw, computed, computed: a line about columns
+        names = max(named, key=lambda cells: len(set(cells) - {""}))
+    stated = [units for cells, units in rows if units is not None and cells is not names]
+    return names, stated[-1] if stated else [None] * count
+
+
+def _as_units(cells: Sequence[str]) -> list[str | None] | None:
+    """The units that a line consists of; None if it does not."""
+    plain = [cell.strip("()[] ") for cell in cells]
+    units = [known_unit(cell or "1") for cell in plain]
+    are_words = any(re.search(r"[^\W\d_]|%|°", cell) for cell in plain)
+    return units if are_words and all(unit is not None for unit in units) else None
 
 
 def count_moments(table: Table, place: int) -> None:

@@ -14,7 +14,7 @@ from steadyslip.experiments.measured.columns import guessed_role, split_name
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, from_vectors
 
 UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
-TIME = "time"
+TIME, WANTED = "time", {"friction", "shear"}
 logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # what is wrong is said once, by the error
 
 
@@ -23,21 +23,36 @@ def read(path: Path, table: str | None) -> Table:
     with path.open("rb") as stream, TdmsFile.open(stream) as file:  # which leaves what it cannot read open
         groups = {group.name: group for group in file.groups() if any(_numeric(c) for c in group.channels())}
         part = chosen_part(path, "group", table, list(groups))
-        if part is None and len(groups) > 1:
-            raise NotAvailable(
-                f"{str(path)!r} has channels in several groups; say which with table=: {', '.join(groups)}"
-            )
-        chosen = list(groups.values()) if part is None else [groups[part]]
-        channels = [channel for group in chosen for channel in group.channels() if _numeric(channel)]
+        own = {name: [c for c in group.channels() if _numeric(c)] for name, group in groups.items()}
+        chosen, notes = ([part], []) if part is not None else _of_a_record(path, own)
+        channels = [channel for name in chosen for channel in own[name]]
         check_size(path, sum(len(channel) for channel in channels))
         found = {channel.name: (_values(channel), _unit(channel)) for channel in channels}
-        notes = []
-        if channels and not any(guessed_role(*split_name(name)) == "time" for name in found):
+        if channels and not any(_role(name) == "time" for name in found):
             every = float(channels[0].properties.get("wf_increment", 0.0))
             if every > 0.0:
                 found[TIME] = (every * np.arange(len(channels[0])), "s")
                 notes.append(f"time counted from the sampling interval of the channels, {every:g} s")
         return from_vectors(path, found, notes)
+
+
+def _of_a_record(path: Path, own: dict[str, list[Any]]) -> tuple[list[str], list[str]]:
+    """The groups that make a record: the only one with friction or stress in it, or all, one column each."""
+    if len(own) <= 1:
+        return list(own), []
+    names = [channel.name for channels in own.values() for channel in channels]
+    sizes = {len(channel) for channels in own.values() for channel in channels}
+    if len(set(names)) == len(names) and len(sizes) == 1:
+        return list(own), []
+    wanted = [group for group, channels in own.items() if WANTED & {_role(channel.name) for channel in channels}]
+    if len(wanted) == 1:
+        left = ", ".join(group for group in own if group not in wanted)
+        return wanted, [f"group {wanted[0]!r}, the only one with friction or stress in it; left out: {left}"]
+    raise NotAvailable(f"{str(path)!r} has channels in several groups; say which with table=: {', '.join(own)}")
+
+
+def _role(name: str) -> str | None:
+    return guessed_role(*split_name(name))
 
 
 def _numeric(channel: Any) -> bool:

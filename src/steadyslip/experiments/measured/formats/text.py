@@ -12,14 +12,17 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
+from steadyslip.experiments.measured.formats.labview import BEGIN, read_labview
 from steadyslip.experiments.measured.formats.moments import day, moment
 from steadyslip.experiments.measured.formats.numerals import COMMA, POINT, either, marks_of, number
+from steadyslip.experiments.measured.formats.remarks import Line, set_apart
 from steadyslip.experiments.measured.formats.table import Table, check_size, count_moments, names_and_units
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
 from steadyslip.files.inputs import read_bytes
 
 Array = np.ndarray
 SHOWN = 8  # bad lines that a message lists
+LOOKED_UP = 500  # lines among which a header ends
 MOST_TEXT = 2**30  # bytes of a file
 MOST_LINES, MOST_LINE = 2_000_000, 100_000  # lines that are looked at one by one; characters of one
 KNOWN = {
@@ -31,6 +34,7 @@ KNOWN = {
 """How other files begin, and what to do."""
 UTF16 = (b"\xff\xfe", b"\xfe\xff")  # how texts begin that are written so, such as Excel's "Unicode text"
 LARGE, LOOKED_AT = 2**20, 2**17  # bytes beyond which NumPy is tried first; from which it learns the columns
+_BEGINS_WITH_NUMBER = re.compile(r"[\s|\"',;]*[-+\u2212]?[.,]?\d")
 _QUOTED = re.compile(r'"[^"]*"')
 _SPLIT_THOUSANDS = re.compile(r"(^|,)[-+]?\d{1,3},\d{3}(\.\d*)?(,|$)")
 _BREAKS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
@@ -67,8 +71,12 @@ def read_text(path: Path, skip_bad_lines: bool) -> Table:
             f"{str(path)!r} has {which} and is not plain columns of numbers throughout; mend it, or give it as HDF5 or "
             "Parquet"
         )
+    if text.startswith(BEGIN):
+        return read_labview(text, path)
     layout = _layout(path, text)
     values, lines, faults, more = _numbers(path, layout)
+    fine, said = set_apart(layout.body, layout.header, {fault.line or 0 for fault in faults})
+    faults, more = [fault for fault in faults if fault.line not in fine], [*more, *said]
     table = Table(layout.names, values, lines, layout.units, [*notes, *more])
     if len(lines):
         _count_all_moments(table, layout)
@@ -111,7 +119,8 @@ class _Layout:
     delimiter: str | None
     moments: tuple[int, ...]
     days: tuple[int, ...]
-    body: list[tuple[int, str]]
+    header: list[Line]
+    body: list[Line]
 
 
 def _layout(path: Path, text: str) -> _Layout:
@@ -123,19 +132,19 @@ def _layout(path: Path, text: str) -> _Layout:
     delimiter = _delimiter(rows)
     header, body = _header(rows, delimiter)
     if not body:
-        raise NotAvailable(f"{str(path)!r} has no lines of numbers in it; it begins with {rows[0][1][:60]!r}")
-    count = _usual_count(body, delimiter)
+        hints = (_hint(cell) for _, line in rows[:50] for cell in _cells(line, delimiter))
+        advice = next((one for one in hints if one), "")
+        raise NotAvailable(f"{str(path)!r} has no lines of numbers in it; it begins with {rows[0][1][:60]!r}{advice}")
+    count = _usual_count(header, body, delimiter)
     names, units = _names(header, comments, body[0][0], delimiter, count)
     _check_split(path, header, body, delimiter, count)
     cells = _cells(body[0][1], delimiter)[: len(names)]
     moments = tuple(k for k, cell in enumerate(cells) if _is_moment(cell.strip('"')))
     days = tuple(k for k in moments if day(cells[k].strip('"')) is not None)
-    return _Layout(names, units, delimiter, moments, days, body)
+    return _Layout(names, units, delimiter, moments, days, header or comments, body)
 
 
-def _check_split(
-    path: Path, header: list[tuple[int, str]], body: list[tuple[int, str]], delimiter: str | None, count: int
-) -> None:
+def _check_split(path: Path, header: list[Line], body: list[Line], delimiter: str | None, count: int) -> None:
     """Refuse numbers such as 1,234.5 that are torn where commas separate columns."""
     named = max((len(_cells(line, delimiter)) for _, line in header), default=count)
     if delimiter != "," or not 1 < named < count:
@@ -187,9 +196,11 @@ def _plain(path: Path, raw: bytes) -> Table | None:
     return Table(layout.names, np.ascontiguousarray(values.T), lines, layout.units, notes)
 
 
-def _delimiter(rows: list[tuple[int, str]]) -> str | None:
+def _delimiter(rows: list[Line]) -> str | None:
     """What separates columns; None if blanks do."""
-    sample = [_QUOTED.sub("0", line) for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
+    middle = [line for _, line in rows[len(rows) // 2 : len(rows) // 2 + 20]]
+    sample = [_QUOTED.sub("0", line) for line in middle if _BEGINS_WITH_NUMBER.match(line)]
+    sample = sample or [_QUOTED.sub("0", line) for line in middle]
     for mark in ("\t", ";", "|"):
         if all(mark in line for line in sample):
             return mark
@@ -209,7 +220,8 @@ def _tells(cell: str, mark: str) -> bool:
     return number(cell, mark) is not None and not cell.endswith(COMMA)
 
 
-def _cells(line: str, delimiter: str | None) -> list[str]:
+def _cells(line: str, delimiter: str | None, least: int = 1) -> list[str]:
+    """What a line has between its delimiters, without empty cells at its end beyond so many."""
     if delimiter is None:
         return line.split()
     line = line.rstrip("\r\n")
@@ -220,7 +232,7 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
         found = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True))
     cells = [cell.strip() for cell in found]
     if delimiter == "\t" or (len(cells) > 1 and cells[-1] == ""):
-        while len(cells) > 1 and cells[-1] == "":
+        while len(cells) > least and cells[-1] == "":
             cells.pop()  # trailing delimiters
     return cells
 
@@ -236,22 +248,39 @@ def _moment(cell: str) -> float | None:
     return moment(plain) if (date := day(plain)) is None else date
 
 
-def _header(rows: list[tuple[int, str]], delimiter: str | None) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
-    """Lines before the first that holds numbers only, and the rest."""
-    for place, (_, line) in enumerate(rows):
-        numbers = [either(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)]
-        if all(n is not None for n in numbers) and any(n == n for n in numbers):
+def _header(rows: list[Line], delimiter: str | None) -> tuple[list[Line], list[Line]]:
+    """Lines before the first that holds numbers only, with others like it below, and the rest."""
+    of_numbers = [_holds_numbers(line, delimiter) for _, line in rows[:LOOKED_UP]]
+    alone = [k for k, own in enumerate(of_numbers) if own]
+    for place in alone:
+        if place + 1 >= len(of_numbers) or of_numbers[place + 1]:
+            return rows[:place], rows[place:]
+    if alone:
+        return rows[: alone[0]], rows[alone[0] :]
+    for place, (_, line) in enumerate(rows[LOOKED_UP:], start=LOOKED_UP):
+        if _holds_numbers(line, delimiter):
             return rows[:place], rows[place:]
     return rows, []
 
 
-def _usual_count(body: list[tuple[int, str]], delimiter: str | None) -> int:
+def _holds_numbers(line: str, delimiter: str | None) -> bool:
+    numbers = [either(cell) if (found := _moment(cell)) is None else found for cell in _cells(line, delimiter)]
+    return all(n is not None for n in numbers) and any(n == n for n in numbers)
+
+
+def _usual_count(header: list[Line], body: list[Line], delimiter: str | None) -> int:
+    """How many columns there are; the last may be empty for long, where a header has a name for it."""
     counts = [len(_cells(line, delimiter)) for _, line in body[:200]]
-    return max(set(counts), key=counts.count)
+    usual = max(set(counts), key=counts.count)
+    if delimiter is not None:
+        whole = [len(line.split(delimiter)) for _, line in body[:200] if _holds_numbers(line, delimiter)]
+        named = [len(_cells(line, delimiter)) for _, line in header]
+        usual = max([count for count in named if usual < count and whole.count(count) > len(whole) / 2], default=usual)
+    return usual
 
 
 def _names(
-    header: list[tuple[int, str]], comments: list[tuple[int, str]], first: int, delimiter: str | None, count: int
+    header: list[Line], comments: list[Line], first: int, delimiter: str | None, count: int
 ) -> tuple[list[str], list[str | None]]:
     """Names of the columns, and units from a line of their own; numbers as names without a header."""
     lines = [line for _, line in header] or [line for i, line in comments if i < first]
@@ -280,7 +309,7 @@ def _numbers(path: Path, layout: _Layout) -> tuple[Array, Array, list[Problem], 
     count = len(layout.names)
     lines, table, faults = [], [], []
     for line_number, line in layout.body:
-        cells = _cells(line, layout.delimiter)
+        cells = _cells(line, layout.delimiter, count)
         if len(cells) == count:
             lines.append(line_number)
             table.append(cells)

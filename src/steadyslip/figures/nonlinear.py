@@ -25,6 +25,7 @@ from steadyslip.figures.style import (
     display_unit,
     labelled,
 )
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 
 if TYPE_CHECKING:
@@ -163,27 +164,34 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
     """
     ax = axes_or_new(ax)
-    length, length_unit = display_unit("m", float(np.max(np.abs(found.x))) / 3)
-    speed, speed_unit = display_unit("m/s", found.rig.drive.velocity)
+    length, length_unit = display_unit(found.units[0], float(np.max(np.abs(found.x))) / 3)
+    speed, speed_unit = display_unit(found.units[1], abs(found.steady[1]) or float(np.max(np.abs(found.v))))
     names = list(_AREAS)
     codes = np.vectorize(names.index)(found.outcome)
     colours = ListedColormap([*_AREAS.values()])
     norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, colours.N)
     ax.pcolormesh(found.x / length, found.v / speed, codes, cmap=colours, norm=norm, shading="nearest", rasterized=True)
-    for i, run in enumerate(found.cycles):
+    for i, run in enumerate(run for run in found.cycles if found.names[1] in run.units):
         label = "" if i else "unstable cycle"
-        ax.plot(run["x"] / length, run["v"] / speed, "--", color=VERMILION, label=label)
-    ax.plot([0], [found.rig.drive.velocity / speed], "o", color=BLACK, markersize=4, label="steady sliding")
+        ax.plot(run[found.names[0]] / length, run[found.names[1]] / speed, "--", color=VERMILION, label=label)
+    ax.plot([0], [found.steady[1] / speed], "o", color=BLACK, markersize=4, label="steady sliding")
     for index in np.unique(codes):
         patch: dict[str, Any] = {"facecolor": _AREAS[names[index]], "edgecolor": GREY}
         doubts = np.unique(found.doubt[found.outcome == names[index]])
         for why in doubts:
             ax.fill_between([], [], label=_undecided(why) if why else names[index], **patch)
-    ax.set_yscale("log")
+    if found.v.min() > 0 and found.units[1].endswith("/s"):
+        ax.set_yscale("log")
     ax.set_xlim(found.x.min() / length, found.x.max() / length)
     ax.set_ylim(found.v.min() / speed, found.v.max() / speed)
-    ax.set_xlabel(labelled("slip ahead of the load point", length_unit))
-    ax.set_ylabel(labelled("velocity", speed_unit))
+    place, height = "slip ahead of the load point", "velocity"
+    if isinstance(found.rig, Machine):
+        body, (kind, name) = found.names[0].rpartition(".")[0], found.names[1].rsplit(".", 1)
+        place, height = f"{body} ahead of where it slides steadily", f"velocity of {body}"
+        if name != "v":
+            height = f"memory {name} of {kind}"
+    ax.set_xlabel(labelled(place, length_unit))
+    ax.set_ylabel(labelled(height, speed_unit))
     ax.legend(fontsize="small", loc="upper right")
     return ax
 

@@ -122,24 +122,23 @@ def _initial_values(
     memory = [_number(start.get(name, value)) for name, value in zip(names, _own_memory(point), strict=True)]
     own = [(item.name.removesuffix("x"), item) for item in model.variables if item.kind == "slip"]
     places = [_number(start.get(item.name, 0.0)) for _, item in own]
+    alone = f"{own[0][0]}v"
     steady = point.evaluate(_steady_speeds(model))
     speeds = [_number(start.get(f"{name}v", speed)) for (name, _), speed in zip(own, steady, strict=True)]
     slips = point.evaluate(_slip_rates(model), *speeds)
     for i, (slip, sliding) in enumerate(zip(slips, reduction.slidings, strict=True)):
         if sliding.variable is not None and sliding.variable.kind == "logarithm" and not np.all(slip > 0):
             if model.is_single:
-                name = f"{own[0][0]}v"
-                raise ParameterError(
-                    [Problem(f"initial.{name}", f"got {given.get(name)!r}; allowed: > 0 m/s with this law")]
-                )
+                message = f"got {given.get(alone)!r}; allowed: > 0 m/s with this law"
+                raise ParameterError([Problem(f"initial.{alone}", message)])
             where = model.contacts[i].name
             message = f"the velocities make {where} slip at {np.min(slip):.4g} m/s; allowed: > 0 with its law"
             raise ParameterError([Problem("initial", message)])
-    if not model.inertial and "v" in start:
+    if model.is_single and not model.inertial and alone in start:
         free = [i for i, name in enumerate(names) if name not in start]
         if not free:
             message = "cannot be given: without mass it follows from the memory; give the memory or the velocity"
-            raise ParameterError([Problem("initial.v", message)])
+            raise ParameterError([Problem(f"initial.{alone}", message)])
         memory[free[0]] = _matching_memory(reduction, point, places[0], speeds[0], memory, free[0])
     values = dict(zip((item.name for _, item in own), places, strict=True)) | dict(zip(names, memory, strict=True))
     values |= {f"{name}v": speed for (name, _), speed in zip(own, speeds, strict=True)}

@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from steadyslip.core.errors import NotAvailable
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
@@ -77,12 +76,11 @@ class Thresholds(Displayed):
 
     @cached_property
     def basin(self) -> Basin:
-        """The basin of the same rig, computed once; NotAvailable for a machine."""
-        if isinstance(self.rig, Machine):
-            raise NotAvailable(
-                "a basin is offered for sliders, whose motion a plane shows; allowed for machines: .html"
-            )
-        return basin(self.rig)
+        """The basin of the same rig, computed once; of a machine in the plane of the body that is kicked."""
+        at = next((one.at for one in self.found if one.at), None)
+        if isinstance(self.rig, Machine) and at in self.rig.contacts:
+            at = self.rig.contacts[at].body
+        return basin(self.rig, at=at)
 
 
 def thresholds_of_file(

@@ -8,21 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.options import BRANCH, NAME, NUMBERS, THREADS, checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar, progress_text
 from steadyslip.core.results import ReadOnly
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.range import beyond_range
+from steadyslip.model.scales import natural_scales
 from steadyslip.model.sliding import steady_states
 from steadyslip.motion import History, simulate
 from steadyslip.motion.jobs import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
-from steadyslip.nonlinear.kicks.rest import rest_of
+from steadyslip.nonlinear.kicks.places import steady_speeds
+from steadyslip.nonlinear.kicks.rest import Rest, rest_of
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
@@ -38,11 +41,11 @@ class Basin(ReadOnly):
 
     Attributes
     ----------
-    rig : Slider
+    rig : Slider or Machine
     x : ndarray (n,)
-        Slip ahead of the load point at the start, m.
+        Slip ahead of the load point at the start, m; of a machine the place of a body, m or rad.
     v : ndarray (m,)
-        Velocity at the start, m/s.
+        Velocity at the start, m/s or rad/s; what else spans the plane, see `names`.
     outcome : ndarray of str (m, n)
         ``returns``, ``blow-up``, ``oscillation``, ``contact lost``, ``no solution``, ``undecided``, ``interrupted``.
     doubt : ndarray of str (m, n)
@@ -50,14 +53,23 @@ class Basin(ReadOnly):
     cycles : tuple of History
         One period of each unstable cycle of this rig that was found: where there is one, it bounds the basin in
         the plane of a rig with two variables.
+    names : tuple of str
+        What spans the plane: ``x`` and ``v``; of a machine a body's place and its velocity, or without mass a memory
+        variable of a contact.
+    units : tuple of str
+    steady : tuple of float
+        Where steady sliding is in the plane.
     """
 
-    rig: Slider
+    rig: Slider | Machine
     x: Array = field(repr=False)
     v: Array = field(repr=False)
     outcome: Array = field(repr=False)
     doubt: Array = field(repr=False)
     cycles: tuple[History, ...] = field(repr=False)
+    names: tuple[str, str] = ("x", "v")
+    units: tuple[str, str] = ("m", "m/s")
+    steady: tuple[float, float] = (0.0, 0.0)
 
     @property
     def share(self) -> float:
@@ -80,13 +92,15 @@ class Basin(ReadOnly):
     threads=THREADS,
     branch=BRANCH,
     along=NAME,
+    at=NAME,
 )
 def basin(
-    rig: Slider,
+    rig: Slider | Machine,
     x: Sequence[float] | None = None,
     v: Sequence[float] | None = None,
     *,
-    along: str = "stiffness",
+    at: str | None = None,
+    along: str | None = None,
     rtol: float = 1e-8,
     threads: int | None = None,
     progress: bool | None = None,
@@ -96,15 +110,19 @@ def basin(
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
     x : array_like, optional
         Slip ahead of the load point, m (negative: the spring is stretched); 81 values unless given, over the width
-        of what a displacement kick survives.
+        of what a displacement kick survives. Of a machine the place of a body from where it is in steady sliding.
     v : array_like, optional
-        Velocity, m/s; 81 values unless given, four decades to each side of the drive. Without mass, the first
-        memory variable follows from it; other memory variables start as in steady sliding.
+        Velocity, m/s or rad/s; 81 values unless given, four decades to each side of that of steady sliding. Without
+        mass, the first memory variable of a slider follows from it; of a machine it is the memory variable itself.
+        Whatever else there is starts as in steady sliding.
+    at : str, optional
+        Of a machine: the body whose plane it is; unless given the one whose contact moves most in the leading mode.
     along : str, optional
-        The parameter along which unstable cycles of this rig are looked for.
+        The parameter along which unstable cycles of this rig are looked for; the stiffness of a slider unless given.
+        Of a machine none are looked for unless one is named.
     rtol, threads, progress, branch
         As for `threshold_map`. After Ctrl-C, points that were not finished are ``interrupted``, and cycles those
         found by then.
@@ -120,40 +138,84 @@ def basin(
 
     Notes
     -----
-    All motions together take two billion steps of integration at most, some minutes on two cores; what is open then is
-    undecided.
+    All motions together take two billion steps of integration at most, of machines with more variables fewer, some
+    minutes on two cores; what is open then is undecided.
     """
     steady_states(rig)  # raises, and says why
-    drive = rig.drive.velocity
+    if isinstance(rig, Slider) and at is not None:
+        raise ParameterError([Problem("at", f"got {at!r}; a slider is one block, leave it out")])
+    if isinstance(rig, Machine) and at is not None and at not in rig.bodies:
+        raise ParameterError([Problem("at", unknown_name("body", at, rig.bodies))])
     options = options_for(operating_point(rig, branch=branch).model, rtol)
     own = prepare(rig, None, 1.0, {}, {}, options, branch)
-    rest = rest_of(own, np.full(1, drive), np.zeros(1))
+    rest = rest_of(own, np.atleast_1d(np.asarray(own.point.drive, dtype=float)), np.zeros(1))
     if not rest.exists[0]:
         raise beyond_range(own.point)
-    length = float(rest.way[0])
-    x = length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
-    v = drive * np.geomspace(1e-4, 1e4, POINTS) if v is None else v  # type: ignore[assignment]
+    plane = _plane_of(rig, rest, at)
+    x = plane.length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
+    v = plane.heights if v is None else v  # type: ignore[assignment]
     across, up = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, v))
     if across.ndim != 1 or up.ndim != 1 or not (np.all(np.isfinite(across)) and np.all(np.isfinite(up))):
         raise ParameterError([Problem("x, v", "allowed: one-dimensional arrays of finite numbers, m and m/s")])
     width = np.broadcast_to(across, (len(up), len(across)))
     height = np.broadcast_to(up[:, None], width.shape)
-    jobs = prepare(rig, None, 1.0, {}, {"x": width.ravel(), "v": height.ravel()}, options, branch)
-    count = width.size
+    start = dict(zip(plane.names, (width.ravel(), height.ravel()), strict=True))
+    jobs = prepare(rig, None, 1.0, {}, start, options, branch)
+    count, budget = width.size, StepBudget.of(STEPS, rest.state.shape[1])
     near, every = Neighbourhood(rest), np.zeros(count, dtype=int)
     near.computed()
-    runs = Judged(
-        replace(jobs, size=count), rest.part(every), near.part(every), np.zeros(count), every, budget=StepBudget(STEPS)
-    )
+    one = (rest.part(every), near.part(every))
+    runs = Judged(replace(jobs, size=count), *one, np.zeros(count), every, budget=budget)
     with progress_bar(count, progress, "starting points") as advanced:
         found = outcomes_of(runs, threads, advanced)
     reasons = [doubt_of(code) for code in range(len(OUTCOMES))]
     outcome, doubt = (np.array(words)[found].reshape(width.shape) for words in (OUTCOMES, reasons))
-    orbits = () if np.any(found == INTERRUPTED) else _unstable_cycles(rig, along, branch, progress)
-    return Basin(rig, across, up, outcome, doubt, orbits)
+    along = "stiffness" if along is None and isinstance(rig, Slider) else along
+    orbits = () if along is None or np.any(found == INTERRUPTED) else _unstable_cycles(rig, along, branch, progress)
+    return Basin(rig, across, up, outcome, doubt, orbits, plane.names, plane.units, (0.0, plane.steady))
 
 
-def _unstable_cycles(rig: Slider, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:
+@dataclass(frozen=True)
+class _Plane:
+    """What spans the plane, the natural length of the first, usual values of the second, and its steady one."""
+
+    names: tuple[str, str]
+    units: tuple[str, str]
+    length: float
+    heights: Array
+    steady: float
+
+
+def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
+    """The plane of a slider's block, or of a body: that whose contact moves most unless one is named."""
+    if isinstance(rig, Slider):
+        drive = rig.drive.velocity
+        heights = drive * np.geomspace(1e-4, 1e4, POINTS)
+        return _Plane(("x", "v"), ("m", "m/s"), float(rest.way[0]), heights, drive)
+    model, scales = rest.reduction.model, natural_scales(rest.point, rest.reduction)[0]
+    touch = list(rig.contacts)[rest.contact]
+    body = at or rig.contacts[touch].body
+    by_name = {item.name: item for item in model.variables}
+    place, speed = by_name[f"{body}.x"], f"{body}.v"
+    length = float(np.ravel(scales[place.name])[0])
+    if speed in by_name or model.is_single:
+        steady = float(np.ravel(steady_speeds(rest.point, body))[0])
+        own = float(np.ravel(scales[speed])[0]) if speed in scales else abs(steady)
+        decades = np.geomspace(1e-4, 1e4, POINTS)
+        heights = steady * decades if steady else own * np.linspace(-15.0, 15.0, POINTS)
+        return _Plane((place.name, speed), (place.unit, f"{place.unit}/s"), length, heights, steady)
+    rubs = [name for name, one in rig.contacts.items() if body in (one.body, one.against)]
+    memory = next((item for name in rubs for item in model.memory if item.name.startswith(f"{name}.")), None)
+    if memory is None:
+        others = [name for name in rig.bodies if f"{name}.v" in by_name]
+        words = f"; allowed: {', '.join(others)}" if others else ""
+        raise ParameterError([Problem("at", f"{body!r} has neither a mass nor a contact with memory{words}")])
+    steady = float(np.ravel(rest.point.evaluate(model.function([model.steady[memory.symbol]]))[0])[0])
+    heights = steady + float(np.ravel(scales[memory.name])[0]) * np.linspace(-15.0, 15.0, POINTS)
+    return _Plane((place.name, memory.name), (place.unit, memory.unit), length, heights, steady)
+
+
+def _unstable_cycles(rig: Slider | Machine, along: str, branch: int, progress: bool | None) -> tuple[History, ...]:
     """One period of each unstable cycle at the rig's own parameter; none where no branch can be followed."""
     with progress_text("following cycles", progress) as said:
 
@@ -169,18 +231,19 @@ def _unstable_cycles(rig: Slider, along: str, branch: int, progress: bool | None
 
 
 @checked(periods=finite(0, 1e4))
-def orbit(rig: Slider, cycle: Cycle, periods: float = 1.0) -> History:
+def orbit(rig: Slider | Machine, cycle: Cycle, periods: float = 1.0) -> History:
     """A cycle as a history, for drawing: simulated from its start.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
         The rig that has this cycle (its parameter at ``cycle.value``).
     cycle : Cycle
     periods : float
         How many; unstable cycles leave themselves after a few.
     """
     names = dict(cycle.start)
-    if rig.friction.memory() and not operating_point(rig).model.inertial:
-        names.pop("v")  # follows from the memory
+    model = operating_point(rig).model
+    if model.is_single and model.memory and not model.inertial:
+        names.pop("v", None)  # follows from the memory
     return simulate(rig, until=periods * cycle.period, initial=names, rtol=1e-10)

@@ -28,7 +28,8 @@ STEPS = 8  # from the rig's own inputs to the new ones, where the normal stress 
 ROUNDS = 40  # of Newton's method at most
 ROUNDING = 1e-14  # of stresses, in the normal stress
 BALANCED = 12  # rounds of Newton's method for the balance of forces
-SETTLED = 1e-9  # change of the state, in natural sizes, at the end of the search for steady sliding of a machine
+SETTLED = 1e-9  # change of the state, in natural sizes, at the end of the search for steady sliding of a machine,
+ROUNDED = 1e-5  # or less than this, where rounding keeps it from falling any further
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,7 +386,7 @@ def _settled(
     count, n = scales.shape
     state, unknown = guess[:, :n].copy(), guess[:, n].copy()
     nothing = np.full((count, n, n), np.nan)
-    change = np.full((count, n), np.inf)
+    change, size = np.full((count, n), np.inf), np.full(count, np.inf)
     for _ in range(ROUNDS):
         velocity, force, pressure = inputs
         here = Rest(reduction, point, velocity, force, pressure, state, unknown, scales, nothing, nothing[:, 0])
@@ -400,10 +401,11 @@ def _settled(
             except np.linalg.LinAlgError:
                 continue
         state = state + np.where(np.isfinite(change), change, 0.0) * scales
-        size = np.max(np.abs(change) / (1 + np.abs(state / scales)), axis=1)
-        if not np.any(size > SETTLED):
+        before, size = size, np.max(np.abs(change) / (1 + np.abs(state / scales)), axis=1)
+        settled = (size <= SETTLED) | ((size <= ROUNDED) & (size > 0.5 * before))
+        if not np.any(~settled & np.isfinite(size)):
             break
-    slides = good & (size <= SETTLED) & (slowest[:, 0] > 0)
+    slides = good & settled & (slowest[:, 0] > 0)
     pressed = np.all(_columns(point.evaluate(_normal_of(reduction), *inputs, *state.T, unknown), count) > 0, axis=1)
     return np.where((slides & pressed)[:, None], state, np.nan), unknown
 

@@ -37,6 +37,7 @@ CERTAIN = (BLOW_UP, CONTACT_LOST, OSCILLATION, NO_SOLUTION)
 """Outcomes that are not a return."""
 OPEN = -1
 
+USUAL = 3  # variables of a slider, by which the work of a step is measured
 STIFF = "rodas4"  # the method for stiff motions, among them those that an explicit one needs too many steps for
 LOADING = 40.0  # natural lengths that the load point moves at least, to take up what a kick has let go,
 TURNS = 3.0  # natural periods,
@@ -57,6 +58,11 @@ class StepBudget:
     """Steps of integration that a search may still take, all its motions together."""
 
     steps: float = np.inf
+
+    @classmethod
+    def of(cls, steps: float, variables: int) -> StepBudget:
+        """So many steps of a slider; fewer where each takes longer, as the elimination of more variables does."""
+        return cls(steps * min(1.0, (USUAL / variables) ** 2))
 
 
 @dataclass(frozen=True, eq=False)

@@ -214,8 +214,8 @@ def threshold(
     sliding that is never left, it has not when it blows up, loses contact or is on a closed orbit that attracts; it may
     also be undecided. Where the steady sliding that a kick leads to is not stable nothing returns, and the search ends
     there. At the edge of stability itself small motions persist; there all that stays bounded counts as returning.
-    All motions together take a billion steps of integration at most, about a minute on two cores; what is open then is
-    undecided.
+    All motions together take a billion steps of integration at most, of machines with more variables fewer, about a
+    minute on two cores; what is open then is undecided.
     """
     if not 1e-12 <= precision <= 0.1:
         raise ParameterError([Problem("precision", f"got {precision!r}; allowed: from 1e-12 to 0.1")])
@@ -258,7 +258,7 @@ class _Search:
 
     def __init__(self, kicked: Kicked, progress: Callable[[int, float, float], None] | None) -> None:
         self.kicked, self.progress = kicked, progress
-        kicked.budget = StepBudget(STEPS)
+        kicked.budget = StepBudget.of(STEPS, kicked.rest.state.shape[1])
         self.low, self.high, self.edge = 0.0, np.inf, np.inf
         self.outcome = self.doubt = RETURNS
         self.tried, self.interrupted = 0, False

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -15,6 +16,7 @@ from javascript import Script
 from moved import DRIVER, moved, slip_events
 from rigs_of_theory import ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.errors import InternalError, NotAvailable
+from steadyslip.core.quantities import printed, shown
 from steadyslip.kernels import primitives
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program, primitive, select
 from steadyslip.kernels.printers import javascript, python
@@ -252,3 +254,15 @@ def test_motion_is_that_of_the_compiled_kernels(name):
     assert kinds == theirs_too == finer_too
     assert (len(kinds) > 0) == (name != "solved")
     assert np.abs(times - when).max(initial=0.0) <= 10 * np.abs(when - exact).max(initial=0.0) + 1e-9 * MOVING[name][2]
+
+
+def test_pages_tell_quantities_as_texts_do():
+    script = Script(javascript.as_script(files("steadyslip.explorer").joinpath("web/quantities.js").read_text("utf-8")))
+    random = np.random.default_rng(1)
+    sizes = random.choice([-1, 1], 3000) * 10 ** random.uniform(-14, 14, 3000)
+    units = random.choice(["1", "rad", "m/rad", "rad/s", "Pa/m", "m", "s", "N", "N m", "kg m^2", "Pa s/m", "1/s"], 3000)
+    cases = [[float(size), str(unit)] for size, unit in zip(sizes, units, strict=True)] + [[0.0, "m/s"]]
+    told = script("cases.map(([value, unit]) => shown(value, unit))", cases=cases)
+    for (value, unit), words in zip(cases, told, strict=True):
+        plain = re.sub(r"e([+-])0*", lambda sign: "e" + sign[1].strip("+"), printed(shown(value, unit)))
+        assert words.replace("\N{MINUS SIGN}", "-") == plain, (value, unit)

@@ -370,6 +370,12 @@ def stress_name(name: str, area: float | None) -> str:
     return name if area is None else name.replace("stress", "force")
 
 
+def _few(value: float, digits: int) -> str:
+    """A number with a few digits, without a power of ten up to five places."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < 1e5 else text
+
+
 def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
     """A value for people: prefixed unit, a few digits, angles in degrees, leads in turns, totals if there is an `area`.
 
@@ -383,25 +389,25 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
     factor, si_unit = outside(si_unit, area)
     value = value * factor
     if si_unit == "1":
-        return f"{value:.{digits}g}"
+        return _few(value, digits)
     if si_unit == "rad":
-        return f"{value / units.deg:.{digits}g} deg"
+        return f"{_few(value / units.deg, digits)} deg"
     if si_unit == "m/rad":
         value, si_unit = value * 2 * math.pi, "m/rev"
     if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
-                return f"{value / size:.{digits}g} {name}"
+                return f"{_few(value / size, digits)} {name}"
     first = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)  # of a power, a prefix would be one of the base
     if first is None or value == 0 or not math.isfinite(value):
-        return f"{value:.{digits}g} {si_unit}"
+        return f"{_few(value, digits)} {si_unit}"
     size = abs(value)
     for factor, prefix in _SHOWN_PREFIXES:
         if size >= 0.9999 * factor and (prefix not in ("G", "M", "k") or first[0] in ("Pa", "N")):
             break
     if not 1e-3 <= size / factor < 1e5:
-        return f"{value:.{digits}g} {si_unit}"
-    return f"{value / factor:.{digits}g} {prefix}{si_unit}"
+        return f"{_few(value, digits)} {si_unit}"
+    return f"{_few(value / factor, digits)} {prefix}{si_unit}"
 
 
 def shown_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
@@ -442,5 +448,10 @@ def percent(share: float) -> str:
 
 
 def printed(text: str) -> str:
-    """Words with units as they are set in print: µm, m²."""
-    return re.sub(r"(?<![A-Za-z])um(?![A-Za-z])", "µm", text.replace("^2", "²").replace("^3", "³"))
+    """Words with units as they are set in print: µm, m², kg/m³.
+
+    >>> printed("9.2 us, 3 um/s, 2 uN m at 5 m^2: ours")
+    '9.2 µs, 3 µm/s, 2 µN m at 5 m²: ours'
+    """
+    text = text.replace("^2", "²").replace("^3", "³")
+    return re.sub(r"(?<![A-Za-z])u(?=(?:m|s|N|Pa)(?![A-Za-z]))", "µ", text)

@@ -87,6 +87,7 @@ export function digits(value, many = 4) {
 export function display(value, si) {
   if (si === "1") return [1, ""];
   if (si === "rad") return [Math.PI / 180, "deg"];
+  if (si === "m/rad") return [display(value * 2 * Math.PI, "m/rev")[0] / (2 * Math.PI), display(value * 2 * Math.PI, "m/rev")[1]];
   const first = SCALED.exec(si), size = Math.abs(value);
   if (si === "s" && Number.isFinite(size)) for (const [factor, name] of LONG) if (size >= Math.max(600, 2 * factor)) return [factor, name];
   if (!first || !(size > 0) || !Number.isFinite(size)) return [1, si];

@@ -91,6 +91,8 @@ def machine_code(text: str) -> bytes:
     module = llvm.parse_assembly(_head(machine) + text)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=SPEED)
+    # what has to be fast has no loops, or is written in vectors; the driver's loops would take half of all compilation
+    options.loop_unrolling = options.loop_vectorization = options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     return bytes(machine.emit_object(module))

@@ -44,6 +44,18 @@ def test_numbers_are_those_of_the_library():
     assert np.all(np.abs(value) < 1e-12 * abs(a.characteristic_polynomial[0]))
 
 
+def test_what_a_gain_alone_holds_is_told_of_the_gain():
+    """In JSON too: `critical_stiffness` is of a spring beside it."""
+    press = ss.Slider(PLAIN.friction, PLAIN.contact, stiffness=None, drive=ss.PID(1e-6, kp=2e9), area=0.01)
+    data = ss.analyze(press).to_dict()
+    held, (edge,) = data["held_by"], ss.boundary(press, "drive.kp")
+    assert (held["parameter"], held["value"], held["critical_side"]) == ("drive.kp", 2e9, "above")
+    assert held["critical"] == pytest.approx(edge.value, rel=1e-9)
+    assert held["total"] == pytest.approx(0.01 * edge.value, rel=1e-9)
+    assert data["critical_stiffness"] == pytest.approx(held["critical"] - 2e9, rel=1e-9)
+    assert "held_by" not in ss.analyze(PLAIN).to_dict()
+
+
 @pytest.mark.parametrize(
     ("rig", "head", "words"),
     [

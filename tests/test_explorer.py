@@ -18,7 +18,7 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
-from steadyslip.explorer.narrow import dense, narrow, renamed
+from steadyslip.explorer.narrow import dense, narrow, renamed, shared
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
@@ -188,6 +188,18 @@ def test_names_of_generated_code_are_as_short_as_may_be():
     text = "function far(R, x, y) {\nvar t1 = R[0], t20 = log(t1) - 1e-7;\ny[0] = Math.abs(t20 * t1) + t20;\n}\n"
     short = "function far(c, e, d) {\nvar a = c[0], b = log(a) - 1e-7;\nd[0] = Math.abs(b * a) + b;\n}\n"
     assert renamed(text, {"far", "log"}) == short
+
+
+def test_long_numbers_that_functions_share_are_written_once():
+    number = "1.221224509226641"
+    text = f"(() => {{\nfunction f(R, x, y) {{\ny[0] = {' + '.join(4 * [number])} + 2.5;\n}}\n}})()"
+    once = shared(text)
+    assert once.count(number) == 1
+    assert (
+        Script(f"const y = [0]; ({once.replace('function f', 'return function f')})(0, 0, y)")("y[0]")
+        == 7.384898036906564
+    )
+    assert shared(text.replace("+ 1.2", "- 0.2", 1)).count(number) == 3, "few are as they were"
 
 
 def test_no_two_parameters_of_a_part_are_called_the_same():

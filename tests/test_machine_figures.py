@@ -86,6 +86,19 @@ def test_bars_are_the_stable_values():
         assert seen > 2
 
 
+def test_what_bars_leave_out_is_said():
+    """Every edge is drawn, or counted below the bars and named under the picture."""
+    from steadyslip.figures.machine_verdict import left_out
+
+    found = ss.analyze(MACHINES["brake-pad"])
+    ax = figures.stable_ranges(found)
+    drawn = [one.parameter for one in found.margins if one.edge is not None and one.parameter not in left_out(found)]
+    assert len(ax.get_yticks()) == len(drawn)
+    assert f"{len(left_out(found))} more edges not drawn" in ax.get_xlabel()
+    document = ss.report(found.rig, explorer=False).html
+    assert f"the edge of {', '.join(left_out(found))}: a factor of 100 away or more" in document
+
+
 def test_the_leading_mode_and_the_eigenvalues_are_those_of_the_analysis():
     found = ss.analyze(MACHINES["brake-pad"])
     ax = figures.mode_shape(found)

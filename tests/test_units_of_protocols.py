@@ -106,3 +106,14 @@ def test_an_ensemble_names_the_contact_that_lifts_off():
 def test_fits_refuse_creep():
     with pytest.raises(ss.NotAvailable, match="not offered for creep"):
         ss.fit(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=100), protocol=ss.CreepStep(at=1, by=1e4))
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ('kind = "disturbance-step"\nat = 1\non = "table"', "the force\\); allowed: a finite number in N,"),
+    ('kind = "disturbance-step"\nat = 1\non = "motor"', "the torque\\); allowed: a finite number in N m,"),
+    ('kind = "normal-stress-step"\nat = 1\non = "guide"', "the force\\); allowed: a finite number in N,"),
+])  # fmt: skip
+def test_what_is_missing_is_asked_for_as_the_rig_has_it(text, words):
+    file = f"{ss.rig_to_text(AXIS)}\n[protocol]\nuntil = 2\n[[protocol.pieces]]\n{text}\n"
+    with pytest.raises(ss.RigFileError, match=f"by: missing \\(change of {words}"):
+        ss.rig_from_text(file)

@@ -16,7 +16,7 @@ from steadyslip.core.records import Address
 from steadyslip.explorer.equations import linear_part
 from steadyslip.explorer.machine_sketch import machine_sketch
 from steadyslip.explorer.motion import DRIVER, driver, motion_part
-from steadyslip.explorer.narrow import dense, functions_of, narrow, narrow_style, renamed
+from steadyslip.explorer.narrow import dense, functions_of, narrow, narrow_style, renamed, shared
 from steadyslip.explorer.own_file import outside_of, own_file
 from steadyslip.explorer.sketch import sketch
 from steadyslip.kernels.printers import javascript
@@ -132,7 +132,8 @@ def parts(rig: Slider | Machine, title: str, branch: int, file: str = "") -> tup
 
 def _short(generated: str, known: Iterable[str]) -> str:
     """Generated code, of which modules of the page know some names."""
-    return dense(renamed(generated, {*known, *javascript.runtime_names()}))
+    whole = shared(generated) if generated.startswith("(() => {") else generated
+    return dense(renamed(whole, {*known, *javascript.runtime_names()}))
 
 
 def _web(name: str) -> str:

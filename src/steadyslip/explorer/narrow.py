@@ -90,6 +90,9 @@ _WORDS = frozenset(
 """What generated code has of JavaScript itself."""
 
 
+_LONG, _OFTEN = re.compile(r"(?<![\w.])\d+\.\d{8,}(?:e-?\d+)?"), 4
+
+
 def functions_of(text: str) -> set[str]:
     """Names of the functions of generated code."""
     return set(re.findall(r"^ *function (\w+)", text, flags=re.M))
@@ -110,6 +113,17 @@ def renamed(text: str, known: Iterable[str]) -> str:
     free = (name for size in (1, 2, 3) for name in map("".join, product(_LETTERS, repeat=size)) if name not in taken)
     short = {name: next(free) for name, _ in sorted(counts.items(), key=lambda item: (-item[1], item[0]))}
     return _NAME.sub(lambda found: short.get(found[0], found[0]), text)
+
+
+def shared(text: str) -> str:
+    """Generated functions in one that begins with ``(() => {``, with a name for each long number that they share."""
+    counts = Counter(_LONG.findall(text))
+    names = {number: f"number{n}" for n, (number, many) in enumerate(counts.items()) if many >= _OFTEN}
+    if not names:
+        return text
+    head, body = text.split("{", 1)
+    declared = ", ".join(f"{name} = {number}" for number, name in names.items())
+    return f"{head}{{\nconst {declared};{_LONG.sub(lambda found: names.get(found[0], found[0]), body)}"
 
 
 def _once(text: str) -> str:

@@ -17,7 +17,7 @@ from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import MachineAnalysis
 
 _SPAN = 100.0  # factor to each side of a value over which its stable range is drawn
-_MOST = 12  # parameters at most
+_MOST = 24  # parameters at most
 
 
 def machine_verdict(found: MachineAnalysis) -> np.ndarray:
@@ -74,12 +74,20 @@ def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     ax.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):
         ax.spines[side].set_visible(False)
-    ax.set_xlabel("value over its own; blue: stable, hatched: unstable or none")
+    left = len(left_out(found))
+    more = f"\n{left} more edge{'s' if left > 1 else ''} not drawn: see the list" if left else ""
+    ax.set_xlabel(f"value over its own; blue: stable, hatched: unstable or none{more}")
     return ax
 
 
 def _shown(found: MachineAnalysis) -> list[Margin]:
     return [m for m in found.margins if m.edge is not None and m.value > 0 and _in_view(m.edge.value / m.value)][:_MOST]
+
+
+def left_out(found: MachineAnalysis) -> list[str]:
+    """Parameters with an edge that `stable_ranges` does not draw: a factor of 100 away or more, or not positive."""
+    drawn = {one.parameter for one in _shown(found)}
+    return [one.parameter for one in found.margins if one.edge is not None and one.parameter not in drawn]
 
 
 def _in_view(ratio: float) -> bool:

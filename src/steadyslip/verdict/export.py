@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.quantities import total
+from steadyslip.verdict.holding import holding
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -34,6 +35,7 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
         "critical_angular_frequency": analysis.critical_angular_frequency,
         "critical_axial_stiffness": analysis.critical_axial_stiffness,
         "stable_stiffness": [[low, _finite(high)] for low, high in analysis.stable_stiffness],
+        **_held_by(analysis),
         **{name: value for name, value in common.items() if name not in ("boundaries", "warnings")},
         "onset": None if analysis.onset is None else onset_dict(analysis.onset),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
@@ -43,6 +45,24 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
     if analysis.rig.area is not None:
         data["forces"] = _forces(analysis, analysis.rig.area)
     return data
+
+
+def _held_by(analysis: Findings) -> dict[str, Any]:
+    """Of a rig that a gain alone holds, that gain: what is said of a stiffness is then of a spring beside it."""
+    name = analysis.rig.gain_name()
+    held = None if name is None or analysis.steady is None else holding(analysis)
+    if held is None or held.name == "stiffness":
+        return {}
+    return {
+        "held_by": {
+            "parameter": name,
+            "value": held.own,
+            "critical": held.critical,
+            "critical_side": held.side,
+            "stable": [[low, _finite(high)] for low, high in held.stable],
+        }
+        | total(held.critical, "Pa/m", analysis.rig.area)
+    }
 
 
 def common_numbers(found: Verdict) -> dict[str, Any]:

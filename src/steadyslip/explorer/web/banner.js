@@ -77,7 +77,7 @@ export class Banner {
   /** What the bar shows, as it is exactly or as the track has it: where it is stable, the own value, a scale from 0 to 1. */
   drawn(answer) {
     const { page, data } = this, { rig } = page, one = data.parameters[rig.bar], own = answer.stiffness + answer.gain;
-    const whole = data.phrases || one?.name === data.stiffness;
+    const whole = data.phrases || this.springs(answer);
     if (whole && answer.intervals && answer.status !== ABSENT && (!data.phrases || own > 0)) {
       const { gain } = answer, told = data.phrases ? one : asStiffness(data);
       const intervals = answer.intervals.map(({ low, high }) => ({ low: low + gain, high: high + gain }));
@@ -94,13 +94,18 @@ export class Banner {
     return { told: one, intervals, ends: parts.slice(0, -1).map(({ at }) => at), own: rig.values[rig.bar], gain: 0, x: (v) => (Number.isFinite(v) ? scale.of(v) : Number(v > 0)), range, logarithmic };
   }
 
+  /** Whether the bar is about a spring, and a gain beside it, rather than about another parameter, or a gain alone. */
+  springs({ gain, stiffness }) {
+    return this.data.parameters[this.page.rig.bar]?.name === this.data.stiffness && (!gain || stiffness > 0);
+  }
+
   /** Stable values of what is chosen, a controller's gain counted with a stiffness, with the rig's own. */
   showBar(answer) {
     const found = this.drawn(answer);
     this.bar.hidden = !found;
     if (!found) return put(this.bar, "aria-label", "no stiffness is stable");
-    const { told: one, intervals, ends, own, gain, logarithmic } = found, { phrases, parameters, stiffness: named } = this.data, { bar } = this.page.rig;
-    const whole = !phrases && parameters[bar]?.name === named, marks = [...ends, own, gain].filter((v) => v > 0), [factor, name] = unitFor(one, own || marks[0] || 1);
+    const { told: one, intervals, ends, own, gain, logarithmic } = found, { phrases, parameters } = this.data, { bar } = this.page.rig;
+    const whole = !phrases && this.springs(answer), marks = [...ends, own, gain].filter((v) => v > 0), [factor, name] = unitFor(one, own || marks[0] || 1);
     const together = logarithmic && Math.max(...marks) < ASUNDER * Math.min(...marks);
     const value = (v) => (together ? `${digits(v / factor)} ${name}`.trim() : told(one, v)); // one unit on one bar, unless decades lie between
     const x = (v) => 100 * Math.min(1, Math.max(0, found.x(v)));

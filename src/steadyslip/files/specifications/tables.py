@@ -154,7 +154,7 @@ class TableReader:
                 if value is not None:
                     arguments[item.name] = value
             elif is_required(item):
-                self.problem(prefix + key, _missing(role))
+                self.problem(prefix + key, _missing(self.told(role)))
         for name, value in rest.items():
             self.problem(prefix + name, unknown_name("key", name, keys) + _key_of_another(law, name, value))
         return arguments
@@ -206,6 +206,16 @@ class TableReader:
             unit = "N m" if self.twisted else total_unit(role.unit)  # a contact without area is described in forces
             return replace(role, unit=unit)
         return replace(role, unit=TURNING[role.unit]) if self.turning and role.unit in TURNING else role
+
+    def told(self, role: Declared) -> Declared:
+        """The same for people: with totals where there is an area, and forces and torques called so."""
+        if not isinstance(role, Parameter):
+            return role
+        here = self.outside(role)
+        if self.area is not None and is_per_area(here.unit):
+            here = replace(here, unit=total_unit(here.unit))
+        word = "torque" if here.unit == "N m" else "force" if here.unit.startswith("N") else "stress"
+        return replace(here, doc=here.doc.replace("stress", word))
 
     def _part(self, role: Part, raw: Any, name: str) -> Any:
         if role.keyed:

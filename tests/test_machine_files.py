@@ -237,7 +237,7 @@ def test_what_machines_do_not_have_yet_is_refused_in_one_line(command, tmp_path)
 CALLS = [
     lambda m: ss.critical_stiffness(m),
     lambda m: ss.stable_stiffness(m), lambda m: ss.small_signal(m),
-    lambda m: ss.formula(m), lambda m: ss.safety_factor(m),
+    lambda m: ss.safety_factor(m),
 ]  # fmt: skip
 
 

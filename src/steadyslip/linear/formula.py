@@ -1,4 +1,4 @@
-"""The critical stiffness of the user's own rig as a formula."""
+"""The critical stiffness of the user's own rig, or the edge in another parameter, as a formula."""
 
 from __future__ import annotations
 
@@ -8,49 +8,104 @@ from threading import Thread
 
 import sympy as sp
 
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import derivative
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
+from steadyslip.linear.stable_values import is_own_stiffness, name_along
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
+from steadyslip.model.equations import Contact
+from steadyslip.model.linearisation import characteristic_coefficients
 
 LONGEST = 4.0
 """Seconds for each of two simplifications; what takes longer is left as it stands."""
 LEGIBLE, SHORT = 60, 3
 """Operations of a formula that is read in one line, and of an ingredient that needs no letter."""
+LARGEST, LONG = 4, 400
+"""Degree of the characteristic polynomial up to which its condition is written, and operations beyond which not."""
 _LETTERS = {"mu": "mu_ss", "f1": "f_1"} | {f"B{i}": f"B_{i}" for i in range(4)}
 MU_SS = sp.Symbol("mu_ss", real=True)
 
 
 @checked()
-def formula(rig: Slider | Machine) -> sp.Eq:
-    """Critical stiffness of a rig with one memory variable, as a SymPy equation.
+def formula(rig: Slider | Machine, along: str | None = None) -> sp.Eq:
+    """Critical stiffness of a rig with one memory variable as a SymPy equation, or the edge in another parameter.
 
     Parameters
     ----------
-    rig : Slider
+    rig : Slider or Machine
         Only its structure matters: the formula holds for every rig with the same terms.
+    along : str, optional
+        Dotted name, or a unique last part, of the parameter whose oscillatory edge is written; the stiffness of a
+        slider or of a machine's only spring unless given.
 
     Returns
     -------
     sympy.Eq
         ``k_cr = N/D`` (Pa/m along the sliding direction); with a position controller ``k_cr + kp = N/D``. In
         terms of the rig's parameters, the steady normal stress ``sigma_ss`` and the steady friction coefficient
-        ``mu_ss``. Stable above k_cr while D > 0, below while D < 0 (theory 3; eq. 20 corrected).
+        ``mu_ss``. Stable above k_cr while D > 0, below while D < 0 (theory 3; eq. 20 corrected). Of another
+        parameter, or of a machine, where the Hurwitz condition of the characteristic polynomial vanishes;
+        `stable_values` tells which side is stable, and whether another condition fails before.
 
     Raises
     ------
     NotAvailable
-        If the rig is a machine, or the model has several memory variables or none, or integral control: then the
-        boundary is a root of a polynomial, which `stable_stiffness` solves.
+        If there is no short formula: of a slider with several memory variables or none, or integral control; of another
+        parameter where the characteristic polynomial has a degree above four, or the condition does not depend on it
+        linearly. The boundary is a root of a polynomial then, which `stable_values` solves.
 
     Notes
     -----
     It is written as short as SymPy manages in `LONGEST` seconds for each of two steps, else unsimplified.
     """
-    return _formula(build_model(rig))
+    model, full = build_model(rig), _name(rig, along)
+    return _formula(model) if is_own_stiffness(rig, full) else _condition(model, full)
+
+
+def _name(rig: Slider | Machine, along: str | None) -> str:
+    """The parameter that is meant; of a machine its only stiffness unless one is given."""
+    if along is None and isinstance(rig, Machine):
+        springs = [name for name, one in rig.parameters().items() if one.value and one.role.kind == "stiffness"]
+        if len(springs) == 1:
+            return springs[0]
+        example = f"formula(machine, {springs[0]!r})" if springs else "formula(machine, NAME)"
+        raise NotAvailable(f"a machine has several stiffnesses; {example} writes the edge in one, where it is short")
+    return name_along(rig, along)
+
+
+@question
+def _condition(model: Model, name: str) -> sp.Eq:
+    """Where the last Hurwitz determinant but one vanishes: roots on the imaginary axis."""
+    symbol, c = model.parameters.get(name), characteristic_coefficients(model)
+    degree, numbers = len(c) - 1, f"; stable_values(rig, {name!r}) gives its edges as numbers"
+    if symbol is None:
+        raise NotAvailable(f"{name} is not in the equations of this rig")
+    if not 1 < degree <= LARGEST:
+        raise NotAvailable(
+            f"the characteristic polynomial has degree {degree}: no short formula has its edges{numbers}"
+        )
+    if any(symbol in e.free_symbols for one in model.contacts for e in _stresses(one)):
+        raise NotAvailable(f"the steady normal stress depends on {name}, and no short formula has its edges{numbers}")
+    whole = {2: lambda: c[1], 3: lambda: c[1] * c[2] - c[0] * c[3],
+             4: lambda: c[1] * c[2] * c[3] - c[0] * c[3] ** 2 - c[4] * c[1] ** 2}[degree]()  # fmt: skip
+    slope = derivative(whole, symbol)
+    if slope == 0 or sp.expand(derivative(slope, symbol)) != 0:
+        raise NotAvailable(f"the condition of stability does not depend on {name} linearly{numbers}")
+    level = whole.xreplace({symbol: sp.Integer(0)})
+    found = _in_time(lambda: _shortest(-level, slope), -level / slope)
+    if (size := sp.count_ops(found)) > LONG:
+        raise NotAvailable(f"the formula of {name} has {size} operations, more than anyone reads{numbers}")
+    return sp.Eq(sp.Symbol(f"{symbol}_cr"), found, evaluate=False)
+
+
+def _stresses(contact: Contact) -> list[sp.Expr]:
+    own = (contact.steady_load, contact.steady_coupling, contact.steady_stress)
+    return [sp.sympify(one) for one in own if one is not None]
 
 
 @question

@@ -48,9 +48,9 @@ class MachineAnalysis(MachineFindings):  # noqa: D101 -- its base has it
         """A figure: ``"verdict"``, or of its parts ``"ranges"``, ``"mode"`` and ``"eigenvalues"`` alone."""
         return draw(self, kind, **options)
 
-    def formula(self) -> sp.Eq:
-        """Refused: `steadyslip.formula` is one of sliders."""
-        return linear_formula(self.rig)
+    def formula(self, along: str | None = None) -> sp.Eq:
+        """The edge in a parameter as a formula, where one is short; see `steadyslip.formula`."""
+        return linear_formula(self.rig, along)
 
     def __str__(self) -> str:
         return lines_of(self, machine_facts(self), margin_table(self), machine_meaning(self))

@@ -46,7 +46,7 @@ def test_numbers_are_those_of_the_library():
 
 def test_what_a_gain_alone_holds_is_told_of_the_gain():
     """In JSON too: `critical_stiffness` is of a spring beside it."""
-    press = ss.Slider(PLAIN.friction, PLAIN.contact, stiffness=None, drive=ss.PID(1e-6, kp=2e9), area=0.01)
+    press = replace(PLAIN, stiffness=None, drive=ss.PID(1e-6, kp=2e9), area=0.01)
     data = ss.analyze(press).to_dict()
     held, (edge,) = data["held_by"], ss.boundary(press, "drive.kp")
     assert (held["parameter"], held["value"], held["critical_side"]) == ("drive.kp", 2e9, "above")

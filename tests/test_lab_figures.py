@@ -110,6 +110,8 @@ def test_a_profile_crosses_its_levels_where_the_intervals_end(fit):
     parabola = next(line for line in ax.lines if line.get_label() == "its error alone")
     np.testing.assert_allclose(parabola.get_ydata()[0], 16.0)  # four standard deviations from the best value
     assert ax.get_title() == "likelihood: " + ("Gaussian" if found.gaussian else "not Gaussian")
+    short = replace(found, rise=np.minimum(found.rise, 3.0))
+    assert short.plot(Figure().subplots()).get_title().endswith("; the profile ends before 95 %")
     assert ax.get_xlabel() == "d_c (µm)"
 
 
@@ -148,6 +150,32 @@ def test_shares_of_kicks_sum_to_all_draws(fit):
     assert "ln(new/old velocity)" in str(kicked)
     with pytest.raises(ss.NotAvailable, match="kick="):
         found.plot("kicks")
+
+
+def test_regions_end_where_the_search_did(fit):
+    """A step lies between two samples; its region was drawn beyond them."""
+    place = next(i for i, name in enumerate(fit.names) if name.startswith("step."))
+    low = np.where(np.arange(len(fit.names)) == place, fit.coordinates, fit.bounds[0])
+    panels = replace(fit, bounds=(low, fit.bounds[1])).plot("corner")
+    said = [text.get_text() for text in panels[0, 0].get_legend().get_texts()]
+    assert said == ["holds 68 %", "holds 95 %", "best fit"]
+    for line in panels[place, 0].lines[:2]:
+        assert np.min(line.get_ydata()) == pytest.approx(0.0, abs=1e-9)
+        assert np.max(line.get_ydata()) > 0
+    (area,) = panels[place, place].collections
+    assert np.min(area.get_paths()[0].vertices[:, 0]) >= -1e-9
+
+
+def test_noise_does_not_make_an_axis_logarithmic():
+    """What is left of noise on such an axis lies above the commanded rate."""
+    rng, time = np.random.default_rng(1), np.linspace(0.0, 100.0, 2001)
+    moved = 1e-7 * time + 1.9e-6 * np.maximum(time - 50, 0)
+    for noise, scale in ((2e-8, "linear"), (0.0, "log")):
+        record = ss.record_from_arrays(
+            time, friction=0.6 + 1e-3 * rng.standard_normal(2001), normal=1e7,
+            displacement=moved + noise * rng.standard_normal(2001),
+        )  # fmt: skip
+        assert ss.figures.record(record, Figure().subplots(3, 1))[1].get_yscale() == scale
 
 
 def test_no_axis_of_a_corner_hides_part_of_its_numbers(fit):

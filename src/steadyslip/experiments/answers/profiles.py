@@ -61,9 +61,9 @@ class Profile(ReadOnly):
             return False
         own, usual = np.array(self._ends(self.rise, LEVEL)), np.array(self._ends(self.normal, LEVEL))
         best = float(self.values[int(np.argmin(self.normal))])
-        both = np.isfinite(own) & np.isfinite(usual)
-        return bool(np.all(np.isfinite(own) == np.isfinite(usual)) and
-                    np.all(np.abs(own - usual)[both] <= ALIKE * np.abs(usual - best)[both]))  # fmt: skip
+        both = np.isfinite(own)
+        return bool(np.all(both == np.isfinite(usual)) and
+                    np.all(np.abs(own[both] - usual[both]) <= ALIKE * np.abs(usual[both] - best)))  # fmt: skip
 
     def _ends(self, rise: Array, level: float) -> tuple[float, float]:
         limit = float(chi2.ppf(level, 1))

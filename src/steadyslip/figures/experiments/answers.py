@@ -64,7 +64,8 @@ def profile(result: Profile, ax: Axes | None = None) -> Axes:
     ax.set_ylim(0.0, min(top, 12.0))
     ax.set_xlabel(labelled(brief(result.name), unit))
     ax.set_ylabel("rise of the misfit, −2 ln of the profile likelihood (1)")
-    ax.set_title("likelihood: " + ("Gaussian" if result.gaussian else "not Gaussian"), fontsize="medium")
+    cut = "" if np.all(np.isfinite(result.interval(0.95))) else "; the profile ends before 95 %"
+    ax.set_title(f"likelihood: {'Gaussian' if result.gaussian else 'not Gaussian'}{cut}", fontsize="medium")
     ax.legend(loc="upper center", fontsize="small")
     return ax
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from scipy.ndimage import gaussian_filter
 from scipy.stats import chi2, norm
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from steadyslip.experiments import Estimate, Fit
 
 LEVELS = (0.68, 0.95)
+STYLES: tuple[Literal["-"], Literal["--"]] = ("-", "--")
+PILED = 0.02  # of draws: so many at one end lie where the search ended
 BINS = 48  # of a histogram of draws
 MOST_DRAWN = 4000  # draws that are drawn as dots
 
@@ -63,6 +66,14 @@ def corner(result: Fit | Draws, ax: Any = None) -> np.ndarray:
             panel.axvline(scales[k].best, color=VERMILION, linewidth=0.8)
             if i != k:
                 panel.axhline(scales[i].best, color=VERMILION, linewidth=0.8)
+    if len(names) > 1:  # in the room that the panels above the diagonal leave
+        color = BLACK if isinstance(result, Draws) else BLUE
+        lines = [Line2D([], [], color=color, linestyle=style, linewidth=1) for style in STYLES]
+        words = [f"holds {100 * level:.0f} %" for level in LEVELS]
+        lines.append(Line2D([], [], color=VERMILION, linewidth=0.8))
+        place = {"loc": "upper left", "bbox_to_anchor": (1.15, 1.0), "borderaxespad": 0.0}
+        legend = panels[0, 0].legend(lines, [*words, "best fit"], fontsize="small", frameon=False, **place)
+        legend.set_in_layout(False)  # it would push the second column aside
     return panels
 
 
@@ -74,19 +85,23 @@ class _Scale:
         self.origin = one.value if clock else 0.0
         self.size, unit = display_unit(one.unit, one.error if clock else abs(one.value) or one.error, one.area)
         self.best = (one.value - self.origin) / self.size
-        self.label = labelled(f"{brief(one.name)}\n- {one.value:.7g} s" if clock else brief(one.name), unit)
+        self.label = labelled(f"{brief(one.name)}\n\u2212 {one.value:.7g} s" if clock else brief(one.name), unit)
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         return (values - self.origin) / self.size
 
 
 def _outlined(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scale, _Scale]) -> None:
-    """The normal distribution of two coordinates, or of one, brought to the parameters themselves."""
+    """The normal distribution of two coordinates, or of one, brought to the parameters themselves.
+
+    It ends where the search did, such as at the samples between which a step lies.
+    """
     one, other = (fit.index(name) for name in names)
     places = [fit.coordinates[i] for i in (one, other)]
     if one == other:
         deviation = float(np.sqrt(fit.covariance[one, one]))
-        z = places[0] + deviation * np.linspace(-3.5, 3.5, 200)
+        z = places[0] + deviation * np.linspace(-3.5, 3.5, 401)
+        z = z[(z >= fit.bounds[0][one]) & (z <= fit.bounds[1][one])]
         density = norm.pdf(z, places[0], deviation)
         values = scales[0](np.asarray(fit.space.unknowns[one].value(z)))
         panel.fill_between(values, density / np.gradient(values, z), color=SKY, linewidth=0)
@@ -95,10 +110,10 @@ def _outlined(panel: Axes, fit: Fit, names: tuple[str, str], scales: tuple[_Scal
         return
     root = np.linalg.cholesky(fit.covariance[np.ix_([one, other], [one, other])])
     angle = np.linspace(0.0, 2 * np.pi, 181)
-    for level, style in zip(LEVELS, ("-", "--"), strict=True):
+    for level, style in zip(LEVELS, STYLES, strict=True):
         ring = root @ (np.sqrt(chi2.ppf(level, 2)) * np.array([np.cos(angle), np.sin(angle)]))
         curve = [
-            scale(np.asarray(fit.space.unknowns[i].value(place + part)))
+            scale(np.asarray(fit.space.unknowns[i].value(np.clip(place + part, fit.bounds[0][i], fit.bounds[1][i]))))
             for i, place, part, scale in zip((one, other), places, ring, scales, strict=True)
         ]
         panel.plot(*curve, color=BLUE, linewidth=1, linestyle=style, label=f"{100 * level:.0f} %")
@@ -125,8 +140,11 @@ def _drawn(panel: Axes, x: np.ndarray, y: np.ndarray, alone: bool) -> None:
         panel.contour(
             *np.einsum("ij,jkl->ikl", root, np.array(middles)), density,
             levels=[region(density, level) for level in LEVELS[::-1]], colors=BLACK, linewidths=1,
-            linestyles=("--", "-"),
+            linestyles=STYLES[::-1],
         )  # fmt: skip
+    for values, limit in ((x, panel.set_xlim), (y, panel.set_ylim)):  # no line where no draw can be
+        low, high = float(np.min(values)), float(np.max(values))
+        limit(low if np.mean(values == low) > PILED else None, high if np.mean(values == high) > PILED else None)
 
 
 def region(density: np.ndarray, share: float) -> float:

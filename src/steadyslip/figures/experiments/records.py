@@ -14,6 +14,7 @@ from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, display_uni
 if TYPE_CHECKING:
     from steadyslip.experiments import Record
 
+MOST_HIDDEN = 0.01  # of the slopes of a record
 DECADE = 5.0  # ratio of rates from which on their axis is logarithmic
 
 
@@ -68,7 +69,8 @@ def rates(data: Record, ax: Axes, time: np.ndarray) -> None:
     high = float(np.max(np.abs(commanded))) or float(np.max(np.abs(rate)))
     low = float(np.min(np.abs(commanded)))
     size, name = display_unit("m/s", high)
-    if low > 0 and high > DECADE * low:
+    hidden = float(np.mean(rate <= 0))  # by a logarithmic axis, which would lift all that is left of the noise
+    if low > 0 and high > DECADE * low and hidden < MOST_HIDDEN:
         ax.set_yscale("log")
         ax.set_ylim(0.1 * low / size, 10 * high / size)
         rate = np.where(rate > 0, rate, np.nan)

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from steadyslip.core.errors import InternalError
+from steadyslip.core.questions import question
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs, windows
 from steadyslip.experiments.fitting.comparison import RecordPart
@@ -60,6 +61,7 @@ class Features:
     longest: float
 
 
+@question
 def features(record: Record, rate: float) -> Features:
     """Read the features off a record; `rate` is the load-point rate at its start, m/s."""
     time, mu = record.time, record.friction

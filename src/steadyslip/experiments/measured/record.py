@@ -14,6 +14,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
+from steadyslip.core.questions import Keeper, question
 from steadyslip.core.results import read_only
 from steadyslip.core.roles import Parameter, real
 from steadyslip.experiments.loading.kinks import load_course
@@ -28,7 +29,7 @@ FEWEST_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Record(Displayed):
+class Record(Displayed, Keeper):
     """A record of an experiment; build one with `read_record` or `record_from_arrays`.
 
     Attributes
@@ -287,6 +288,7 @@ def seconds(name: str, value: Any) -> float:
 # -- thinning
 
 
+@question
 def transient_rows(record: Record, count: int) -> Array:
     """Rows to keep of a record: as many after every step as before the next, evenly in the logarithm of time."""
     cumulated = np.cumsum(_wanted(record, count))

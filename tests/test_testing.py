@@ -260,6 +260,17 @@ def doubled_contact(self):
     object.__setattr__(self, "gradient", 2 * self.gradient)
 
 
+def with_film(**methods):
+    """A state that follows velocity over a slip distance, and thins the normal stress; with one thing changed."""
+    sound = {
+        "memory": lambda self: ("film",),
+        "rates": lambda self, motion: (1e6 * motion.velocity * (sp.log(motion.velocity / 1e-6) - motion.memory[0]),),
+        "steady_memory": lambda self, velocity: (sp.log(velocity / 1e-6),),
+        "coupling": lambda self, motion: -1e4 * motion.memory[0],
+    }
+    return sound | methods
+
+
 CONTACT_FAULTS = [
     ("check_contact_names", {"steady_stress": lambda self: self.preload}, "give exactly one, None for the other"),
     ("check_contact_names", {"load": lambda self: None}, "give exactly one, None for the other"),
@@ -301,6 +312,54 @@ CONTACT_FAULTS = [
     ("check_linearisation", {"coupling": kinked}, r"∂σ/∂\(slip\) is 0 by differentiation.*check kinks"),
     ("check_axis", {"sliding_stiffness": lambda self, k: 2 * k}, r"sliding_stiffness\(1\) is 2.0"),
     ("check_axis", {"sliding_stiffness": lambda self, k: 0.5 * k**2}, "a projection is proportional"),
+    ("check_contact_states", with_film(rates=lambda self, motion: ()), r"names 1 states and rates\(\) has 0"),
+    ("check_contact_states", with_film(memory=lambda self: ("a film",)), "allowed: different names of letters"),
+    ("check_contact_states", with_film(coupling=lambda self, motion: 0), "nothing depends on film; leave it out"),
+    (
+        "check_contact_states",
+        with_film(steady_memory=lambda self, velocity: (sp.log(velocity / 2e-6),)),
+        r"the rate of film is .* must vanish at steady_memory\(\)",
+    ),
+    (
+        "check_contact_states",
+        with_film(
+            rates=lambda self, motion: (1e6 * motion.velocity * motion.memory[0],),
+            steady_memory=lambda self, velocity: (sp.Integer(0),),
+        ),
+        "a state grows or stays at the rate",
+    ),
+    (
+        "check_contact_states",
+        with_film(rates=lambda self, motion: (sp.Symbol("temperature") - motion.memory[0],)),
+        "rates contains temperature",
+    ),
+    (
+        "check_contact_senses",
+        {"coupling": lambda self, motion: -motion.outside},
+        r"depends on the pressure around, and has_pores\(\) is False",
+    ),
+    (
+        "check_contact_senses",
+        {"is_compliant": lambda self: True},
+        r"does not depend on the distance of the surfaces, and is_compliant\(\) is True",
+    ),
+    (
+        "check_contact_senses",
+        {
+            "load": lambda self: 0.0,
+            "is_compliant": lambda self: True,
+            "coupling": lambda self, motion: -1e9 * motion.separation + 1e3 * motion.separation_rate,
+        },
+        r"∂σ/∂\(separation_rate\) is 1000.0 Pa s/m, must be <= 0",
+    ),
+    (
+        "check_contact_routes",
+        with_film(
+            rates=lambda self, motion: (1e6 * (5e6 * sp.Abs(motion.velocity - 1e-6) - 1e-6 * motion.memory[0]),),
+            steady_memory=lambda self, velocity: (sp.Integer(0),),
+        ),
+        "the rate of film has other slopes by differences",
+    ),
     ("check_contact_round_trip", {"__post_init__": doubled_contact}, "a rig file changes it"),
 ]
 
@@ -320,6 +379,7 @@ def test_every_contact_check_has_a_fault_of_its_own():
 
 def test_sound_contact_passes():
     testing.check_contact_law(broken_contact())
+    testing.check_contact_law(broken_contact(**with_film()))
     testing.check_contact_law(broken_contact(), Surroundings(velocity=1e-3, mass=0.0))
 
 

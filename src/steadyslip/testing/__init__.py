@@ -25,6 +25,11 @@ from steadyslip.testing.contact import (
     check_linearisation,
     check_steady_stress,
 )
+from steadyslip.testing.contact_states import (
+    check_contact_routes,
+    check_contact_senses,
+    check_contact_states,
+)
 from steadyslip.testing.friction import (
     check_derivatives,
     check_names,
@@ -51,10 +56,13 @@ FRICTION_CHECKS: tuple[Callable[[FrictionLaw, Conditions], None], ...] = (
 )
 CONTACT_CHECKS: tuple[Callable[[ContactLaw, Surroundings], None], ...] = (
     check_contact_names,
+    check_contact_senses,
+    check_contact_states,
     check_contact_numbers,
     check_steady_stress,
     check_linearisation,
     check_axis,
+    check_contact_routes,
     check_contact_round_trip,
 )
 
@@ -97,7 +105,8 @@ def check_contact_law(contact: ContactLaw, surroundings: Surroundings | None = N
     ----------
     contact : ContactLaw
     surroundings : Surroundings, optional
-        Friction law, drive velocity, stiffness, mass and dampings of the rig around it.
+        Friction law, drive velocity, stiffness, mass and dampings of the rig around it, and what presses surfaces that
+        give.
 
     Raises
     ------

@@ -11,8 +11,13 @@ import sympy as sp
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.laws.contact import ContactLaw, Motion
 from steadyslip.laws.friction import FrictionLaw, RateState
+from steadyslip.machine.bodies import PlanarBody
 from steadyslip.machine.drive import Steady
+from steadyslip.machine.links import Spring
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.servo import Pull
 from steadyslip.machine.slider import Slider
+from steadyslip.machine.surfaces import Surface
 from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_states
 from steadyslip.testing.precise import (
@@ -36,7 +41,10 @@ def _rock() -> FrictionLaw:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The rig in which a contact law is checked; every term is there so that none goes unnoticed."""
+    """The rig in which a contact law is checked; every term is there so that none goes unnoticed.
+
+    Under a law for surfaces that give it is a machine: a body that `press`, a normal stress, holds on them.
+    """
 
     friction: FrictionLaw = field(default_factory=_rock)
     velocity: float = 1e-6
@@ -44,8 +52,12 @@ class Surroundings:
     mass: float = 1e9
     damping: float = 2e9
     radiation_damping: float = 3e9
+    press: float = 5e6
 
-    def rig(self, contact: ContactLaw) -> Slider:
+    def rig(self, contact: ContactLaw) -> Slider | Machine:
+        """The slider, or machine, in steady sliding with a contact law."""
+        if contact.is_compliant():
+            return self._machine(contact)
         return Slider(
             friction=self.friction,
             contact=contact,
@@ -56,27 +68,59 @@ class Surroundings:
             drive=Steady(self.velocity),
         )
 
+    def _machine(self, contact: ContactLaw) -> Machine:
+        links = {
+            "spring": Spring(between=("drive", "block"), stiffness=self.stiffness, damping=self.damping),
+            "waves": Spring(between=("ground", "block"), damping=self.radiation_damping),
+        }
+        return Machine(
+            bodies={"block": PlanarBody(mass=self.mass, press=self.press)},
+            links=links,
+            contacts={"base": Surface(body="block", friction=self.friction, contact=contact)},
+            drive=Pull(velocity=self.velocity),
+        )
+
     def steady_stress(self, contact: ContactLaw) -> float:
         """σss of the rig; the highest where there are several is as good as any."""
+        rig = self.rig(contact)
         try:
-            return steady_states(self.rig(contact))[-1].normal_stress
+            if isinstance(rig, Machine):
+                return steady_states(rig)[-1].contacts["base"].normal_force
+            return steady_states(rig)[-1].normal_stress
         except NoSteadySliding as error:
             raise ContractViolation(
                 f"{contact!r}: {error}; check it with numbers that have a steady state, or give `surroundings`"
             ) from error
 
-    def steady_motion(self, sigma: float) -> Motion:
-        """Steady sliding at normal stress `sigma`, as numbers."""
-        tau = float(self.friction.steady_strength(self.velocity, sigma))
-        spring = tau + self.radiation_damping * self.velocity
-        v = self.velocity
-        return Motion(0.0, v, 0.0, spring, spring, tau, tau, self.stiffness, v)
+    def steady_motion(self, contact: ContactLaw, sigma: float, velocity: float | None = None) -> Motion:
+        """Steady sliding at normal stress `sigma`, as numbers; at the drive's velocity unless one is given."""
+        v = self.velocity if velocity is None else velocity
+        tau = float(self.friction.steady_strength(v, sigma))
+        spring = tau + self.radiation_damping * v
+        memory = tuple(float(one) for one in contact.steady_memory(v))
+        motion = Motion(0.0, v, 0.0, spring, spring, tau, tau, self.stiffness, v, memory=memory, steady_memory=memory)
+        if not contact.is_compliant():
+            return motion
+        # pressed into each other by as much as the stress takes, which falls as the surfaces part
+
+        def missing(u: float) -> float:
+            return float(contact.normal_stress(replace(motion, separation=u, steady_separation=u))) - sigma
+
+        from scipy.optimize import brentq  # slow to import
+
+        deep = -1e-12
+        while missing(deep) < 0:
+            deep *= 10
+            if deep < -1e12:
+                raise ContractViolation(f"{contact!r}: no distance of the surfaces makes a stress of {sigma!r} Pa")
+        apart = float(brentq(missing, deep, 0.0, xtol=1e-300, rtol=1e-15))
+        return replace(motion, separation=apart, steady_separation=apart)
 
 
 PRESS = Surroundings()
 
 
-class _Statement:
+class ContactStatement:
     """A contact law's normal stress in symbols."""
 
     def __init__(self, contact: ContactLaw) -> None:
@@ -87,23 +131,31 @@ class _Statement:
         k = sp.Symbol("k", nonnegative=True)
         apart = sp.symbols("u u_ss u_dot", real=True)
         outside = sp.Symbol("q", real=True)
-        self.inputs = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0, *apart, outside)
-        self.motion = replace(Motion(*self.inputs[:-1]), outside=outside)
+        plain = (x, v, acceleration, spring, steady_spring, tau, steady_tau, k, v0, *apart)
+        memory = tuple(sp.Symbol(f"m_{i}", real=True) for i in range(len(contact.memory())))
+        steady = tuple(sp.Symbol(f"m_ss_{i}", real=True) for i in range(len(contact.memory())))
+        self.inputs = (*plain, outside, *memory, *steady)
+        self.motion = replace(Motion(*plain), outside=outside, memory=memory, steady_memory=steady)
         self.stress = stated(contact, "normal_stress", self.copy.normal_stress, self.motion)
         require_known_symbols(contact, "normal_stress", self.stress, [*self.inputs, *self.numbers])
 
     def at(self, motion: Motion) -> Any:
         """σ at a motion given as numbers, to fifty digits."""
         function = precise_function(self.contact, [*self.inputs, *self.numbers], [self.stress])
-        return function(*_values(motion), *self.numbers.values())[0]
+        return function(*values_of(motion), *self.numbers.values())[0]
 
 
-def _values(motion: Motion) -> list[Any]:
-    return [getattr(motion, name) for name in Motion.__dataclass_fields__ if not name.endswith("memory")]
+def values_of(motion: Motion) -> list[Any]:
+    """What a motion's numbers are, in the order of a statement's `inputs`."""
+    plain = [getattr(motion, name) for name in Motion.__dataclass_fields__ if not name.endswith("memory")]
+    return [*plain, *motion.memory, *motion.steady_memory]
 
 
 def check_contact_names(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """The law is registered, and gives either a load or a steady normal stress, which is positive."""
+    """The law is registered, and gives either a load or a steady normal stress, which is positive.
+
+    Surfaces that give carry what presses them together, and may have no load of their own.
+    """
     name = type(contact).name
     require(
         name and ContactLaw.registry.get(name) is type(contact),
@@ -117,15 +169,17 @@ def check_contact_names(contact: ContactLaw, surroundings: Surroundings = PRESS)
         "load() and steady_stress(): give exactly one, None for the other",
     )
     given = float(load if load is not None else steady)  # type: ignore[arg-type]  # one of them is given
-    require(given > 0, contact, f"the load is {given!r} Pa, must be > 0 (compression is positive)")
+    unloaded = contact.is_compliant() and given == 0
+    require(given > 0 or unloaded, contact, f"the load is {given!r} Pa, must be > 0 (compression is positive)")
 
 
 def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
     """Called with plain floats, the normal stress is that of the symbols, away from steady sliding too."""
-    said = _Statement(contact)
+    said = ContactStatement(contact)
     sigma = surroundings.steady_stress(contact)
     for factor in (1.0, 1.01, 0.99):
-        motion = _moved(surroundings, sigma, (factor - 1) * 1e-7, surroundings.velocity * factor, (factor - 1) * 1e-6)
+        away = factor - 1
+        motion = _moved(surroundings, contact, sigma, away * 1e-7, surroundings.velocity * factor, away * 1e-6)
         by_hand, exact = float(contact.normal_stress(motion)), said.at(motion)
         require(
             abs(by_hand - exact) <= TOLERANCE * abs(exact),
@@ -137,7 +191,7 @@ def check_contact_numbers(contact: ContactLaw, surroundings: Surroundings = PRES
 
 def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
     """Steady sliding is positive and consistent: what the law makes of it is the normal stress it started from."""
-    said = _Statement(contact)
+    said = ContactStatement(contact)
     sigma = surroundings.steady_stress(contact)
     require(sigma > 0, contact, f"the steady normal stress is {sigma!r} Pa, must be > 0")
     given = contact.steady_stress()
@@ -146,7 +200,7 @@ def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS)
         contact,
         f"the steady normal stress is {sigma!r} Pa, but steady_stress() says {given!r} Pa",
     )
-    found = said.at(surroundings.steady_motion(sigma))
+    found = said.at(surroundings.steady_motion(contact, sigma))
     require(
         abs(found - sigma) <= TOLERANCE * sigma,
         contact,
@@ -155,10 +209,15 @@ def check_steady_stress(contact: ContactLaw, surroundings: Surroundings = PRESS)
 
 
 def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS) -> None:
-    """B0...B3 (eq. 12) agree with central differences of the normal stress, at two stiffnesses."""
+    """B0...B3 (eq. 12) agree with central differences of the normal stress, at two stiffnesses.
+
+    With states of its own, or on surfaces that give, the law has no such coefficients: `check_contact_routes`.
+    """
     from steadyslip.linear.response import contact_coefficients
 
-    said = _Statement(contact)
+    if contact.memory() or contact.is_compliant():
+        return
+    said = ContactStatement(contact)
     for place in (surroundings, replace(surroundings, stiffness=2 * surroundings.stiffness)):
         sigma = place.steady_stress(contact)
         values = operating_point(place.rig(contact))
@@ -175,7 +234,7 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS)
             def along(x: Any, index: int = index, place: Surroundings = place, sigma: float = sigma) -> Any:
                 moved = [0, place.velocity, 0]
                 moved[index] = x
-                return said.at(_moved(place, sigma, *moved))
+                return said.at(_moved(place, contact, sigma, *moved))
 
             scale = (1e-7, place.velocity, place.velocity)[index]
             found, excess = disagreement(along, coefficient, (0, place.velocity, 0)[index], scale)
@@ -190,9 +249,9 @@ def check_linearisation(contact: ContactLaw, surroundings: Surroundings = PRESS)
             )
 
 
-def _moved(place: Surroundings, sigma: float, x: Any, v: Any, acceleration: Any) -> Motion:
+def _moved(place: Surroundings, contact: ContactLaw, sigma: float, x: Any, v: Any, acceleration: Any) -> Motion:
     """Steady sliding displaced by x, at velocity v and with an acceleration; forces follow from the balance."""
-    rest = place.steady_motion(sigma)
+    rest = place.steady_motion(contact, sigma)
     with mpmath.workdps(DIGITS):
         spring = rest.spring - mpmath.mpf(place.stiffness) * x - place.damping * (v - mpmath.mpf(place.velocity))
         tau = spring - mpmath.mpf(place.radiation_damping) * v - mpmath.mpf(place.mass) * acceleration

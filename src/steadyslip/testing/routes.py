@@ -6,6 +6,7 @@ import mpmath
 
 from steadyslip.core.records import FrozenRecord
 from steadyslip.laws.friction import FrictionLaw
+from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.testing.precise import DIGITS, TOLERANCE, precise_function, require, shown
 from steadyslip.testing.statement import MIDDLE, Conditions, statement
@@ -69,14 +70,14 @@ def check_friction_round_trip(law: FrictionLaw, conditions: Conditions = MIDDLE)
     round_trip(law, Slider(friction=law, contact=press, stiffness=1e9, drive=Steady(conditions.velocity)))
 
 
-def round_trip(law: FrozenRecord, rig: Slider) -> None:
+def round_trip(law: FrozenRecord, rig: Slider | Machine) -> None:
     """Write `rig` as text, read it back, and compare."""
     from steadyslip.core.errors import SteadyslipError
-    from steadyslip.files.specifications import rig_to_text, slider_from_text
+    from steadyslip.files.specifications import rig_from_text, rig_to_text
 
     text = rig_to_text(rig)
     try:
-        back = slider_from_text(text)
+        back = rig_from_text(text)
     except SteadyslipError as error:
         require(False, law, f"a rig file with it cannot be read back: {error}\n{text}")
     require(back == rig, law, f"a rig file changes it: wrote\n{text}\nand read back {back!r}")

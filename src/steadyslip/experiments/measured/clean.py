@@ -18,6 +18,7 @@ PLAUSIBLE = (1e-3, 10.0)  # friction coefficients
 STANDS_FOR_NONE = (999.0, 999.25, 9999.0, 9999.25, 99999.0, 999999.0, 1e20, 1e30, 9.9e37, 9.91e37, 9.969209968386869e36)
 """Numbers, of either sign, that instruments and programs write where they have none."""
 APART = 4.0  # times the largest of all other numbers: the size of such a one, unless it has another sign than all
+ALIKE = 1e-6  # of such a number: single precision, and what was printed of it
 MOST_OF_NONE = 0.2  # of a column: more of one number than that are what was measured
 
 
@@ -27,17 +28,27 @@ def without_stand_ins(values: Array, name: str, notes: list[str]) -> Array:
     A stand-in is few and far from all other numbers of its column: a record that passes 999 keeps it.
     """
     found = values
-    for size in STANDS_FOR_NONE:
-        for number in (-size, size):
-            same = np.isclose(found, number, rtol=1e-6, atol=0.0)
-            rest = found[np.isfinite(found) & ~same]
-            if not np.any(same) or np.sum(same) > MOST_OF_NONE * len(rest):
-                continue
-            low, high = float(np.min(rest)), float(np.max(rest))
-            if size > APART * max(-low, high) or number < 0.0 <= low or high <= 0.0 < number:
-                found = np.where(same, np.nan, found)
-                notes.append(f"{int(np.sum(same))} times {number:.6g} in column {name!r} stands for no number")
+    while (number := _stand_in(found)) is not None:
+        same = np.abs(found - number) <= ALIKE * abs(number)
+        found = np.where(same, np.nan, found)
+        notes.append(f"{int(np.sum(same))} times {number:.6g} in column {name!r} stands for no number")
     return found
+
+
+def _stand_in(values: Array) -> float | None:
+    """The least or largest number of a column, if it stands for none."""
+    usual = values[np.isfinite(values)]
+    for number in (float(np.min(usual)), float(np.max(usual))) if len(usual) else ():
+        size = abs(number)
+        if not any(abs(size - one) <= ALIKE * one for one in STANDS_FOR_NONE):
+            continue
+        rest = usual[np.abs(usual - number) > ALIKE * size]
+        if len(usual) - len(rest) > MOST_OF_NONE * len(rest):
+            continue
+        low, high = float(np.min(rest)), float(np.max(rest))
+        if size > APART * max(-low, high) or number < 0.0 <= low or high <= 0.0 < number:
+            return number
+    return None
 
 
 def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) -> Record:

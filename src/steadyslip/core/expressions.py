@@ -235,6 +235,29 @@ def _made(code: Any, world: Mapping[str, Any]) -> Callable[..., list[Any]]:
     return function
 
 
+def replaced(e: sp.Expr, found: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """What ``e.xreplace(found)`` gives, going through what occurs several times once, here and in later calls."""
+    return _replaced(e, _seen(tuple(found.items()))) if found else e
+
+
+@lru_cache(maxsize=64)
+def _seen(found: tuple[tuple[sp.Symbol, sp.Expr], ...]) -> dict[sp.Basic, sp.Basic]:
+    """Expressions, and what becomes of them."""
+    return dict(found)
+
+
+def _replaced(e: Any, seen: dict[sp.Basic, sp.Basic]) -> Any:
+    known = seen.get(e)
+    if known is not None:
+        return known
+    if not isinstance(e, sp.Basic) or not e.args:
+        return e
+    parts = [_replaced(part, seen) for part in e.args]
+    changed = any(own is not part for own, part in zip(parts, e.args, strict=True))
+    seen[e] = found = e.func(*parts) if changed else e
+    return found
+
+
 @lru_cache(maxsize=2**15)
 def derivative(e: sp.Expr, x: sp.Symbol) -> sp.Expr:
     """The derivative, as `sympy.diff` gives it.

@@ -9,7 +9,7 @@ from functools import cached_property
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.expressions import ArrayFunction, replaced
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper
 from steadyslip.core.roles import Parameter
@@ -271,7 +271,7 @@ class Model(Keeper, Displayed):
     def inlined(self, expression: sp.Expr, definitions: dict[sp.Symbol, sp.Expr] | None = None) -> sp.Expr:
         """An expression with T, τ and σ replaced by what they are, or by the same in other variables."""
         for symbol, definition in reversed((definitions or self.definitions).items()):
-            expression = expression.xreplace({symbol: definition})
+            expression = replaced(expression, {symbol: definition})
         return expression
 
     def at_steady(self, expression: sp.Expr) -> sp.Expr:

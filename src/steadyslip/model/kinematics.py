@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from steadyslip.core.errors import InternalError
-from steadyslip.core.expressions import asinh_exp, derivative
+from steadyslip.core.expressions import asinh_exp, derivative, replaced
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Contact, Coordinate, Model
 
@@ -191,13 +191,13 @@ def solved_in_turn(
     found: dict[sp.Symbol, sp.Expr] = {}
     left: list[tuple[sp.Expr, sp.Symbol]] = []
     for residual, unknown in equations:
-        here = residual.xreplace(found)
+        here = replaced(residual, found)
         solution = solved_for(here, unknown)
         if solution is None:
             left.append((here, unknown))
             continue
-        found = {symbol: e.xreplace({unknown: solution}) for symbol, e in found.items()} | {unknown: solution}
-    return found, [(residual.xreplace(found), unknown) for residual, unknown in left]
+        found = {symbol: replaced(e, {unknown: solution}) for symbol, e in found.items()} | {unknown: solution}
+    return found, [(replaced(residual, found), unknown) for residual, unknown in left]
 
 
 def solved_together(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
@@ -205,13 +205,13 @@ def solved_together(equations: Iterable[sp.Expr], unknowns: Iterable[sp.Symbol])
     found: dict[sp.Symbol, sp.Expr] = {}
     left = list(unknowns)
     for residual in equations:
-        here = residual.xreplace(found)
+        here = replaced(residual, found)
         unknown = next((one for one in left if derivative(here, one) != 0), None)
         solution = None if unknown is None else solved_for(here, unknown)
         if unknown is None or solution is None:
             raise InternalError("as many independent linear equations as unknowns")
         left.remove(unknown)
-        found = {symbol: e.xreplace({unknown: solution}) for symbol, e in found.items()} | {unknown: solution}
+        found = {symbol: replaced(e, {unknown: solution}) for symbol, e in found.items()} | {unknown: solution}
     return found
 
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 import sympy as sp
 
 from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import derivative, replaced
 from steadyslip.core.questions import question
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model.equations import Contact, Coordinate, Model
@@ -109,7 +109,7 @@ class _Reducing:
 
     def inlined(self, expression: sp.Expr) -> sp.Expr:
         """T, τ and σ replaced by what they are, and what is known of light coordinates put in."""
-        return self.model.inlined(expression, self.definitions).xreplace(self.found)
+        return replaced(self.model.inlined(expression, self.definitions), self.found)
 
     # -- which equation fixes what
 
@@ -200,7 +200,7 @@ class _Reducing:
         self.pushed, accelerations = solved_in_turn(
             [(self.inlined(self._force_balance(one)), one.acceleration) for one in heavy]
         )
-        self.light = [(self.inlined(self.balances[i]).xreplace(self.pushed), self._w(i)) for i in light]
+        self.light = [(replaced(self.inlined(self.balances[i]), self.pushed), self._w(i)) for i in light]
         self.victims = self._victims(light, eliminate)
         self.closed: Row = {}
         velocities: Equations = []
@@ -268,17 +268,17 @@ class _Reducing:
     def _written(self, expression: sp.Expr) -> sp.Expr:
         """An expression in state, inputs and unknowns."""
         if self.victims:
-            expression = expression.xreplace(self.victims)
-        return self.inlined(expression).xreplace(self.pushed).xreplace(self.closed)
+            expression = replaced(expression, self.victims)
+        return replaced(replaced(self.inlined(expression), self.pushed), self.closed)
 
     def _raw_rates(self, heavy: list[Coordinate]) -> None:
         """Rates of everything that moves, memory variables that follow from a balance and their w included."""
         self.raw: Row = {}
         for symbol in (*(one.displacement for one in self._free()), *self.memory, *self.integrals):
-            self.raw[symbol] = self.inlined(self.rates[symbol]).xreplace(self.pushed)
+            self.raw[symbol] = replaced(self.inlined(self.rates[symbol]), self.pushed)
         for one in heavy:
             if self.moving.contact_at(one) is None:
-                self.raw[one.velocity] = self.inlined(one.acceleration).xreplace(self.pushed)
+                self.raw[one.velocity] = replaced(self.inlined(one.acceleration), self.pushed)
         own = (variable.w for variable in self.moving.variables if variable)
         others = self._felt()
         rates = {symbol: sp.Dummy(real=True) for symbol in (*own, *(symbol for _, symbol in others))}
@@ -287,7 +287,7 @@ class _Reducing:
         equations = [self._change(self._velocity(one.velocity)) - self._acceleration(one) for one in placed.values()]
         equations += [self._change(balance) for balance, _ in (*self.light, *others)]
         solved = solved_together(equations, [rates[w] for w in rates if w in self.raw])
-        self.raw = {symbol: rate.xreplace(solved) for symbol, rate in self.raw.items()}
+        self.raw = {symbol: replaced(rate, solved) for symbol, rate in self.raw.items()}
 
     def _felt(self) -> Equations:
         """Unknown frictions and accelerations on which velocities depend that have no inertia."""
@@ -315,7 +315,7 @@ class _Reducing:
 
     def _acceleration(self, coordinate: Coordinate) -> sp.Expr:
         if coordinate.inertial:
-            return self.inlined(coordinate.acceleration).xreplace(self.pushed)
+            return replaced(self.inlined(coordinate.acceleration), self.pushed)
         return self._change(self._velocity(coordinate.velocity))
 
     def _velocity(self, symbol: sp.Symbol) -> sp.Expr:

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import steadyslip as ss
-from steadyslip.core.expressions import FEW, ArrayFunction, asinh_exp, derivative, occurrences
+from steadyslip.core.expressions import FEW, ArrayFunction, asinh_exp, derivative, occurrences, replaced
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.source import Formulas
 
@@ -107,3 +107,25 @@ def test_what_leaves_floating_point_is_no_traceback():
 def test_functions_that_arrays_do_not_have_are_named():
     with pytest.raises(ss.NotAvailable, match=r"zeta\(\.\.\.\)"):
         ArrayFunction([X], [sp.zeta(X)])
+
+
+def test_replacing_is_that_of_sympy():
+    """Whatever was seen before: another thing for the same symbol, or a symbol that stands in what is put in."""
+    x, y, z = sp.symbols("x y z", real=True)
+    shared = sp.exp(x * y) + sp.log(1 + x**2)
+    expressions = [shared, shared**2 / (1 + shared), sp.Piecewise((shared, x > y), (z, True)), x, sp.Integer(3), z + 1]
+    mappings = [{x: y + 1}, {x: z, z: x}, {y: shared}, {x: sp.Integer(0)}, {x: y + 1, y: x}, {}]
+    for mapping in (*mappings, *mappings):
+        for e in expressions:
+            assert replaced(e, mapping) == e.xreplace(mapping)
+
+
+def test_replacing_goes_through_what_is_shared_once():
+    x, y = sp.symbols("x y", real=True)
+    nested = x
+    for _ in range(50):  # a tree of 2^50 leaves
+        nested = asinh_exp(nested, nested)
+    parts = occurrences([replaced(nested, {x: y})])
+    assert len(parts) == len(occurrences([nested])) == 51
+    assert y in parts
+    assert x not in parts

@@ -56,3 +56,30 @@ def test_a_machine_is_disturbed_where_one_says_and_shown_by_name(browser, page_o
         after = [bodies.nth(i).get_attribute("transform") for i in range(bodies.count())]
         assert len(before) == 2
         assert before != after
+
+
+@pytest.mark.parametrize("changes", [
+    {"contacts.mesh.friction.mu_ref": "3", "contacts.mesh.contact.angle": "-80 deg"},
+    {"bodies.load.force": "400 N"},
+])  # fmt: skip
+def test_a_page_says_why_there_is_no_steady_sliding_as_analyze_does(browser, page_of_servo, changes):
+    machine, path = page_of_servo
+    found = ss.analyze(machine.with_values(changes))
+    assert found.stable is None
+    with Visit(browser, path) as visit:
+        for name, value in changes.items():
+            visit.type(name, value)
+        assert visit.sentence() == "No steady sliding at 20 µm/s"
+        said = visit.page.locator(".verdict p").first.inner_text().replace("−", "-").lower()
+        assert said == f"{found.reason}.".lower()
+
+
+def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
+    """The edge of what presses is 0 on the page as in Python, and its other side is a lift-off, not a lock-up."""
+    machine = ss.read_rig(MACHINES / "brake-pad.toml")
+    assert next(one for one in ss.analyze(machine).margins if one.parameter == "bodies.pad.press").edge.value == 0
+    ss.explore(machine).save(tmp_path / "pad.html")
+    with Visit(browser, tmp_path / "pad.html") as visit:
+        assert "bodies.pad.press → 0 N" in visit.page.locator(".edges button").all_text_contents()
+        visit.type("bodies.pad.press", "-1 N")
+        assert visit.page.locator(".verdict p").first.inner_text().startswith("Lift-off at contact disc.")

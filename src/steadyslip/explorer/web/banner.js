@@ -8,7 +8,7 @@ import { asStiffness, headline, kindBeyond, kindOf, machineReason, reason } from
 const DECADE = Math.log(10); // on both sides of what is marked
 const ASUNDER = 1e3; // between marks that share a unit
 const TOLD_OF = 3; // contacts in a sentence
-const LETTER = 7.4; // width of one on the bar
+const WIDTH = 7.4; // of a letter on the bar
 
 /** Marks or labels of a bar: class, place in per cent and text; only what is new is written. */
 function placed(box, rows, name) {
@@ -129,7 +129,7 @@ export class Banner {
   fitted(labels) {
     const wide = this.page.wide, taken = /** @type {[number, number][]} */ ([]);
     return labels.flatMap(([kind, at, text]) => {
-      const half = Math.min(50, (50 * LETTER * text.length) / wide), place = Math.min(100 - half, Math.max(half, at));
+      const half = Math.min(50, (50 * WIDTH * text.length) / wide), place = Math.min(100 - half, Math.max(half, at));
       if (taken.some(([from, to]) => place + half > from && place - half < to)) return [];
       taken.push([place - half, place + half]);
       return [[kind, place, text]];

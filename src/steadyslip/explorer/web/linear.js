@@ -123,7 +123,7 @@ export class Linear {
   assess(branch = 0) {
     const { facts, R, count } = this, status = this.status(branch);
     const answer = { status, sigma: R[count], sigmas: Array.from(R.subarray(count)) };
-    if (status === ABSENT || status === UNKNOWN) return { ...answer, ...this.absence(status), ...NOTHING };
+    if (status === ABSENT || status === UNKNOWN) return { ...answer, ...NOTHING, ...this.absence(status) };
     const degree = facts.degree, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1, eigenvalues = roots(c);
     const { p, q, own, gain, share, intervals, ends } = this.varied(c, branch), [statics] = this.ask("statics", 1);
     const critical = ends.length ? ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a)) : null;
@@ -154,7 +154,7 @@ export class Linear {
     if (joint) {
       this.programs.steady(R, 0, y);
       const gain = this.gain(), least = contacts.reduce((best, _, i) => (R[count + i] < R[count + best] ? i : best), 0);
-      return { contact: least, gain, load: R[count + least] };
+      return { contact: least, pressing: gain, load: R[count + least] };
     }
     const i = contacts.findIndex((_, n) => !(R[count + n] > 0));
     if (searched[i]) return { contact: i, searched: true };

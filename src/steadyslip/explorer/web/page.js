@@ -289,7 +289,7 @@ export class Page {
     for (let n = 1; n <= PARTS; n++) {
       const high = scale.at(n / PARTS), next = this.rig.status(i, high);
       if (next !== before) {
-        const narrowed = this.rig.narrowed(i, low, high), own = this.rig.data.parameters[i], zero = low < 0 && Math.abs(narrowed) < ROUNDED * Math.max(Math.abs(own.value), own.natural);
+        const narrowed = this.rig.narrowed(i, low, high), own = this.rig.data.parameters[i], zero = (own.low === null || own.low < 0) && Math.abs(narrowed) < ROUNDED * Math.max(Math.abs(own.value), own.natural);
         const at = zero ? 0 : narrowed, to = scale.of(at);
         parts.push({ from, to, at, status: before });
         [from, before] = [to, next];
@@ -320,7 +320,7 @@ export class Page {
 
   /** Eigenvalues at other values of what the bar shows, where they follow from no formula: over its range, and at its edges. */
   others() {
-    const { rig } = this, i = rig.bar, at = (value) => rig.set(this.with(i, value)).roots(rig.data.branch), scale = this.scale(i), many = this.sliding ? OTHERS / 2 : OTHERS;
+    const { rig } = this, i = rig.bar, at = (value) => rig.set(this.with(i, value)).roots(rig.data.branch), scale = this.scale(i), many = this.sliding ? OTHERS / 4 : OTHERS;
     return { along: Array.from({ length: many }, (_, n) => at(scale.at((n + 0.5) / many))), beyond: this.tracks[i].slice(0, -1).map((part) => at(part.at)) };
   }
 

@@ -9,6 +9,8 @@ import { NEW } from "./rig.js";
  * @typedef {{scale: Scale, range: [number, number], logarithmic: boolean}} Span
  */
 
+const LETTER = 7.5, MARGIN = 40; // width of one in a label, and how much longer than its axis that may be
+
 /** Round numbers between two, positions of ticks. */
 export function ticks(low, high, logarithmic, most) {
   const found = [];
@@ -46,7 +48,10 @@ export function axis(box, scale, [low, high], one, label, upright) {
       svg("text", { x: upright ? x - 6 : x, y: upright ? y + 4 : y + 16, "text-anchor": upright ? "end" : "middle" }, digits(value, logarithmic ? 3 : many)),
     );
   }
-  const text = name ? `${label} (${name})` : label;
+  let own = label;
+  const whole = () => (name ? `${own} (${name})` : own);
+  while (whole().length * LETTER > length + MARGIN && own.includes(".")) own = own.slice(own.indexOf(".") + 1); // a long name is told by its end
+  const text = whole();
   const where = upright ? { transform: `translate(13 ${box.top + box.height / 2}) rotate(-90)` } : { x: box.left + box.width / 2, y: box.top + box.height + 34 };
   group.append(svg("text", { ...where, "text-anchor": "middle", class: "label" }, text));
   return group;

@@ -64,7 +64,7 @@ export function machineReason(answer, { phrases, facts, areas }, edge) {
     const { absent } = phrases, at = fill(absent.at, { name: facts.contacts[answer.contact] }), area = areas[answer.contact] < 0 ? 1 : answer.own[areas[answer.contact]];
     const force = (stress) => shown(stress * area, "N");
     if (answer.searched) return sentence(fill(absent["no solution"], { force: "force", at }));
-    if (answer.gain !== undefined) return sentence(answer.gain < 1 ? fill(absent.lifted, { at, left: force(answer.load) }) : fill(absent.together, { at, margin: digits(1 - answer.gain) }));
+    if (answer.pressing !== undefined) return sentence(answer.pressing < 1 ? fill(absent.lifted, { at, left: force(answer.load) }) : fill(absent.together, { at, margin: digits(1 - answer.pressing) }));
     if (!(answer.slope < 1)) return sentence(fill(absent["lock-up"], { at, margin: digits(1 - answer.slope) }));
     return sentence(fill(absent["lift-off"], { at, force: "force", load: force(answer.had), taken: force(answer.had - answer.load), left: force(answer.load) }));
   }
@@ -77,7 +77,7 @@ export function machineReason(answer, { phrases, facts, areas }, edge) {
 /** What kind of change an edge is, by what is behind it. @param {any} answer there */
 export function kindBeyond(answer) {
   if (answer.status === STABLE) return "stable";
-  if (answer.status === ABSENT) return answer.searched ? "no solution" : (answer.gain ?? answer.slope) < 1 ? "lift-off" : "lock-up";
+  if (answer.status === ABSENT) return answer.searched ? "no solution" : (answer.pressing ?? answer.slope) < 1 ? "lift-off" : "lock-up";
   return answer.illPosed ? "ill-posed" : answer.eigenvalues[0]?.im ? "oscillatory" : "divergence";
 }
 

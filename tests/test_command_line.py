@@ -87,6 +87,22 @@ def test_bad_input_is_one_message_and_status_2(arguments, words):
     assert done.stdout == ""
 
 
+def test_answers_come_in_the_units_of_the_file(tmp_path):
+    text = EXAMPLE.read_text(encoding="utf-8")
+    own = tmp_path / "rig.toml"
+    own.write_text(text.replace('"5 MPa"', '"50 bar"').replace('"9 GPa/m"', '"90 bar/mm"'), encoding="utf-8")
+    told = run("analyze", own).stdout
+    assert "critical stiffness 290.7 bar/mm" in told
+    assert "normal stress 166.7 bar" in told
+    assert "slider.damping                0 Pa s/m" in told
+    assert "critical stiffness 29.07 GPa/m" in run("analyze", EXAMPLE).stdout
+    found, same = (json.loads(run("analyze", rig, "--json").stdout) for rig in (own, EXAMPLE))
+    assert found.pop("reason") != same.pop("reason")
+    assert found == same
+    own.write_text(text.replace('"5 MPa"', '"50 bar"') + 'x = "1 MPa"', encoding="utf-8")
+    assert "unknown key 'x'" in run("analyze", own).stderr
+
+
 def test_formula_schema_version():
     assert "k_cr = " in run("analyze", EXAMPLE, "--formula").stdout
     without = run("analyze", EXAMPLE, "--formula", "--set", "friction.normal_memory.law=prakash-clifton")

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-RigFile = Annotated[Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'")]
+
+def _speak(context: typer.Context, rig: Path) -> Path:
+    """Answer in the units of the file."""
+    from steadyslip.core.errors import ParameterError
+    from steadyslip.core.quantities import told_in
+    from steadyslip.files.specifications.read import text_of
+    from steadyslip.files.specifications.written import units_of
+
+    with suppress(ParameterError):  # whoever reads the rig says what is wrong with the file
+        context.with_resource(told_in(units_of(text_of(rig))))
+    return rig
+
+
+RigFile = Annotated[
+    Path, typer.Argument(metavar="RIG", help="rig file (TOML); see 'steadyslip schema'", callback=_speak)
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from fractions import Fraction
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,6 +69,8 @@ for _base, _dimension in _PREFIXED.items():
     _TABLE[_base] = (1.0, _dimension)
     for _letter, _factor in _PREFIX.items():
         _TABLE.setdefault(_letter + _base, (_factor, _dimension))
+_PLAIN_WORDS = {"1", "kg", "rad", *_PREFIXED}
+_PREFIXABLE = _PLAIN_WORDS | {prefix + base for base in _PREFIXED for prefix in _PREFIX}
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
 _TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
@@ -362,6 +367,34 @@ def _times(value: float | None, factor: float) -> float | None:
     return value * factor if value is not None and math.isfinite(value * factor) else None
 
 
+_own: ContextVar[Mapping[Dimension, str]] = ContextVar("own units", default=MappingProxyType({}))
+
+
+@contextmanager
+def told_in(names: Iterable[str]) -> Iterator[None]:
+    """Tell people quantities in units of their own, such as rpm, bar or N/um, where these are one for a dimension.
+
+    Units with a prefix in front alone, such as kN or um/s, are no reason: they are told as reads best in any case.
+
+    >>> with told_in(["rpm", "kN", "MPa", "bar", "N/um"]):
+    ...     shown(10.0, "rad/s"), shown(2e4, "N"), shown(2e5, "Pa"), shown(12e6, "N/m")
+    ('95.49 rpm', '20 kN', '200 kPa', '12 N/um')
+    """
+    found: dict[Dimension, set[str]] = {}
+    for name in names:
+        found.setdefault(unit(name)[1], set()).add(name)
+    alone = {dimension: own for dimension, several in found.items() for own in several if len(several) == 1}
+    own = {
+        dimension: name for dimension, name in alone.items()
+        if any(word not in _PREFIXABLE or (word not in _PLAIN_WORDS and power < 0) for word, power in _factors(name))
+    }  # fmt: skip
+    before = _own.set(own)
+    try:
+        yield
+    finally:
+        _own.reset(before)
+
+
 _SHOWN_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
 
@@ -390,6 +423,9 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
+    own = _own.get().get(unit(si_unit)[1])
+    if own is not None and (value == 0 or 1e-3 <= abs(value / unit(own)[0]) < 1e5):
+        return f"{_few(value / unit(own)[0], digits)} {own}"
     if si_unit == "rad":
         return f"{_few(value / units.deg, digits)} deg"
     if si_unit == "m/rad":

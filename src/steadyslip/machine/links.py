@@ -94,7 +94,7 @@ class Screw(Link, name="screw"):
 
     turning: ClassVar[tuple[bool | None, bool | None]] = (True, False)
 
-    lead: float = parameter("m/rad", positive, "travel for one radian, such as '5 mm/rev'")
+    lead: float = parameter("m/rad", positive, "travel for an angle, such as '5 mm/rev'")
     stiffness: float | None = parameter("N/m", positive, "stiffness k along the slide", default=None, kind="stiffness")
     damping: float = parameter("N s/m", nonnegative, "damping c along the slide", default=0.0, structural=True)
 

@@ -155,6 +155,11 @@ def written(text: str, rig: Slider | Machine, names: Sequence[str]) -> Written |
     return whole if _comes_back(whole, own, names) else Written((), given, {})
 
 
+def units_of(text: str) -> set[str]:
+    """All units that a file writes behind numbers."""
+    return {place.unit for place in _places(text) if place.unit}
+
+
 def _places(text: str) -> list[Place]:
     """Every number of a text that a key is given, bare or with a unit in quotes."""
     found = []

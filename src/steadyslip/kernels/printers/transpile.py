@@ -1,6 +1,6 @@
 """Modules of the driver as JavaScript: a small part of Python, written anew from its syntax tree.
 
-The part is what numba compiles as it stands: numbers, arrays that are indexed, functions of positional arguments,
+The part is what `native` compiles: numbers, arrays that are indexed, functions of positional arguments,
 ``for`` over a range, ``while``, ``if``. Everything else is refused by module and line, so that a driver that grows
 beyond it fails where it is generated and not in a browser. Arrays of several indices are nested, the innermost are
 typed; there is one lane.

@@ -130,3 +130,29 @@ def test_the_verdict_tells_kicks_of_bodies():
         ss.analyze(two_mass(kp=1.0), kick="force")
     with pytest.raises(ss.NotAvailable, match="one steady sliding"):
         ss.analyze(two_mass(), branch=1)
+
+
+def test_the_contact_that_a_kick_lifts_off_is_named():
+    """A block on two surfaces that its spring lifts: the lighter pressed one goes first."""
+    away = ss.InclinedSpring(steady_normal_stress=0.2, angle=0.5)
+    machine = ss.Machine(
+        bodies={"block": ss.SlidingBody(mass=1.0)},
+        links={"spring": ss.Spring(between=("drive", "block"), stiffness=4.0, damping=1.0)},
+        contacts={
+            "base": surface("block", ss.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0)),
+            "rail": ss.Surface(
+                body="block", friction=ss.RateState(a=0.5, b=0.4, d_c=1.0, mu_ref=0.6, v_ref=1.0), contact=away
+            ),
+        },
+        drive=ss.Pull(velocity=1.0),
+    )
+    assert ss.steady_state(machine).contacts["rail"].normal_force == pytest.approx(0.2)  # given, whatever the base rubs
+    pressed = 0.6 * np.tan(0.5)  # friction that the spring's pull takes from the rail
+    for s in ss.eigenvalues(machine):  # theory 11, typed: m = c = r = 1, k = 4, f and S of both surfaces together
+        pull = 4.0 + s
+        terms = np.array([s**2, pull, s * (0.6 * s + 0.12) / (s + 1), pressed * pull])
+        assert abs(terms.sum()) < 1e-9 * np.abs(terms).sum()
+    found = ss.threshold(machine, "impulse", at="block", direction=-1, precision=COARSE)
+    assert (found.outcome, found.contact) == ("contact lost", "rail")
+    assert str(found).endswith("beyond: contact lost at rail")
+    assert found.to_dict()["contact"] == "rail"

@@ -68,7 +68,8 @@ def steady_equation(model: Model, place: int | None = None) -> SteadyEquation:
     residual = ArrayFunction([*arguments, sigma], [contact.steady_stress - sigma])
     if not affine:
         return SteadyEquation(False, given, residual)
-    offset = contact.steady_coupling.xreplace({sigma: sp.Integer(0)})
+    # others are in it only where the stress is given, and the coupling counts from its steady value
+    offset = contact.steady_coupling.xreplace(dict.fromkeys({sigma, *others}, sp.Integer(0)))
     parts = ArrayFunction(arguments, [load, offset, slope])
     solved = load if given else (load + offset) / (1 - slope)
     return SteadyEquation(True, given, residual, parts, solved, slope)

@@ -406,8 +406,15 @@ def _settled(
         if not np.any(~settled & np.isfinite(size)):
             break
     slides = good & settled & (slowest[:, 0] > 0)
-    pressed = np.all(_columns(point.evaluate(_normal_of(reduction), *inputs, *state.T, unknown), count) > 0, axis=1)
+    pressed = np.all(normal_stresses(here, state, unknown) > 0, axis=1)
     return np.where((slides & pressed)[:, None], state, np.nan), unknown
+
+
+def normal_stresses(rest: Rest, state: Array, unknown: Array) -> Array:
+    """Of every contact, at states (m, n), one for each rig: (m, contacts)."""
+    inputs = rest.velocity, rest.force, rest.pressure
+    found = rest.point.evaluate(_normal_of(rest.reduction), *inputs, *state.T, unknown)
+    return _columns(found, len(state))
 
 
 @question

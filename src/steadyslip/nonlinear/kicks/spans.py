@@ -22,7 +22,7 @@ from steadyslip.protocol import Segments
 Array = np.ndarray
 DOUBTS = (
     "neither near steady sliding nor on a cycle that was found when its longest time was over",
-    "the steps of integration allowed for one motion are used up",
+    "the steps of integration allowed for one motion are used up, as where something rings on almost undamped",
     "the steps of integration allowed for all motions together are used up",
     "the integrator came to where it cannot go on",
     "no neighbourhood of steady sliding was found, so that a return cannot be told",

@@ -12,19 +12,23 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, total
+from steadyslip.kernels.runner import STATUSES
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import beyond_range
 from steadyslip.model.sliding import steady_state, steady_states
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
+from steadyslip.nonlinear.kicks.rest import normal_stresses
 from steadyslip.nonlinear.kicks.spans import (
     CERTAIN,
+    CONTACT_LOST,
     INTERRUPTED,
     LATE,
     OUTCOMES,
     RETURNS,
     UNDECIDED,
     StepBudget,
+    advanced_runs,
     doubt_of,
 )
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
@@ -75,6 +79,8 @@ class Threshold(Displayed):
         The lower end of the bracket in SI units, as `amount`: all smaller kicks that were tried return.
     at : str
         Of a machine: the body or contact that is kicked; empty for its drive.
+    contact : str
+        Of a machine, where contact is lost beyond: which; else empty.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -92,6 +98,7 @@ class Threshold(Displayed):
     doubt: str = ""
     survived: float = np.nan
     at: str = ""
+    contact: str = ""
 
     @property
     def area(self) -> float | None:
@@ -101,6 +108,7 @@ class Threshold(Displayed):
     def __str__(self) -> str:
         what = f"{self.kick} kick" + (f" at {self.at}" if self.at else "")
         low, high = self.bracket
+        where = f" at {self.contact}" if self.contact else ""
         if self.size == 0:
             return f"{what}: none survived, steady sliding is unstable"
         if np.isinf(self.size):
@@ -109,9 +117,11 @@ class Threshold(Displayed):
             return f"{what}: stopped before anything was found"
         if np.isnan(self.size):
             beyond = "stopped there" if self.interrupted else f"undecided beyond ({self.doubt})"
+            if low == 0 and not self.interrupted:
+                return f"{what}: undecided from the smallest that was tried on ({self.doubt})"
             return f"{what}: all that were tried are survived up to size {low:.4g}; {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
-        after = self.outcome if self.outcome != "undecided" else f"undecided ({self.doubt})"
+        after = self.outcome + where if self.outcome != "undecided" else f"undecided ({self.doubt})"
         amount = shown(self.amount, self.unit, 7, self.area)
         if self.decided:
             return (
@@ -140,6 +150,7 @@ class Threshold(Displayed):
             "survived": plain(self.survived),
             "unit": self.unit,
             "outcome": self.outcome,
+            **({"contact": self.contact} if self.contact else {}),
             "searched": self.searched,
             "edge": self.edge,
             "decided": self.decided,
@@ -334,10 +345,25 @@ class _Search:
         amount, survived = (float(kicked.amount(s)[0]) if np.isfinite(s) else s for s in (size, low))
         doubt = doubt_of(self.doubt) or doubt_of(self.outcome)
         word = "" if self.outcome == RETURNS else OUTCOMES[self.outcome]
+        contact = lost_contact(kicked, high) if self.outcome == CONTACT_LOST and np.isfinite(high) else ""
         return Threshold(
             rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.unit_name, word, kicked.highest,
-            self.at_edge, decided and not self.interrupted, self.interrupted, doubt, survived, kicked.at,
+            self.at_edge, decided and not self.interrupted, self.interrupted, doubt, survived, kicked.at, contact,
         )  # fmt: skip
+
+
+def lost_contact(kicked: Kicked, size: float) -> str:
+    """The contact of a machine that lifts off after a kick, that least pressed at the end; empty where none is seen."""
+    one = np.zeros(1, dtype=int)
+    runs = kicked.runs(one, np.array([size]), PATIENCE)
+    names = [contact.name for contact in runs.rest.reduction.model.contacts]
+    if len(names) == 1:  # of a slider it has no name
+        return names[0]
+    ended = advanced_runs(runs, one, None, runs.times()[1])
+    if ended.status[0] != STATUSES.index("contact lost") or not np.all(np.isfinite(ended.state)):
+        return ""
+    pressed = normal_stresses(runs.rest, ended.state, ended.unknown)[0] / np.stack(runs.rest.sigmas, axis=1)[0]
+    return names[int(np.argmin(pressed))]
 
 
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:

@@ -208,13 +208,13 @@ def greedy(n: int) -> int:
     own = np.zeros((n, 1000))
     for i in range(n):
         own[i, 999] = 1.0
-        if i > 5:
+        if i > 900:
             return i
     return int(own[0, 999])
 """
     resource = pytest.importorskip("resource")
     greedy = compiled(text, "greedy", ["int"])
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for _ in range(400):
-        assert greedy(1000) == 6
+    for _ in range(40):
+        assert greedy(1000) == 901
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000, "kB"

@@ -15,6 +15,7 @@ from explored import Explored, compared, library
 from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
+from steadyslip.core.quantities import parse, unit
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part
@@ -251,6 +252,54 @@ def test_links_and_files_keep_every_digit(page_of_own, a, k, psi):
     again = ss.rig_from_text(text)
     assert again == own
     np.testing.assert_array_equal(ss.critical_stiffness(again), ss.critical_stiffness(own))  # NaN where there is none
+
+
+WRITTEN = """[friction]   # written by hand
+law = "rate-state"
+a = 0.0145
+b = 1.6e-2           # 0.0145 + 0.0015
+d_c = "1e-3 mm"
+mu_ref = 0.7
+v_ref = "3.6 mm/h"
+[contact]
+law = "inclined-spring"
+preload = 6000
+angle = "-28.6 deg"
+[slider]
+stiffness = "9 N/um"
+area = "20 cm^2"
+[drive]
+velocity = "86.4 mm/day"
+"""
+
+
+@pytest.fixture(scope="module")
+def page_of_user():
+    """The same of a user's file, in units of all kinds."""
+    own = ss.rig_from_text(WRITTEN)
+    code, known = parts(own, "A rig", 0, WRITTEN)
+    return Script(f"{code}\nconst known = {json.dumps(known)};\nconst rig = new Rig(known, programs);"), known, own
+
+
+VARIED = [f"friction.{name}" for name in ("a", "d_c", "v_ref")]
+VARIED += ["contact.preload", "contact.angle", "slider.stiffness", "drive.velocity"]
+SI = {"mm/day": "m/s", "N/um": "N/m", "deg": "rad", "cm^2": "m^2", "rpm": "rad/s", "mm/rev": "m/rad"}
+
+
+@settings(max_examples=60, deadline=None)
+@given(share=st.floats(0.5, 2), names=st.sets(st.sampled_from(VARIED)))
+def test_files_of_users_keep_every_digit_and_every_word(page_of_user, share, names):
+    """What has not changed stands there as it stood; what has, reads as it is on the page; so does what is typed."""
+    script, known, own = page_of_user
+    changed = own.with_values({name: share * own.value(name) for name in names})
+    values = [float(changed.value(one["name"])) for one in known["parameters"]]
+    text = script("(rig.values = values, rig.toml())", values=values)
+    assert ss.rig_from_text(text) == changed
+    for old, new in zip(WRITTEN.splitlines(), text.splitlines(), strict=True):
+        assert old == new or (old.split(" = ")[0] == new.split(" = ")[0] and old.split("#")[1:] == new.split("#")[1:])
+    typed = f"{share:.5g}"
+    for name, si in SI.items():
+        assert script("exactly(typed, size)", typed=typed, size=unit(name)[0]) == parse(f"{typed} {name}", si)
 
 
 # -- drawings

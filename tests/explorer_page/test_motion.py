@@ -162,11 +162,13 @@ def test_the_run_of_a_page_is_one_of_the_command_line(browser, moved, tmp_path):
         told = visit.told("slip event")
         visit.page.locator(".motion .hint", has_text="pull on the block").wait_for()
         told, block = visit.page.inner_text(".told"), visit.page.locator(".motion pre").text_content()
+        when = re.match(r"At ([\d.]+) s ", visit.page.inner_text(".motion .hint"))[1]
     ss.write_rig(MOVED, tmp_path / "rig.toml")
     (tmp_path / "rig.toml").write_text(
         (tmp_path / "rig.toml").read_text(encoding="utf-8") + "\n" + block, encoding="utf-8"
     )
     protocol = ss.read_protocol(tmp_path / "rig.toml")
+    assert f"{protocol.pieces[0].at:.4g}" == when
     run = ss.simulate(ss.read_rig(tmp_path / "rig.toml"), protocol, rtol=1e-6)
     assert told.startswith(f"{len(run.slip_events)} slip events")
     assert f"{run.slip_events[-1].recurrence:.3g} s apart" in told

@@ -83,6 +83,8 @@ def test_reports_ask_for_nothing_fit_every_width_and_print_without_the_explorer(
             assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
         assert [one for one in visit.requests if not one.startswith(("blob:", "data:"))] == [path.as_uri()]
         assert visit.page.locator(".steadyslip-root").is_visible()
+        cut = "all => all.filter((one) => one.scrollHeight > one.clientHeight).length"
+        assert visit.page.locator(".formula").evaluate_all(cut) == 0, "subscripts are seen"
         visit.page.emulate_media(media="print")
         assert not visit.page.locator(".steadyslip-root").is_visible()
         assert visit.page.get_by_role("heading", name="How far is the edge?").is_visible()

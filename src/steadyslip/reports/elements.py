@@ -43,7 +43,7 @@ STYLE = """
   white-space: pre-wrap; overflow-wrap: anywhere; }
 .steadyslip-told math { font-size: 17px; }
 @supports not (-moz-appearance: none) { .steadyslip-told msub > :last-child { transform: translateY(.18em); } }
-.steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 8px 0; padding: 2px 0; }
+.steadyslip-told .formula { overflow-x: auto; overflow-y: hidden; margin: 6px 0; padding: 4px 0 10px; }
 """
 """Of everything inside an element of class ``steadyslip-told``."""
 

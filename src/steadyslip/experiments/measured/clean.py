@@ -51,8 +51,12 @@ def _stand_in(values: Array) -> float | None:
     return None
 
 
-def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) -> Record:
-    """Rows in order of time, each whole, with a note of every one that is not."""
+def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, any_sign: bool = False) -> Record:
+    """Rows in order of time, each whole, with a note of every one that is not.
+
+    Where columns may be counted with `any_sign`, as files do, compression becomes positive and the load point moves
+    forwards.
+    """
     si, lines = _without_gaps_in_rows(si, lines, notes)
     _check_sizes(si, source, lines)
     if len(lines) >= FEWEST_ROWS:
@@ -60,12 +64,12 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array) -
     if len(lines) < FEWEST_ROWS:
         message = f"{len(lines)} usable rows are left; a record needs {FEWEST_ROWS} or more"
         raise ParameterError([Problem("file", message)], title=source)
-    si = _in_compression(si, notes)
+    si = _in_compression(si, notes) if any_sign else si
     _check_stress(si, source, lines)
     if "friction" not in si:
         si["friction"] = si["shear"] / si["normal"]
         notes.append("friction computed as shear over normal stress")
-    si = _forwards(si, notes)
+    si = _forwards(si, notes) if any_sign else si
     _check_friction(si["friction"], source)
     spacing = np.diff(si["time"])
     usual = float(np.median(spacing))

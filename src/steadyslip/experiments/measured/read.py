@@ -109,7 +109,7 @@ def read_record(
     lines = raw.lines
     if between is not None:
         si, lines = _cut(si, lines, between, notes)
-    return cleaned(si, str(path), [*raw.notes, *notes], lines)
+    return cleaned(si, str(path), [*raw.notes, *notes], lines, any_sign=True)
 
 
 def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Array], int], tuple[Array, str]] | None:

@@ -1,7 +1,9 @@
 """Critical stiffness, stable stiffness, eigenvalues: for one rig or for arrays of any parameters.
 
-Rigs with one memory variable go through the cubic in closed form, all others through the Model's
-characteristic polynomial p(s) + k q(s); the two routes agree to rounding (tests).
+Rigs with one memory variable go through the cubic in closed form, which is fast and keeps its digits where a large mass
+swamps the rest; all others through the Model's characteristic polynomial p(s) + k q(s), split in symbols; what has a
+delay through `linear_sets`, which splits in numbers and serves every parameter that enters linearly. The routes agree
+to rounding (tests).
 """
 
 from __future__ import annotations

@@ -26,6 +26,7 @@ def test_no_stress_is_spoken_of_where_nobody_gave_an_area():
         texts += [str(edge) for edge in found.boundaries]
         for text in texts:
             assert not re.search(r"\b[kMG]?Pa\b", text)
+        assert not [one.role.doc for one in machine.parameters().values() if one.role.doc.startswith("normal stress")]
     (row,) = [r for r in ss.analyze(AXIS).to_dict()["boundaries"] if r["parameter"].endswith("preload")]
     assert row["unit"] == "N"
     assert row["value"] == pytest.approx(11105.535448629415)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import html
 import inspect
 import re
 from html.parser import HTMLParser
@@ -239,15 +240,18 @@ def test_a_machine_has_a_report():
     assert text.count(" 1/s ") == sum(s.imag >= 0 for s in analysis.eigenvalues)
     assert "Explorer" not in text
     assert words(ss.report(analysis).html).replace(" ", "").startswith(text.replace(" ", "")[:400])
-    with pytest.raises(ss.NotAvailable, match="takes no branch, fit or tolerances"):
-        ss.report(machine, tolerances={"drive.velocity": "5 %"})
+    within = words(ss.report(machine, tolerances={"drive.velocity": "5 %"}, explorer=False).html)
+    assert "growth rate" in within
+    assert "growth rate" not in text
 
 
 @pytest.mark.usefixtures("unpainted")
 def test_the_command_reports_on_machines_and_explores_them(tmp_path):
     answered = run("report", MACHINES / "brake-pad.toml", "-o", tmp_path / "report.html")
     assert answered.returncode == 0, answered.stderr
-    assert "brake-pad" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    own = (MACHINES / "brake-pad.toml").read_text(encoding="utf-8")
+    told = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert html.escape(own) in told  # its comments and units, and nothing rewritten
     explored = run("explore", MACHINES / "brake-pad.toml", "-o", tmp_path / "page.html")
     assert explored.returncode == 0, explored.stderr
     assert "contacts.disc.contact.normal_stiffness" in (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -450,6 +454,7 @@ def test_the_command_writes_a_report(tmp_path):
     assert "<title>my rig – steadyslip</title>" in text
     assert "Stable: steady sliding" in text
     assert hashlib.sha256((tmp_path / "my rig.toml").read_bytes()).hexdigest() in text
+    assert "stiffness = 90000000000.0" in text  # not what the file says
     refused = run("report", tmp_path / "my rig.toml", "-o", tmp_path / "report.pdf")
     assert refused.returncode == 2
     assert ".html" in refused.stderr

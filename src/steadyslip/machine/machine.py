@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import Problem, unknown_name
-from steadyslip.core.quantities import is_per_area, total_unit
+from steadyslip.core.quantities import is_per_area, stress_name, total_unit
 from steadyslip.core.records import Address, Condition, Members, members, part
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.ends import unnamed
@@ -213,7 +213,8 @@ class Machine(Rig):
     def _in_forces(self, one: Address) -> Address:
         if not one.name.startswith("contacts.") or self.area_of(one.name) or not is_per_area(one.role.unit):
             return one
-        return replace(one, role=replace(one.role, unit=total_unit(one.role.unit)))
+        doc = stress_name(one.role.doc, 1.0)
+        return replace(one, role=replace(one.role, unit=total_unit(one.role.unit), doc=doc))
 
     # -- how it is assembled
 

@@ -36,7 +36,7 @@ _BY_UNIT = {
     "Pa s/m": "f S",
     "kg/m^2": "m",
     "rad/s": "angular_frequency critical_angular_frequency",
-    "1/s": "eigenvalue eigenvalues growth_rate coefficient r",
+    "1/s": "eigenvalue eigenvalues growth_rate growth coefficient r",
     "m^2": "area",
     "N": "normal_force friction_force force_drop pull",
 }
@@ -49,7 +49,7 @@ PLAIN = frozenset(
     residuals
     seen worth errors first second first_interval total_interval total missing spacing edge correlation
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
-    sides conditions amplitudes energy speeds links characteristic_terms unstable_roots""".split()  # noqa: SIM905 -- a list of words
+    sides conditions amplitudes energy speeds links steady characteristic_terms unstable_roots""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _NOT_SHOWN = frozenset(

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from steadyslip.core.errors import NotAvailable, RigFileError
+from steadyslip.core.errors import NotAvailable, ParameterError, RigFileError
 from steadyslip.explorer.assembly import document, fragment, style
-from steadyslip.files.specifications.read import text_of
+from steadyslip.files.specifications.read import protocol_of, rig_from_text, text_of
 from steadyslip.files.standalone import Standalone
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.protocol import Protocol
 from steadyslip.reports.elements import STYLE, heading, listing, paragraph, table, typed
 
 _PAGE = """
@@ -81,7 +82,7 @@ def put_together(parts: Parts, title: str, explorer: bool, source: Path | None) 
         '<article class="report steadyslip-told" role="region" aria-label="report">'
         f'<p class="kind">{typed(title)}</p><h1>{typed(parts.headline)}</h1>'
         f"{paragraph(parts.lead, 'lead') if parts.lead else ''}{heading('The question')}{paragraph(parts.question)}"
-        f"{''.join(parts.body)}{_provenance(parts.text, source)}{still}"
+        f"{''.join(parts.body)}{_provenance(_listed(parts, source), source)}{still}"
         f'<div class="on-screen">{shown}</div></article>\n'
     )
     return document(f"{title} – steadyslip", _PAGE + STYLE + (style() if live else ""), article + live)
@@ -93,6 +94,21 @@ def _text_of(source: Path | None) -> str:
         return "" if source is None or source.suffix != ".toml" else text_of(source)
     except RigFileError:
         return ""
+
+
+def _listed(parts: Parts, source: Path | None) -> str:
+    """The file that gives this rig again: the user's own where it is the whole of it, with its comments and units."""
+    own = _text_of(source)
+    try:
+        same = own and parts.text and _meant(own) == _meant(parts.text)
+    except ParameterError:  # as of a rig with a law that no file can name
+        same = False
+    return own if same else parts.text
+
+
+def _meant(text: str) -> tuple[Slider | Machine, Protocol | None]:
+    """What a file says, however it is written."""
+    return rig_from_text(text), protocol_of(text, "rig", ())
 
 
 def _provenance(text: str, source: Path | None) -> str:

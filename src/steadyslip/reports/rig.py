@@ -75,7 +75,12 @@ def inputs(rig: Slider) -> str:
             continue
         known = letter(symbols[name]) if name in symbols else Markup("")
         rows.append(
-            (name, known, shown(one.value, one.role.unit, 6, rig.area_of(name)), stress_name(one.role.doc, rig.area))
+            (
+                name,
+                known,
+                shown(one.value, one.role.unit, 6, rig.area_of(name)),
+                stress_name(one.role.doc, rig.area_of(name)),
+            )
         )
     return table(rows, ("parameter", "letter", "value", "meaning"))
 

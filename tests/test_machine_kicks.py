@@ -155,3 +155,15 @@ def test_the_contact_that_a_kick_lifts_off_is_named():
     assert (found.outcome, found.contact) == ("contact lost", "rail")
     assert str(found).endswith("beyond: contact lost at rail")
     assert found.to_dict()["contact"] == "rail"
+
+
+def test_steady_sliding_is_found_where_rounding_moves_an_integral():
+    """The controller of the telescope integrates a place so small that its last digits move the integral by 4e-8."""
+    from pathlib import Path
+
+    from steadyslip.nonlinear.kicks.kicks import Kicked
+
+    telescope = ss.read_rig(Path(__file__).parent.parent / "examples" / "machines" / "telescope.toml")
+    kicked = Kicked(telescope, "velocity", 1, "before", {}, 0, None)
+    found = np.sort_complex(kicked.rest.roots[0])
+    np.testing.assert_allclose(found, np.sort_complex(ss.eigenvalues(telescope)), rtol=1e-6)

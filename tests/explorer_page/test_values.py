@@ -26,7 +26,7 @@ def test_values_can_be_typed_with_units_and_taken_back(browser, file):
         assert visit.sentence().startswith("Unstable")
         visit.page.get_by_role("button", name="redo").click()
         assert visit.sentence().startswith("Stable")
-        visit.page.get_by_role("button", name="back to the rig").click()
+        visit.page.get_by_role("button", name="back to the values").click()
         assert visit.sentence().startswith("Unstable")
 
 
@@ -38,7 +38,7 @@ def test_sliders_and_the_chart_work_by_keyboard_and_by_pointer(browser, file):
             visit.page.keyboard.press("PageUp")
         assert visit.sentence().startswith("Stable")
         assert "GPa/m" in stiffness.get_attribute("aria-valuetext")
-        visit.page.get_by_role("button", name="back to the rig").click()
+        visit.page.get_by_role("button", name="back to the values").click()
         chart = visit.page.locator("svg[role=application]")
         chart.focus()
         for _ in range(10):
@@ -71,7 +71,7 @@ def test_a_value_far_away_leaves_nothing_behind(browser, file, far):
         visit.type(*far)
         if far[0] == "friction.b":
             assert edges_of(visit)["friction.b"] == before["friction.b"], "edges are exact on every range"
-        for back in ("back to the rig", "undo"):
+        for back in ("back to the values", "undo"):
             visit.page.get_by_role("button", name=back).click()
             if back == "undo":
                 visit.page.get_by_role("button", name=back).click()
@@ -208,7 +208,7 @@ def test_a_refused_entry_says_so_until_it_goes(browser, file):
             assert words in visit.page.inner_text(".fault:not(:empty)")
             assert field.input_value() == wrong
             if wrong == "x":
-                visit.page.get_by_role("button", name="back to the rig").click()
+                visit.page.get_by_role("button", name="back to the values").click()
             else:
                 field.press("Escape")
             assert field.get_attribute("aria-invalid") is None

@@ -1,14 +1,12 @@
 // Steady sliding in numbers, eigenvalues with their locus, and the list of nearest edges.
 import { make, put, svg, tell } from "./dom.js";
 import { BESIDE, REMOTE } from "./edges.js";
-import { ABSENT, STABLE, UNKNOWN, UNSTABLE } from "./linear.js";
+import { ABSENT, UNKNOWN } from "./linear.js";
 import { Locus } from "./locus.js";
 import { words } from "./modes.js";
 import { digits, shown, told } from "./quantities.js";
 import { inside } from "./rig.js";
-import { named, quantity } from "./words.js";
-
-const BECOMES = { [ABSENT]: "no steady sliding", [STABLE]: "becomes stable", [UNSTABLE]: "becomes unstable", [UNKNOWN]: "no such rig" };
+import { beyondWords, named, quantity } from "./words.js";
 
 /** What the marks of the locus mean, beside the mark itself: its path and class. */
 const MARKS = [
@@ -40,9 +38,9 @@ export class Facts {
     this.far = make("details", {}, make("summary", {}), make("ol", { className: "edges" }));
     const head = make("thead", {}, make("tr", {}, ...["growth rate", "oscillation", "size"].map((text) => make("th", { textContent: text, scope: "col" }))));
     this.box = make("section", { className: "facts", "aria-label": "details" },
-      make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: `one parameter changed, the others as they are; press to go ${100 * BESIDE} % to its stable side` }), this.near, this.far),
+      make("div", {}, make("h2", { textContent: "Nearest edges" }), make("p", { className: "hint", textContent: `one parameter changed, the others as they are; press to go ${100 * BESIDE} % to its stable side, or to the one that slides steadily` }), this.near, this.far),
       this.sliding = make("div", {}, make("h2", { textContent: "Steady sliding" }), this.steady),
-      this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas,
+      this.swings = make("div", {}, make("h2", { textContent: "Eigenvalues" }), make("p", { className: "hint", textContent: "what becomes of a small disturbance; steady sliding is stable if it dies out in each way" }), make("table", {}, head, this.eigenvalues), this.locus.canvas, this.locus.note,
         this.shape = make("p", { className: "mode" }), legend()));
   }
 
@@ -73,7 +71,7 @@ export class Facts {
       go.addEventListener("click", () => {
         if (inside(one, edge.landing)) page.change(page.with(edge.i, edge.landing));
       });
-      return make("li", {}, go, ` ${BECOMES[edge.beyond]}`);
+      return make("li", {}, go, ` ${beyondWords(edge, page)}`);
     });
     const found = page.edges(), far = found.filter((edge) => edge.far);
     this.near.replaceChildren(...rows(found.filter((edge) => !edge.far)));

@@ -1,5 +1,5 @@
 // Eigenvalues in the complex plane, and how they move with the stiffness.
-import { put, svg } from "./dom.js";
+import { make, put, svg, tell } from "./dom.js";
 import { axis, straight } from "./plot.js";
 import { roots } from "./polynomials.js";
 
@@ -29,6 +29,7 @@ export class Locus {
     this.decays = svg("path", { class: "own" });
     this.grows = svg("path", { class: "own grows" });
     this.half = 0;
+    this.note = make("p", { className: "hint" });
   }
 
   /** @param {any} answer @param {{along: any[], beyond: any[]}} [others] eigenvalues at other values, where p + k q has none */
@@ -52,6 +53,7 @@ export class Locus {
     put(this.decays, "d", drawn(eigenvalues.filter((s) => !(s.re > 0)), cross));
     put(this.grows, "d", drawn(eigenvalues.filter((s) => s.re > 0), cross));
     const seen = eigenvalues.filter(shows).length;
+    tell(this.note, seen < eigenvalues.length ? `${eigenvalues.length - seen} of ${eigenvalues.length} are further out than the picture` : "");
     put(this.canvas, "aria-label", `eigenvalues in the complex plane, ${seen} of ${eigenvalues.length} in view; dots: as what the bar shows rises`);
   }
 

@@ -55,7 +55,7 @@ export class Motion {
   refusal(disturbance) {
     if (disturbance === "push" && this.ask("dashpot", 1)[0] !== 0) return "a sudden push through a dashpot is an infinite force";
     if (disturbance === "blow" && !Object.keys(this.facts.shares.blow).length) return "a blow needs a mass: without it the block takes any velocity at once";
-    if (!this.scales.posed) return "the motion is ill-posed here";
+    if (!this.scales.posed) return "the equations of this page do not hold at these values, as where a mass is set to zero; steadyslip simulate writes them anew";
     if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";
     return "";
   }

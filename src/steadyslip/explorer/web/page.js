@@ -142,7 +142,7 @@ export class Page {
     this.redoButton = button("↷", "redo", () => this.step(this.future, this.past));
     const { title, version, parameters } = this.rig.data;
     this.tools = make("div", { className: "tools", role: "toolbar", "aria-label": "page" }, this.undoButton, this.redoButton,
-      button("reset", "back to the rig of the file", () => {
+      button("reset", "back to the values of the file", () => {
         parameters.forEach((_, i) => this.controls.forget(i));
         this.put(parameters.map((one) => one.value));
         this.controls.show();

@@ -81,13 +81,20 @@ export function kindBeyond(answer) {
   return answer.illPosed ? "ill-posed" : answer.eigenvalues[0]?.im ? "oscillatory" : "divergence";
 }
 
+/** What happens beyond an edge; where nothing slides steadily there, why. @param {any} edge @param {any} page */
+export function beyondWords({ i, beyond, behind }, page) {
+  if (beyond === STABLE) return "becomes stable";
+  if (beyond === ABSENT) return { "lift-off": "it lifts off", "lock-up": "it locks up", "no solution": "steady sliding ceases to exist" }[kindBeyond(page.rig.assess(page.with(i, behind)))];
+  return page.rig.status(i, page.rig.values[i]) === ABSENT ? "slides steadily, but unstable" : "becomes unstable";
+}
+
 /** How many times something is something else: with as many digits as tell it from once. */
 const ratio = (many) => digits(many, Math.min(8, Math.max(3, 1 - Math.floor(Math.log10(Math.abs(many - 1) || 1)))));
 
 /** How a motion ends before its time, where the driver has a word of its own for it. @type {Record<string, string>} */
 const ENDED = {
   "no velocity": "no velocity balances the forces", "contact lost": "the contact is lost, its normal force has fallen to zero",
-  stuck: "no step is small enough, as the equations have no solution beyond", "too many steps": "more steps than a page takes; steadyslip simulate goes on",
+  stuck: "no step is small enough, as the equations have no solution beyond", "too many steps": "more steps than a page takes; ask for a shorter time, or steadyslip simulate, which takes more",
 };
 
 /** A velocity, unless it is so small that nothing moves. @param {number} v @param {number} floor */

@@ -10,6 +10,7 @@ route, killed processes, repeated fits. A run of the whole leaves them out, ``-m
 
 import gc
 import os
+import sys
 from itertools import accumulate
 from pathlib import Path
 
@@ -53,6 +54,14 @@ def pytest_sessionfinish():
     gc.unfreeze()
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(autouse=True)
+def _closed_figures():
+    """What a test leaves open in pyplot does not become a warning in another."""
+    yield
+    if (pyplot := sys.modules.get("matplotlib.pyplot")) is not None:
+        pyplot.close("all")
 
 
 @pytest.fixture

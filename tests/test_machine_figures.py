@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -20,12 +19,6 @@ MACHINES = {path.stem: ss.read_rig(path) for path in EXAMPLES} | {
                                                  delay=0.1)),
     **{f"random {seed}": at_random(seed)[0] for seed in range(12)},
 }  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    plt.close("all")
 
 
 def boxes(ax):

@@ -36,12 +36,6 @@ def maps(tmp_path_factory):
     }  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    matplotlib.pyplot.close("all")
-
-
 def labels(ax):
     return [label.split("\n")[0] for label in ax.get_legend_handles_labels()[1]]
 

@@ -46,7 +46,6 @@ def test_blow_up_is_said_and_clipped():
     assert low < run["v"].min()  # clipped above only: the slow part stays in view
     assert high <= 1e13
     assert any(line.get_xdata()[0] == pytest.approx(run.end) for line in panels[1].lines[1:])
-    matplotlib.pyplot.close("all")
 
 
 def test_phase_plane_shows_the_run_and_steady_states(spiral):

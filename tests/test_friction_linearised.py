@@ -70,8 +70,8 @@ def test_nagata_law(c, v, alpha, regularised, low):
 @given(
     v=st.floats(1e-9, 1e-4),
     sigma0=st.floats(1e3, 1e8),
-    sigma1=st.floats(0, 1e4),
-    viscous=st.floats(0, 100),
+    sigma1=st.just(0.0) | st.floats(1e-9, 1e4),
+    viscous=st.just(0.0) | st.floats(1e-9, 100),
     static=st.floats(0.05, 0.9),
 )
 def test_lugre_closed_forms(v, sigma0, sigma1, viscous, static):

@@ -41,7 +41,7 @@ def value_of(role):
         return (
             whole
             if role.domain.whole
-            else st.floats(max(role.domain.low, 0), min(role.domain.high, 1e6), exclude_min=True)
+            else st.floats(max(role.domain.low, 0), min(role.domain.high, 1e6), exclude_min=True, exclude_max=True)
         )
     if isinstance(role, Named):
         one = record_of(role.family) | (st.lists(NUMBER, max_size=3).map(tuple) if role.listed else st.nothing())

@@ -9,7 +9,7 @@ from machines import same_block, two_mass
 X, V = np.linspace(-6.0, 6.0, 5), np.geomspace(0.1, 30.0, 4)
 
 
-@pytest.mark.parametrize("seed", [7, 1])
+@pytest.mark.parametrize("seed", [7, pytest.param(1, marks=pytest.mark.campaign)])
 def test_a_machine_of_one_body_has_the_basin_of_its_slider(seed):
     """With mass and without, where the first memory variable follows from the velocity."""
     block, machine = same_block(seed)

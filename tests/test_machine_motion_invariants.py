@@ -69,8 +69,13 @@ def test_small_motion_has_the_eigenvalues_of_the_linear_verdict(seed):
 
 
 def test_bodies_without_mass_take_every_form():
-    forms = {slopes_of_motion(at_random(seed)[0])[2].form for seed in range(16)}
-    assert forms >= {"explicit", "eliminated"}
+    forms = (slopes_of_motion(at_random(seed)[0])[2].form for seed in range(16))
+    wanted = {"explicit", "eliminated"}
+    for form in forms:
+        wanted.discard(form)
+        if not wanted:
+            break
+    assert not wanted
 
 
 def test_light_bodies_move_as_those_of_little_mass():

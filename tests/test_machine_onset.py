@@ -84,8 +84,8 @@ def renamed(machine):
     links = {f"l{name}": replace(one, between=ends(one)) for name, one in list(machine.links.items())[::-1]}
     contacts = {f"c{name}": replace(one, body=other[one.body]) for name, one in machine.contacts.items()}
     return ss.Machine(
-        bodies={other[name]: one for name, one in list(machine.bodies.items())[::-1]}, links=links, contacts=contacts,
-        drive=replace(machine.drive, body=other[machine.drive.body]),
+        bodies={other.get(name, name): one for name, one in list(machine.bodies.items())[::-1]}, links=links,
+        contacts=contacts, drive=replace(machine.drive, body=other[machine.drive.body]),
     )  # fmt: skip
 
 

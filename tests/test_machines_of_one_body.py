@@ -148,7 +148,7 @@ def short(kind):
     return replace(slider, mass=1e10), machine.with_values({"bodies.block.mass": 1e10})
 
 
-@pytest.mark.parametrize("kind", SHORT)
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=[pytest.mark.campaign] * (k == "late pid")) for k in SHORT])
 def test_a_slider_has_all_that_its_machine_has(kind):
     """Friction and controllers that are late, contacts with states of their own: random numbers under both names."""
     slider, machine = short(kind)

@@ -6,7 +6,8 @@ import sympy as sp
 import steadyslip as ss
 from machines import at_random
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.kicks.rest import rest_of, solved_at
+from steadyslip.nonlinear.kicks.field import solved_at
+from steadyslip.nonlinear.kicks.settled import rest_of
 
 STEPS = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)  # in natural sizes: how curved rates are differs by decades
 

@@ -10,8 +10,9 @@ from kicked_rigs import tilted
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks.closed_orbits import _attraction
+from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.rest import rates_at, rest_of
+from steadyslip.nonlinear.kicks.settled import rest_of
 
 STEEP = rate_state(b=0.022, normal_memory=ss.LinkerDieterich(alpha=0.3))
 

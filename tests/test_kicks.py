@@ -21,7 +21,7 @@ from steadyslip.nonlinear.kicks import (
 from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.fold import at_fold
 from steadyslip.nonlinear.kicks.kicks import Kicked
-from steadyslip.nonlinear.kicks.rest import rest_of
+from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import BLOW_UP, DOUBTS, EXHAUSTED, LATE, OUTCOMES, RETURNS, StepBudget, doubt_of
 
 # -- with mass: recovery is no oscillation, and unstable sliding gets no return
@@ -144,12 +144,12 @@ def test_a_motion_goes_on_at_the_velocity_at_which_it_stopped():
     runs = replace(runs, jobs=replace(runs.jobs, initial=initial, velocity=velocity), jump=np.zeros(1))
     whole = spans_module.advanced_runs(runs, one, None, 2 * span)
     half = spans_module.advanced_runs(runs, one, None, span)
-    assert half.unknown[0] > 100 * 5e-4
-    again = spans_module.advanced_runs(runs, one, half.state, span, unknown=half.unknown)
+    assert half.unknowns[0, 0] > 100 * 5e-4
+    again = spans_module.advanced_runs(runs, one, half.state, span, unknowns=half.unknowns)
     assert again.state == pytest.approx(whole.state, rel=1e-4)
-    assert again.unknown == pytest.approx(whole.unknown, rel=1e-4)
+    assert again.unknowns == pytest.approx(whole.unknowns, rel=1e-4)
     lost = spans_module.advanced_runs(runs, one, half.state, span)
-    assert lost.unknown[0] < 0.1 * whole.unknown[0]
+    assert lost.unknowns[0, 0] < 0.1 * whole.unknowns[0, 0]
 
 
 # -- no threshold beyond an edge
@@ -429,7 +429,7 @@ def test_next_to_a_fold_small_kicks_return():
     assert set(found.outcomes(np.zeros(24, dtype=int), np.geomspace(1e-6, 1e-3, 24)).tolist()) == {RETURNS}
     rest = found.rest
     assert at_fold(rest, rest.state).tolist() == [True]
-    assert at_fold(rest, rest.state, rest.unknown).tolist() == [False]
+    assert at_fold(rest, rest.state, rest.unknowns).tolist() == [False]
     limit = ss.threshold(CLOSE_TO_A_FOLD, "normal-stress")
     assert (limit.decided, limit.outcome) == (True, "no solution")
     assert 0.9 < limit.size < 1.1
@@ -466,6 +466,6 @@ def test_where_the_balance_has_no_fold_no_state_is_at_one():
     a_rig = rig(friction=rate_state(evolution=ss.PRZ(), regularised=True), contact=press, stiffness=9e9,
                 drive=ss.PD(1e-6, kp=2e10, kd=1e9))  # fmt: skip
     jobs = prepare(a_rig, (), 1.0, {}, {}, Options())
-    assert jobs.reduction.unknown is not None
+    assert jobs.reduction.unknowns
     rest = rest_of(jobs, np.full(3, 1e-6), np.zeros(3))
     assert at_fold(rest, rest.state).tolist() == [False] * 3

@@ -15,7 +15,7 @@ from steadyslip.model.reducing import reduce_model
 from steadyslip.model.scales import natural_scales, posed, scale_rows, weights
 from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare
-from steadyslip.nonlinear.kicks.rest import rest_of
+from steadyslip.nonlinear.kicks.settled import rest_of
 
 ROCK = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6)
 RIG = ss.Slider(friction=ROCK, contact=ss.Constant(preload=5e6), stiffness=2e9, drive=ss.Steady(1e-6))

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import sympy as sp
 
-from steadyslip.core.errors import NotAvailable
 from steadyslip.core.questions import Keeper
 from steadyslip.model.equations import Model
 from steadyslip.model.kinematics import VelocityVariable, W, only
@@ -118,31 +117,6 @@ class Reduction(Keeper):
     def inputs(self) -> tuple[sp.Symbol, ...]:
         """v_lp, q, p and time."""
         return INPUTS
-
-    @property
-    def unknown(self) -> sp.Symbol | None:
-        """The one that is left to solve for, if there is any.
-
-        Raises
-        ------
-        NotAvailable
-            If there are several; what asks for this is not ready for them.
-        """
-        return self._one[0] if self.unknowns else None
-
-    @property
-    def residual(self) -> sp.Expr | None:
-        """Its equation."""
-        return self._one[1] if self.unknowns else None
-
-    @property
-    def _one(self) -> tuple[sp.Symbol, sp.Expr]:
-        if len(self.unknowns) > 1:
-            raise NotAvailable(
-                f"this is not offered where {len(self.unknowns)} equations are solved together at every moment; give "
-                "the bodies mass, or other laws"
-            )
-        return self.unknowns[0], self.residuals[0]
 
     @property
     def searched(self) -> tuple[sp.Symbol, ...]:

@@ -14,7 +14,7 @@ from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction, W
+from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
 from steadyslip.model.scales import slip_rates
 
 
@@ -211,16 +211,6 @@ def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, ve
 def _steady_unknowns(reduction: Reduction) -> Callable[..., list[Any]]:
     """What is searched for, in steady sliding; zero for velocity variables, which follow from velocities."""
     return reduction.model.function(reduction.model.steady.get(s, sp.Integer(0)) for s in reduction.searched)
-
-
-@question
-def _velocity(reduction: Reduction) -> Callable[..., list[Any]]:
-    return reduction.model.function([reduction.outputs["v"]], *reduction.state, W)
-
-
-def velocity_at(reduction: Reduction, point: OperatingPoint, state: np.ndarray, unknown: Any) -> Any:
-    """Velocity of a massless block, m/s, from its state (k, n) and the unknown of the balance, if there is one."""
-    return point.evaluate(_velocity(reduction), *state.T, unknown)[0]
 
 
 @question

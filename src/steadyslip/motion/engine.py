@@ -27,7 +27,7 @@ INTERRUPTED, NO_STEADY, ILL_POSED, OUT_OF_RANGE = range(len(STATUSES), len(STATU
 @dataclass
 class Outcome:
     """What a kernel leaves behind for some jobs; `log` and `recorded` for a single run only; `tables` it was given.
-    `size` is the length of the state.
+    `size` is the length of the state, `balances` how many unknowns balances fix.
 
     ``final``, ``recorded`` and ``samples`` have the columns of `Final`, `Recorded` and `Sampled`.
     """
@@ -40,6 +40,7 @@ class Outcome:
     recorded: np.ndarray
     tables: tuple[np.ndarray, ...]
     size: int
+    balances: int
 
     @property
     def steps(self) -> np.ndarray:
@@ -52,9 +53,10 @@ class Outcome:
         return self.final[:, Final.POINT :]
 
     @property
-    def unknown(self) -> np.ndarray:
-        """The first unknown of the balances where each ended, (jobs,)."""
-        return self.final[:, Final.POINT]
+    def unknowns(self) -> np.ndarray:
+        """Those of the balances where each ended, (jobs, unknowns)."""
+        own = np.hstack([self.point[:, :1], self.point[:, 1 + self.size :]])
+        return np.asarray(own[:, : self.balances])
 
     @property
     def state(self) -> np.ndarray:
@@ -109,7 +111,7 @@ class Call:
         return Outcome(
             self.status, self.final, self.tally, self.samples,
             self.log[: self.cursor[Cursor.LOGGED]], self.recorded[: self.cursor[Cursor.RECORDED]], self.tables,
-            self.layout.size,
+            self.layout.size, self.layout.unknowns,
         )  # fmt: skip
 
 

@@ -86,6 +86,8 @@ class Jobs:
     initial : ndarray (jobs, continuous variables)
     velocity : ndarray (jobs,)
         At the start, m/s.
+    near : ndarray (jobs, searched), optional
+        What is left to solve for at the start (`Reduction.searched`), where it is known; NaN elsewhere.
     reduction : Reduction
     eliminate : int or None
         The memory variable that follows from the balance.
@@ -103,6 +105,7 @@ class Jobs:
     size: int
     push: str = ""
     press: str = ""
+    near: np.ndarray | None = None
 
     @property
     def exists(self) -> np.ndarray:
@@ -133,7 +136,11 @@ class Jobs:
         point = self.point.part(slice(start, stop))
         initial = self.initial[start:stop] if len(self.initial) > 1 else self.initial
         velocity = self.velocity[start:stop] if len(self.velocity) > 1 else self.velocity
-        first, *others = guesses(self.reduction, point, initial, velocity)
+        found = guesses(self.reduction, point, initial, velocity)
+        if self.near is not None:
+            near = self.near[start:stop].T
+            found = [np.where(np.isfinite(own), own, guess) for own, guess in zip(near, found, strict=False)] or found
+        first, *others = found
         ask = _kept_settings if point.size == 1 else _settings
         settings = ask(point, machine, self.reduction, self.options)
         settings = settings.repeat(max(len(settings), np.size(first)) // len(settings), axis=0)

@@ -162,7 +162,8 @@ def check_contact_routes(contact: ContactLaw, surroundings: Surroundings = PRESS
     """
     from steadyslip.linear.stiffness import eigenvalues as of_polynomial
     from steadyslip.motion.jobs import Options, prepare
-    from steadyslip.nonlinear.kicks.rest import rates_at, rest_of
+    from steadyslip.nonlinear.kicks.field import rates_at
+    from steadyslip.nonlinear.kicks.settled import rest_of
 
     if not (contact.memory() or contact.is_compliant()):
         return

@@ -25,7 +25,8 @@ from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.places import steady_speeds
-from steadyslip.nonlinear.kicks.rest import Rest, rest_of
+from steadyslip.nonlinear.kicks.rest import Rest
+from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steadyslip.kernels.runner import STATUSES
-from steadyslip.nonlinear.kicks.rest import rates_at
+from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.spans import Judged, advanced_runs, constant_inputs
 from steadyslip.nonlinear.orbits.flow import Runs as ConstantInputs
 from steadyslip.nonlinear.orbits.verify import cycle_near
@@ -34,17 +34,17 @@ AWAY = 1e-3  # distance from steady sliding below which a closed orbit is not to
 DONE = STATUSES.index("done")
 
 
-def on_long_cycle(runs: Judged, one: int, state: Array, unknown: float) -> bool:
+def on_long_cycle(runs: Judged, one: int, state: Array, unknowns: Array) -> bool:
     """Whether one run, now at `state` (n,), is on an attracting cycle of several slip events, or turns.
 
-    `unknown` is that of the balance there, NaN where it is not known.
+    `unknowns` (u,) are those of the balances there, NaN where they are not known.
     """
     which, rest = np.array([one]), runs.rest
     inputs = constant_inputs(
         np.ones(1), rest.velocity[which], np.zeros(1), rest.pressure[which], rest.force[which]
     )  # fmt: skip
     jobs = replace(runs.repeated(one, 1).jobs, segments=inputs)
-    cycle = cycle_near(ConstantInputs(jobs, contact=rest.contact), state, unknown=unknown) if jobs.posed[0] else None
+    cycle = cycle_near(ConstantInputs(jobs, contact=rest.contact), state, unknowns=unknowns) if jobs.posed[0] else None
     return cycle is not None and cycle.growth < 1 - ATTRACTS
 
 
@@ -58,12 +58,12 @@ class _Turn:
 
 
 def attracted(
-    runs: Judged, which: Array, states: Array, unknown: Array, period: Array, threads: int | None = None
+    runs: Judged, which: Array, states: Array, unknowns: Array, period: Array, threads: int | None = None
 ) -> tuple[Array, Array]:
     """Whether runs `which` (k,), now at `states` (k, n), are on an attracting closed orbit of about `period` (k,).
 
     And whether a period later they are where they were, but for a little: on any closed orbit, or close to one.
-    `unknown` (k,) is that of the balance there, NaN where it is not known.
+    `unknowns` (k, u) are those of the balances there, NaN where they are not known.
     """
     rest = runs.rest.part(which)
     scale, n = rest.scales, states.shape[1]
@@ -79,7 +79,7 @@ def attracted(
         here = np.flatnonzero(alive)
         if not len(here):
             break
-        at, near = y[here] * scale[here], unknown[here]
+        at, near = y[here] * scale[here], unknowns[here]
         turn = _turned(runs, which[here], at, near, scale[here], np.exp(log_period[here]), threads)
         arrival = rates_at(rest.part(here), (turn.end * scale[here])[:, None, :])[:, 0] / scale[here]
         missed = turn.end - y[here]
@@ -117,14 +117,14 @@ def attracted(
 
 
 def _turned(
-    runs: Judged, which: Array, states: Array, unknown: Array, scale: Array, period: Array, threads: int | None
+    runs: Judged, which: Array, states: Array, unknowns: Array, scale: Array, period: Array, threads: int | None
 ) -> _Turn:
     """One period from k states, and its derivative by central differences."""
     count, n = states.shape
     beside = BESIDE * np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)])  # (2n+1, n)
     many = (states[:, None, :] + scale[:, None, :] * beside[None]).reshape(-1, n)
     repeat = np.repeat(np.arange(count), 2 * n + 1)
-    ended = advanced_runs(runs, which[repeat], many, period[repeat], False, threads, unknown=unknown[repeat])
+    ended = advanced_runs(runs, which[repeat], many, period[repeat], False, threads, unknowns=unknowns[repeat])
     ends = ended.state.reshape(count, 2 * n + 1, n) / scale[:, None, :]
     good = np.all(ended.status.reshape(count, -1) == DONE, axis=1) & np.all(np.isfinite(ends), axis=(1, 2))
     derivative = (ends[:, 1 : n + 1] - ends[:, n + 1 :]).transpose(0, 2, 1) / (2 * BESIDE)

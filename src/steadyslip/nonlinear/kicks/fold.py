@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from steadyslip.nonlinear.kicks.rest import Rest, field_of
+from steadyslip.nonlinear.kicks.field import field_of
+from steadyslip.nonlinear.kicks.rest import Rest
 
 Array = np.ndarray
 REACH = 60.0  # of ln(velocity/drive), to both sides, within which a fold is looked for,
@@ -18,13 +19,13 @@ NEAR = 1e-7  # force that is missing, as a share of the normal stress, at a stat
 CLOSE = 1e-3  # and difference of ln(velocity/drive), where its own velocity is known
 
 
-def at_fold(rest: Rest, states: Array, unknown: Array | None = None) -> Array:
+def at_fold(rest: Rest, states: Array, unknowns: Array | None = None) -> Array:
     """Whether states (m, n), one for each rig, are where two velocities that balance forces meet (m,).
 
-    `unknown` (m,) is that of the balance at the states, NaN where it is lost: next to a fold forces may balance at a
-    velocity that is not at it.
+    `unknowns` (m, 1) are those of the balance at the states, NaN where they are lost: next to a fold forces may balance
+    at a velocity that is not at it.
     """
-    if rest.reduction.unknown is None or rest.reduction.model.inertial or not rest.reduction.model.is_single:
+    if not rest.reduction.unknowns or rest.reduction.model.inertial or not rest.reduction.model.is_single:
         return np.zeros(len(states), dtype=bool)
     turns = np.linspace(-REACH, REACH, COUNT)
     with np.errstate(all="ignore"):
@@ -37,7 +38,7 @@ def at_fold(rest: Rest, states: Array, unknown: Array | None = None) -> Array:
             falls = _balance(part, where, middle[:, None])[1][:, 0] < 0
             low, high = np.where(falls == rising, middle, low), np.where(falls == rising, high, middle)
         missing = np.abs(_balance(part, where, low[:, None])[0][:, 0])
-        own = np.full(len(states), np.nan) if unknown is None else unknown
+        own = np.full(len(states), np.nan) if unknowns is None else unknowns[:, 0]
         own = np.arcsinh(own / rest.velocity) if rest.reduction.velocity == "linear" else own
     found = np.zeros(len(states), dtype=bool)
     found[which[(missing < NEAR * part.sigmas[0]) & ~(np.abs(own[which] - low) > CLOSE)]] = True

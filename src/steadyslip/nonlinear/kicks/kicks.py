@@ -23,7 +23,8 @@ from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import outcomes_of
 from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, steady_speeds
-from steadyslip.nonlinear.kicks.rest import Rest, picked, rest_of
+from steadyslip.nonlinear.kicks.rest import Rest, picked
+from steadyslip.nonlinear.kicks.settled import rest_of
 from steadyslip.nonlinear.kicks.spans import STIFF, Judged, StepBudget, continuous_at
 
 Array = np.ndarray
@@ -264,8 +265,9 @@ class Kicked:
         """The same rigs in steady sliding at another velocity of the load point."""
         nothing = np.zeros(len(velocity))
         before = rest_of(jobs, velocity, nothing)
-        initial, speed = continuous_at(jobs.reduction, jobs.point, before.state, (velocity, nothing, nothing))
-        return replace(jobs, initial=initial, velocity=speed)
+        inputs = velocity, nothing, nothing
+        initial, near = continuous_at(jobs.reduction, jobs.point, before.state, inputs, before.unknowns)
+        return replace(jobs, initial=initial, near=near)
 
     def _struck(self, jobs: Jobs, change: Array, which: Array) -> Jobs:
         """The same rigs with another velocity of the block, or of a body."""

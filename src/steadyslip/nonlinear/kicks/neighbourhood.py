@@ -20,7 +20,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from steadyslip.nonlinear.kicks.rest import Rest, motion_at
+from steadyslip.nonlinear.kicks.field import motion_at
+from steadyslip.nonlinear.kicks.rest import Rest
 
 Array = np.ndarray
 LARGEST, SMALLEST = 4.0, 1e-12  # radius, in natural sizes of the weakest mode

@@ -87,7 +87,7 @@ class _Course:
         self.peak = np.full(count, np.nan)
         self.found, self.stiff = np.full(count, OPEN), np.zeros(count, dtype=bool)
         self.state = np.full(runs.rest.state.shape, np.nan) if start is None else np.array(start)
-        self.unknown = np.full(count, np.nan)
+        self.unknowns = np.full(runs.rest.unknowns.shape, np.nan)
         self.started, self.begun = start is not None, np.full(count, start is not None)
         self.shells = None if self.started else Shells(runs, threads, _fates)
         self.stiffly = replace(runs.jobs.options, method=STIFF)
@@ -117,7 +117,7 @@ class _Course:
     def _advanced(self, open_: Array) -> Spans:
         """A span of some motions: those of each method, and those from their beginning, by themselves."""
         fresh = ~self.begun[open_]
-        found = Spans.empty(len(open_), self.state.shape[1])
+        found = Spans.empty(len(open_), self.state.shape[1], self.runs.rest.unknowns.shape[1])
         for stiff, anew in ((False, True), (False, False), (True, True), (True, False)):
             here = np.flatnonzero((self.stiff[open_] == stiff) & (fresh == anew))
             if not len(here) or not found.whole:
@@ -126,7 +126,7 @@ class _Course:
             watch = bool(self.begun[which].any())
             found.put(here, advanced_runs(
                 self.runs, which, None if anew else self.state[which], self.span[which], watch, self.threads,
-                self.stiffly if stiff else None, self.unknown[which],
+                self.stiffly if stiff else None, self.unknowns[which],
             ))  # fmt: skip
         return found
 
@@ -144,7 +144,7 @@ class _Course:
         short = many[over] & np.all(np.isfinite(ended.state[over]), axis=1)
         self.span[which[short]] = 0.5 * ended.time[over[short]]
         self.elapsed[which] += np.where(short, ended.time[over], self.span[which])
-        self.state[which], self.unknown[which], self.begun[which] = ended.state[over], ended.unknown[over], True
+        self.state[which], self.unknowns[which], self.begun[which] = ended.state[over], ended.unknowns[over], True
         away = self.allowed[which] + self.runs.reload(which, self.state[which])
         self.most[which] = np.maximum(self.most[which], away)
         return over
@@ -170,12 +170,12 @@ class _Course:
         if len(tried):
             one = going[tried]
             closed, again[tried] = attracted(
-                runs, one, state[one], self.unknown[one], apart[running[tried]], self.threads
+                runs, one, state[one], self.unknowns[one], apart[running[tried]], self.threads
             )
             found[one[closed]] = OSCILLATION
         long = np.where(runs.rest.stable[going], HALFWAY, EARLY) * self.most[going]
         several = going[(found[going] == OPEN) & ~neutral & ~again & (self.elapsed[going] > long)]
-        found[[one for one in several if on_long_cycle(runs, one, state[one], self.unknown[one])]] = OSCILLATION
+        found[[one for one in several if on_long_cycle(runs, one, state[one], self.unknowns[one])]] = OSCILLATION
         left = running[np.isin(going, several) & (found[going] == OPEN)]
         found[which[left[self._goes_on(which[left], ended.tally[left])]]] = OSCILLATION
         self.peak[which] = np.fmax(self.peak[which], ended.tally[:, TALLY.index("peak_velocity")])
@@ -223,7 +223,7 @@ def _seen(runs: Judged, which: Array, ended: Spans) -> Array:
     many = status == CODE["too many steps"]
     limited = np.flatnonzero((status == CODE["stuck"]) | many)
     if len(limited):  # the integrator's limits, or no solution
-        folded = at_fold(runs.rest.part(which[limited]), ended.state[limited], ended.unknown[limited])
+        folded = at_fold(runs.rest.part(which[limited]), ended.state[limited], ended.unknowns[limited])
         lost = ~np.all(np.isfinite(ended.state[limited]), axis=1)
         further = np.where(many[limited], np.where(lost, EXHAUSTED, OPEN), STUCK)
         found[limited[~folded]] = further[~folded]

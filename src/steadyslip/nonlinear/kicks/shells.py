@@ -20,8 +20,8 @@ from collections.abc import Callable
 import numpy as np
 
 from steadyslip.kernels.runner import STATUSES
+from steadyslip.nonlinear.kicks.field import rates_at
 from steadyslip.nonlinear.kicks.neighbourhood import LARGEST
-from steadyslip.nonlinear.kicks.rest import rates_at
 from steadyslip.nonlinear.kicks.spans import CERTAIN, OPEN, RETURNS, Judged, advanced_runs
 
 Array = np.ndarray

@@ -10,9 +10,8 @@ import numpy as np
 from steadyslip.kernels.layout import Final
 from steadyslip.kernels.runner import STATUSES, TALLY, Runner
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import Reduction, W
-from steadyslip.model.scales import slip_rates
-from steadyslip.model.start import restored_of, velocity_at
+from steadyslip.model.reduction import Reduction
+from steadyslip.model.start import restored_of
 from steadyslip.motion.engine import LANES, run_chunk, run_many
 from steadyslip.motion.jobs import Jobs, Options
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
@@ -136,29 +135,30 @@ def constant_inputs(span: Array, velocity: Array, jump: Array, pressure: Array, 
     )
 
 
-ARRAYS = ("status", "time", "state", "unknown", "steps", "tally")
+ARRAYS = ("status", "time", "state", "unknowns", "steps", "tally")
 
 
 @dataclass
 class Spans:
     """What a span of some runs ended with: status, time reached (s), state (k, n), steps and tally.
 
-    `unknown` (k,) is that of the balance.
+    `unknowns` (k, u) are those of the balances.
     """
 
     status: Array
     time: Array
     state: Array
-    unknown: Array
+    unknowns: Array
     steps: Array
     tally: Array
     whole: bool = True
 
     @classmethod
-    def empty(cls, count: int, n: int) -> Spans:
+    def empty(cls, count: int, n: int, unknowns: int) -> Spans:
         """Of runs that are still to be run."""
         return cls(np.full(count, len(STATUSES)), np.zeros(count), np.full((count, n), np.nan),
-                   np.full(count, np.nan), np.zeros(count), np.full((count, len(TALLY)), np.nan))  # fmt: skip
+                   np.full((count, unknowns), np.nan), np.zeros(count),
+                   np.full((count, len(TALLY)), np.nan))  # fmt: skip
 
     def part(self, which: Array) -> Spans:
         """Those of some of the runs."""
@@ -173,34 +173,34 @@ class Spans:
 
 def advanced_runs(
     runs: Judged, which: Array, start: Array | None, span: Array, watch: bool = False, threads: int | None = None,
-    options: Options | None = None, unknown: Array | None = None,
+    options: Options | None = None, unknowns: Array | None = None,
 ) -> Spans:  # fmt: skip
     """Let runs `which` (k,) go on for `span` (k,) from states `start` (k, n), or from their beginning.
 
-    `unknown` (k,) is that of the balance at `start`, NaN where it is not known.
+    `unknowns` (k, u) are those of the balances at `start`, NaN where they are not known.
     """
     jobs, rest = replace(runs.jobs, options=options or runs.jobs.options), runs.rest
     velocity, force, pressure = rest.velocity[which], rest.force[which], rest.pressure[which]
     jump = runs.jump[which] if start is None else np.zeros(len(which))
     point = jobs.point.part(which)
     if start is None:
-        initial, speed = picked(jobs.initial, which), picked(jobs.velocity, which)
+        initial, near = picked(jobs.initial, which), None if jobs.near is None else jobs.near[which]
     else:
-        initial, speed = continuous_at(jobs.reduction, point, start, (velocity, force, pressure), unknown)
+        initial, near = continuous_at(jobs.reduction, point, start, (velocity, force, pressure), unknowns)
     part = replace(
-        jobs, point=point, initial=initial, velocity=speed,
+        jobs, point=point, initial=initial, velocity=picked(jobs.velocity, which), near=near,
         segments=constant_inputs(span, velocity, jump, pressure, force), size=len(which),
     )  # fmt: skip
     machine: Runner = jobs.runner(LANES, dense=True)
     _ = machine.code.advance  # compile before the threads start
     count, own = len(which), rest.contact * len(TALLY)
-    found = Spans.empty(count, rest.state.shape[1])
+    found = Spans.empty(count, rest.state.shape[1], rest.unknowns.shape[1])
 
     def work(begin: int, end: int, stopped: threading.Event) -> None:
         outcome = run_chunk(part, machine, begin, end, np.empty(0), watch, stopped)
         found.status[begin:end], found.tally[begin:end] = outcome.status, outcome.tally[:, own : own + len(TALLY)]
         found.time[begin:end], found.steps[begin:end] = outcome.final[:, Final.TIME], outcome.steps.sum(axis=1)
-        found.state[begin:end], found.unknown[begin:end] = outcome.state, outcome.unknown
+        found.state[begin:end], found.unknowns[begin:end] = outcome.state, outcome.unknowns
 
     found.whole = run_many(work, count, threads)
     runs.budget.steps -= float(np.nansum(found.steps))
@@ -208,22 +208,17 @@ def advanced_runs(
 
 
 def continuous_at(
-    reduction: Reduction, point: OperatingPoint, state: Array, inputs: tuple[Array, ...], unknown: Array | None = None
+    reduction: Reduction, point: OperatingPoint, state: Array, inputs: tuple[Array, ...], unknowns: Array | None = None
 ) -> tuple[Array, Array]:
-    """What a kernel starts from: the continuous variables, and a slip rate near which to look for its own.
+    """What a kernel starts from: the continuous variables, and near what it finds the others, as in `Jobs.near`.
 
-    `inputs` are the velocity of the load point, the force on a body and the added normal stress, each (m,).
+    `inputs` are the velocity of the load point, the force on a body and the added normal stress, each (m,);
+    `unknowns` (m, u) those of the balances at the states, NaN where they are not known.
     """
     with np.errstate(all="ignore"):
         found = point.evaluate(restored_of(reduction), *state.T, *inputs, 0.0)
         initial = np.column_stack([np.broadcast_to(np.asarray(c, dtype=float), (len(state),)) for c in found])
-        slip = slip_rates(point)[0]
-        speed = np.array(inputs[0] / np.asarray(point.drive) * slip)
-        if not reduction.model.is_single:  # each contact has its own, which the kernel begins with
-            return np.ascontiguousarray(initial), speed
-        if reduction.form == "eliminated":
-            speed = np.asarray(slip * np.exp(state[:, reduction.state.index(W)]))
-        elif unknown is not None and reduction.unknown is not None and not reduction.model.inertial:
-            known = np.broadcast_to(velocity_at(reduction, point, state, unknown), speed.shape)
-            speed = np.where(np.isfinite(known), known, speed)
-    return np.ascontiguousarray(initial), speed
+    known = dict(zip(reduction.state, state.T, strict=True))
+    known |= {} if unknowns is None else dict(zip(reduction.unknowns, unknowns.T, strict=True))
+    near = [known.get(symbol, np.full(len(state), np.nan)) for symbol in reduction.searched]
+    return np.ascontiguousarray(initial), np.column_stack(near) if near else np.empty((len(state), 0))

@@ -17,8 +17,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import beyond_range
 from steadyslip.model.sliding import steady_state, steady_states
+from steadyslip.nonlinear.kicks.field import normal_stresses
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
-from steadyslip.nonlinear.kicks.rest import normal_stresses
 from steadyslip.nonlinear.kicks.spans import (
     CERTAIN,
     CONTACT_LOST,
@@ -362,7 +362,7 @@ def lost_contact(kicked: Kicked, size: float) -> str:
     ended = advanced_runs(runs, one, None, runs.times()[1])
     if ended.status[0] != STATUSES.index("contact lost") or not np.all(np.isfinite(ended.state)):
         return ""
-    pressed = normal_stresses(runs.rest, ended.state, ended.unknown)[0] / np.stack(runs.rest.sigmas, axis=1)[0]
+    pressed = normal_stresses(runs.rest, ended.state, ended.unknowns)[0] / np.stack(runs.rest.sigmas, axis=1)[0]
     return names[int(np.argmin(pressed))]
 
 

@@ -273,11 +273,11 @@ class Runs:
 
     def watched(
         self, setting: FlowSetting, state: Array, time: float, amplitude: float = 1.0, times: Array = NEVER,
-        unknown: float = np.nan,
+        unknowns: Array | None = None,
     ) -> Outcome:  # fmt: skip
         """One run with its events and steps, and samples at given times.
 
-        `unknown` is that of the balance at `state`, where it is known.
+        `unknowns` (u,) are those of the balances at `state`, NaN where they are not known.
 
         Raises
         ------
@@ -289,8 +289,10 @@ class Runs:
         initial = self._continuous(setting, state[None])
         settings = self._finer(setting.plain[1], amplitude)
         settings[:, SETTINGS.index("watch")] = settings[:, SETTINGS.index("record")] = 1.0
-        if np.isfinite(unknown):
-            settings[:, SETTINGS.index("guess")] = unknown
+        behind = self.tolerances.stop
+        for k, known in enumerate([] if unknowns is None else unknowns):
+            if np.isfinite(known):
+                settings[:, Setting.GUESS if k == 0 else behind + k - 1] = known
         tables = (*setting.plain[:1], initial, settings, _rows(setting.inputs, np.array([time])))
         outcome = run_tables(self.machine, tables, times)
         if outcome.status[0] == INTERRUPTED:

@@ -35,7 +35,7 @@ MOST_STEPS = 40_000
 
 def cycle_near(
     runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
-    unknown: float = np.nan,
+    unknowns: Array | None = None,
 ) -> Cycle | None:  # fmt: skip
     """The cycle that a motion is on, or comes to.
 
@@ -50,8 +50,8 @@ def cycle_near(
         How many stretches of some returns each to go on for, as long as no cycle is close enough.
     attracts : bool
         Whether to pass by cycles that are not stable.
-    unknown : float, optional
-        Of the balance at `state`, where it is known.
+    unknowns : ndarray (u,), optional
+        Of the balances at `state`, where they are known.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def cycle_near(
         None if there is none: the motion grows, settles, wanders, or is still too far from any.
     """
     with suppress(FlowFailure):
-        for seen in _stretches(runs, runs.setting(value), state, unknown, patience):
+        for seen in _stretches(runs, runs.setting(value), state, unknowns, patience):
             for back in _candidates(runs, seen):
                 found = _solved(runs, value, seen, int(back))
                 if found is not None and (found.stable or not attracts):
@@ -81,7 +81,9 @@ class _Stretch:
     amplitude: float
 
 
-def _stretches(runs: Runs, setting: FlowSetting, state: Array, unknown: float, patience: int) -> Iterator[_Stretch]:
+def _stretches(
+    runs: Runs, setting: FlowSetting, state: Array, unknowns: Array | None, patience: int
+) -> Iterator[_Stretch]:
     """The motion, some returns at a time."""
     span, spent = FIRST_SPAN * runs.time, 0
     for _ in range(patience):
@@ -90,7 +92,7 @@ def _stretches(runs: Runs, setting: FlowSetting, state: Array, unknown: float, p
         low, high, speeds = [], [], []
         now = 0.0
         while len(times) < RETURNS and spent < MOST_STEPS * patience:
-            outcome = runs.watched(setting, state, span, unknown=unknown)
+            outcome = runs.watched(setting, state, span, unknowns=unknowns)
             record, log = outcome.recorded, outcome.log
             visited = record[:, Recorded.STATE : Recorded.STATE + runs.size]
             at = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0), 1]
@@ -101,7 +103,7 @@ def _stretches(runs: Runs, setting: FlowSetting, state: Array, unknown: float, p
             if np.max(high[-1] - low[-1]) < SMALLEST:
                 return
             speeds.append(runs.speeds(setting, outcome))
-            state, unknown = outcome.state[0], float(outcome.unknown[0])
+            state, unknowns = outcome.state[0], outcome.unknowns[0]
             now, spent = now + span, spent + len(record)
             span *= 2.0 if len(times) < RETURNS // 2 else 1.0
         if len(times) < 2:

@@ -1,0 +1,130 @@
+"""Motion of rigs at constant inputs: rates, slip rates and normal stresses at any states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.questions import question
+from steadyslip.model import OperatingPoint
+from steadyslip.model.reduction import SLOPES, TIME, V_LP, P, Q, Reduction
+from steadyslip.model.scales import natural_scales
+from steadyslip.motion.single import areas as areas_of
+from steadyslip.nonlinear.kicks.rest import Rest, in_columns
+
+Array = np.ndarray
+ROUNDING = 1e-14  # of stresses, in the normal stress
+BALANCED = 12  # rounds of Newton's method for the balance of forces
+
+
+@question
+def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
+    """Rates and slip rates, then residuals of the balances and their slopes, row by row, where unknowns are left.
+
+    A function of the parameters, σss, v_lp, q, p, the state and the unknowns.
+    """
+    slopes = [entry for row in reduction.solved.matrix for entry in row]
+    speeds = (one.outputs["v"] for one in reduction.slidings)
+    return _at_constant_inputs(reduction, [*reduction.rates, *speeds, *reduction.residuals, *slopes])
+
+
+@question
+def _jacobian_of(reduction: Reduction) -> Callable[..., list[Any]]:
+    return _at_constant_inputs(reduction, [entry for row in reduction.jacobian() for entry in row])
+
+
+def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> Callable[..., list[Any]]:
+    still = {TIME: sp.Integer(0)}
+    still |= {s: sp.Integer(0) for s in sp.symbols("v_lp_dot q_dot p_dot", real=True)}
+    at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
+    return reduction.model.function(at_rest, V_LP, Q, P, *reduction.state, *reduction.unknowns)
+
+
+def rates_at(rest: Rest, states: Array) -> Array:
+    """Rates (m, d, n) at states (m, d, n), d of them for each rig; NaN where the balance of forces has no solution."""
+    return motion_at(rest, states)[0]
+
+
+def motion_at(rest: Rest, states: Array) -> tuple[Array, Array]:
+    """Rates (m, d, n) and the slowest slip rate (m, d) at states (m, d, n); NaN where forces cannot balance."""
+    rates, velocity, _ = solved_at(rest, states)
+    return rates, velocity
+
+
+def solved_at(rest: Rest, states: Array) -> tuple[Array, Array, Array]:
+    """The same, and the unknowns of the balances (m, d, u)."""
+    given = [rest.column(np.asarray(a)) for a in rest.given()]
+    function, split, n = field_of(rest.reduction), np.moveaxis(states, 2, 0), states.shape[2]
+    shape, count, speeds = states.shape[:2], len(rest.reduction.unknowns), len(rest.reduction.slidings)
+    unknowns = np.array(np.broadcast_to(rest.unknowns[:, None, :], (*shape, count)))
+    with np.errstate(all="ignore"):
+        for _ in range(BALANCED if count else 1):
+            found = function(*given, *split, *np.moveaxis(unknowns, 2, 0))
+            numbers = np.stack([np.broadcast_to(np.asarray(one, dtype=float), shape) for one in found], axis=2)
+            if count:
+                residuals, slopes = numbers[..., n + speeds : n + speeds + count], numbers[..., n + speeds + count :]
+                change, feels = _newton(residuals, slopes.reshape(*shape, count, count))
+                unknowns = unknowns - change
+        moving = numbers[..., n : n + speeds].min(axis=2)
+        rates = numbers[..., :n]
+        if count:
+            rounding = ROUNDING * feels * _forces(rest)[:, None, None]  # much where mass is small
+            settled = np.abs(change) <= 1e-10 * (np.abs(unknowns) + _sizes(rest)[:, None, :]) + rounding
+            rates = np.where(np.all(settled, axis=2)[..., None], rates, np.nan)
+    return rates, moving, unknowns
+
+
+def _newton(residuals: Array, slopes: Array) -> tuple[Array, Array]:
+    """How far each unknown is off, (m, d, u), and how much it feels a force that is."""
+    if residuals.shape[-1] == 1:
+        return residuals / slopes[..., 0], 1 / np.abs(slopes[..., 0])
+    good = np.all(np.isfinite(slopes), axis=(-2, -1)) & (np.linalg.det(slopes) != 0)
+    inverse = np.full_like(slopes, np.nan)
+    inverse[good] = np.linalg.inv(slopes[good])
+    return np.einsum("...ij,...j->...i", inverse, residuals), np.sum(np.abs(inverse), axis=-1)
+
+
+def _forces(rest: Rest) -> Array:
+    """Size of what balances, (m,)."""
+    areas = rest.point.evaluate(areas_of(rest.reduction.model))
+    found = [np.maximum(1.0, np.abs(area)) * sigma for area, sigma in zip(areas, rest.sigmas, strict=True)]
+    return np.asarray(np.maximum.reduce(np.broadcast_arrays(*found)))
+
+
+def _sizes(rest: Rest) -> Array:
+    """Natural sizes of the unknowns, (m, u): of velocity variables, accelerations, or frictions."""
+    count = len(rest.reduction.unknowns)
+    if rest.is_machine:
+        return in_columns(natural_scales(rest.point, rest.reduction)[1][:count], len(rest.velocity))
+    if not rest.reduction.model.inertial:
+        own = np.ones(len(rest.velocity)) if rest.reduction.velocity != "linear" else rest.velocity
+    else:
+        own = rest.velocity**2 / rest.scales[:, rest.places[0]]
+    return np.asarray(own[:, None])
+
+
+def slopes_at(
+    reduction: Reduction, point: OperatingPoint, inputs: tuple[Array, ...], state: Array, unknowns: Array, scales: Array
+) -> Array:
+    """Jacobian of the rates in natural sizes, (m, n, n)."""
+    count, n = state.shape
+    entries = point.evaluate(_jacobian_of(reduction), *inputs, *state.T, *unknowns.T)
+    return np.asarray(in_columns(entries, count).reshape(count, n, n) * scales[:, None, :] / scales[:, :, None])
+
+
+def normal_stresses(rest: Rest, state: Array, unknowns: Array) -> Array:
+    """Of every contact, at states (m, n) and unknowns (m, u), one for each rig: (m, contacts)."""
+    inputs = rest.velocity, rest.force, rest.pressure
+    found = rest.point.evaluate(_normal_of(rest.reduction), *inputs, *state.T, *unknowns.T)
+    return in_columns(found, len(state))
+
+
+@question
+def _normal_of(reduction: Reduction) -> Callable[..., list[Any]]:
+    """Normal stresses."""
+    still = {TIME: sp.Integer(0)} | dict.fromkeys(SLOPES[:3], sp.Integer(0))
+    wanted = (one.outputs["sigma"].xreplace(still) for one in reduction.slidings)
+    return reduction.model.function(wanted, V_LP, Q, P, *reduction.state, *reduction.unknowns)

@@ -5,6 +5,7 @@ import pytest
 
 import steadyslip as ss
 from machines import same_block, surface, two_mass
+from test_several_unknowns import heavy_footed, two_smooth, wedges
 
 COARSE = 1e-3
 
@@ -81,6 +82,32 @@ def test_after_a_kick_of_its_inputs_a_machine_slides_where_it_would():
         other = machine.with_values({"drive.velocity": velocity})
         found = np.sort_complex(rest.roots[i])
         np.testing.assert_allclose(found, np.sort_complex(ss.eigenvalues(other)), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "machine",
+    [two_smooth(), wedges(one=1.0, two=2.0), heavy_footed()],
+    ids=["velocities", "frictions", "accelerations"],
+)
+def test_kicks_where_several_equations_are_solved_together(machine):
+    """They lead to the steady sliding of the machine that is driven so fast, with its eigenvalues."""
+    from steadyslip.nonlinear.kicks.kicks import Kicked
+
+    kicked = Kicked(machine, "velocity", 1, "before", {}, 0, 1e-6)
+    assert kicked.rest.unknowns.shape == (1, 2)
+    rest = kicked.rest_after(np.zeros(2, dtype=int), np.array([0.3, -0.4]))
+    for roots, velocity in zip(rest.roots, np.exp([0.3, -0.4]), strict=True):
+        other = machine.with_values({"drive.velocity": velocity})
+        np.testing.assert_allclose(np.sort_complex(roots), np.sort_complex(ss.eigenvalues(other)), rtol=1e-6)
+
+
+def test_bodies_without_mass_joined_by_a_dashpot_return_after_a_kick():
+    from steadyslip.nonlinear.kicks.kicks import Kicked
+    from steadyslip.nonlinear.kicks.spans import RETURNS
+
+    kicked = Kicked(two_smooth(), "force", 1, "before", {}, 0, 1e-6, "two")
+    assert kicked.stable[0]
+    assert kicked.outcomes(np.zeros(1, dtype=int), np.array([0.02])).tolist() == [RETURNS]
 
 
 def test_what_a_push_makes_of_a_machine_is_what_it_comes_to():

@@ -214,7 +214,9 @@ def space_index(space, name):
 def test_no_steady_sliding_to_start_from_is_no_crash():
     rig = replace(lab.rig(), contact=ss.InclinedSpring(preload=8e6, angle=0.3))
     record = ss.record_from_arrays(
-        np.linspace(0, 10, 50), friction=np.full(50, 0.6), displacement=np.linspace(0, 1e-5, 50)
+        np.linspace(0, 10, 50),
+        friction=np.full(50, 0.6),
+        displacement=np.interp(np.arange(50), [0, 25, 49], [0, 5e-6, 2e-5]),
     )
     plan = make_plan(rig, record, free=["contact.angle"], fixed=["friction.mu_ref"])
     seen, _ = plan.comparison().model(plan.space().coordinates(np.array([[0.3], [-1.2]])))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.quantities import shown
 from steadyslip.core.records import Address, parameters, resolve
+from steadyslip.experiments.fitting.checks import check_changes, check_records
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.comparison import (
     Comparison,
@@ -25,7 +25,7 @@ from steadyslip.experiments.fitting.comparison import (
 )
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
-from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
+from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
@@ -39,7 +39,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
-from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
+from steadyslip.protocol.protocol import NORMAL_STRESS
 
 Array = np.ndarray
 MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
@@ -273,8 +273,10 @@ def make_plan(
     if plan_protocol is not None:
         options["drive"] = "protocol"
     plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
-    _check_records(plan)
-    return with_loading(plan)
+    check_records(plan)
+    plan = with_loading(plan)
+    check_changes(plan)
+    return plan
 
 
 def with_loading(plan: Plan) -> Plan:
@@ -342,59 +344,6 @@ def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[P
             return None
         found.append(row)
     return tuple(found)
-
-
-def check_friction(records: Iterable[Record]) -> None:
-    """Refuse measured friction that never changes, which is another column than that of friction."""
-    problems = [
-        Problem("record", f"{record.source}: friction is {record.friction[0]:.6g} in all samples; is it its column?")
-        for record in records
-        if np.ptp(record.friction) == 0
-    ]
-    if problems:
-        raise ParameterError(problems)
-
-
-def _check_records(plan: Plan) -> None:
-    problems = []
-    drives = plan.protocol is not None and any(piece.channel == LOAD_POINT for piece in plan.protocol.pieces)
-    given = float(plan.rig.drive.velocity)
-    for i, record in enumerate(plan.records, start=1):
-        where = "record" if len(plan.records) == 1 else f"record {i}"
-        if plan.protocol is None and record.displacement is None:
-            problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or rate; "
-                                    "name it, or give the protocol of the experiment"))  # fmt: skip
-        elif plan.protocol is None and not (record.initial_rate or 0.0) > 0 and not _begins_at_rest(plan, record):
-            problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
-                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding or, driven by "
-                                    "commanded loading, at rest; cut it with between=(start, end)"))  # fmt: skip
-        if plan.lag and (plan.protocol is not None or plan.drive != "commanded" or _curved(record.loading)):
-            problems.append(Problem("lag", f"{record.source} is not driven by steps and ramps found in it; allowed: "
-                                    "false, or drive = 'commanded' and a record of steps and ramps"))  # fmt: skip
-        rate = record.initial_rate or 0.0
-        if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
-            message = f"got {shown(given, 'm/s')}, but {record.source} begins at {shown(rate, 'm/s')}; make them agree"
-            problems.append(Problem("drive.velocity", message))
-        if plan.protocol is not None and not drives and record.displacement is not None:
-            problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "
-                                    "away, or give it a velocity-step, hold or velocity-table"))  # fmt: skip
-        if plan.protocol is not None and record.time[0] < 0:
-            problems.append(
-                Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
-            )
-        needed = len(plan.free) + plan.trend + plan.offset + (plan.initial == "free")
-        if len(record) <= needed:
-            problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))
-    if problems:
-        raise ParameterError(problems)
-
-
-def _begins_at_rest(plan: Plan, record: Record) -> bool:
-    return plan.drive == "commanded" and resting_rate(record.loading) is not None
-
-
-def _curved(loading: Loading) -> bool:
-    return any(course is not None and course.curve is not None for course in (loading.load, loading.stress))
 
 
 def check_width(plan: Plan, residuals: Array) -> Plan:

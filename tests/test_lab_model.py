@@ -12,7 +12,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_changes
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.kernels.experiment import ExperimentProgram
 from steadyslip.kernels.runner import Runner
 from steadyslip.model.reducing import reduce_model

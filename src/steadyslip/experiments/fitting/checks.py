@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.quantities import shown
 from steadyslip.experiments.fitting.inputs import LEAST_RATE
+from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.protocol.protocol import LOAD_POINT
-
-if TYPE_CHECKING:
-    from steadyslip.experiments.fitting.plan import Plan
 
 
 def check_friction(records: Iterable[Record]) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers, SearchStory
-from steadyslip.experiments.fitting.plan import Plan, make_plan
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record

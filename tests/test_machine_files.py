@@ -125,7 +125,7 @@ STRUCTURE = {
     "cannot slide on itself": (
         two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="table")}}, "contacts.g.against"),
     "do not slide": (
-        two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="motor")}}, "contacts"),
+        two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="motor")}}, "contacts.g"),
     "write 'rotary-pd'": (
         two_mass(), {"bodies": {"motor": ss.RotatingBody(), "table": ss.SlidingBody()}}, "drive.control"),
     "does not; see the kinds of link": (

@@ -127,3 +127,50 @@ def test_a_gear_whose_friction_grows_with_its_torque_is_an_inclined_spring():
     dragged = replace(machine, contacts={**machine.contacts, "drum": surface("load", friction, load=3.0)})
     sigma = (2.0 + gain * 1.8) / (1 - 0.6 * gain)  # the gear carries the friction of the load as well
     assert ss.steady_state(dragged).contacts["mesh"].normal_force == pytest.approx(sigma)
+
+
+def _in_the_plane(belt):
+    """A pad on three links over a compliant disc; with `belt` links end at the ground and the drive moves the disc."""
+    held, lean = ("ground", -1.0) if belt else ("drive", 1.0)
+    rubs = {"body": "drive", "against": "pad"} if belt else {"body": "pad"}
+    return ss.Machine(
+        bodies={"pad": ss.PlanarBody(mass=1.0, press=1.0), "tail": ss.SlidingBody(mass=0.2)},
+        links={
+            "arm": ss.Spring(between=(held, "pad"), stiffness=0.7, damping=0.02),
+            "lining": ss.Spring(between=(held, "pad"), stiffness=0.1, direction="normal"),
+            "caliper": ss.Spring(between=(held, "pad"), stiffness=0.6, angle=lean * np.pi / 5),
+            "hook": ss.Spring(between=("pad", "tail"), stiffness=0.4),
+            "air": ss.Spring(between=("ground" if not belt else "drive", "tail"), damping=0.1),
+        },
+        contacts={
+            "disc": ss.Surface(**rubs, friction=rate_state(0.3, -0.1, 1.0), contact=ss.Compliant(normal_stiffness=0.8))
+        },
+        drive=ss.Pull(velocity=1.0),
+    )
+
+
+def test_what_moves_and_what_stands_is_a_matter_of_view():
+    """Seen from the drive the ground moves: a block on a belt is a block pulled over the ground, in the mirror."""
+    pulled, belt = _in_the_plane(False), _in_the_plane(True)
+    assert ss.eigenvalues(belt) == pytest.approx(ss.eigenvalues(pulled), rel=1e-11)
+    assert ss.stable_values(belt, "hook.stiffness") == pytest.approx(ss.stable_values(pulled, "hook.stiffness"))
+    a, b = ss.steady_state(pulled), ss.steady_state(belt)
+    assert b.contacts["disc"].normal_force == pytest.approx(a.contacts["disc"].normal_force, rel=1e-12)
+    assert b.links["arm"] == pytest.approx(-a.links["arm"], rel=1e-12)
+
+
+def test_a_belt_moves_a_block_as_the_ground_does():
+    def block(belt):
+        ends, rubs = ("ground", {"body": "drive", "against": "b"}) if belt else ("drive", {"body": "b"})
+        return ss.Machine(
+            bodies={"b": ss.SlidingBody(mass=0.5)},
+            links={"k": ss.Spring(between=(ends, "b"), stiffness=1.0)},
+            contacts={"c": surface(friction=rate_state(0.5, -0.3, 1.0), **rubs)},
+            drive=ss.Pull(velocity=1.0),
+        )
+
+    times = np.linspace(0, 20, 30)
+    pulled = ss.simulate(block(False), until=20.0, initial={"b.v": 1.3}, times=times)
+    belt = ss.simulate(block(True), until=20.0, initial={"b.v": -0.3}, times=times)
+    assert belt["c.slip_rate"] == pytest.approx(pulled["c.slip_rate"], rel=1e-6)
+    assert belt["b.x"] == pytest.approx(-pulled["b.x"], abs=1e-6)

@@ -140,11 +140,16 @@ class InternalError(SteadyslipError, RuntimeError):
         super().__init__(f"a fault in steadyslip: expected {expected}; please report how you came here")
 
 
-def unknown_name(what: str, name: object, allowed: Iterable[str]) -> str:
-    """Say that `name` is unknown, with the nearest valid name or all of them."""
+def legible(name: str) -> str:
+    """A name for a message: as it is, or quoted and cut where it would break the line."""
+    return name if name.isprintable() and len(name) <= MOST_SHOWN // 2 else came(name)
+
+
+def unknown_name(what: str, name: object, allowed: Iterable[str], guess: bool = True) -> str:
+    """Say that `name` is unknown, with all valid names, and unless not to `guess` the nearest of them."""
     allowed = list(allowed)
-    close = get_close_matches(str(name), allowed, n=1, cutoff=0.5)
-    if not close and "." not in str(name):  # the last part of a dotted name is often enough
+    close = get_close_matches(str(name), allowed, n=1, cutoff=0.5) if guess else []
+    if guess and not close and "." not in str(name):  # the last part of a dotted name is often enough
         last = {full.rpartition(".")[2]: full for full in allowed}
         close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""

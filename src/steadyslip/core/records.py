@@ -132,7 +132,7 @@ class Condition:
     Attributes
     ----------
     name : str
-        Field that a message names.
+        Field that a message names, or a member of one, such as ``contacts.guide``.
     holds : bool or ndarray of bool
         Per rig, where the numbers are arrays.
     message : str
@@ -154,7 +154,7 @@ class Condition:
         arrays = np.broadcast_arrays(holds, *self.numbers)
         where = tuple(int(i) for i in np.argwhere(~arrays[0])[0])
         place = f" (at position {where})" if arrays[0].size > 1 else ""
-        return Problem(name or self.name, self.message.format(*(repr(float(a[where])) for a in arrays[1:])) + place)
+        return Problem(name or self.name, self.message.format(*(f"{float(a[where]):.12g}" for a in arrays[1:])) + place)
 
 
 Declared = Value | Part | Named
@@ -406,7 +406,9 @@ def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Co
     """Every condition below `record`, with the dotted name of the field that it is about."""
     layout = _layout(record)
     own = {field_name: prefix + own_name for field_name, own_name, _ in layout}
-    yield from ((own[condition.name], condition) for condition in record.conditions())
+    for condition in record.conditions():
+        first, dot, rest = condition.name.partition(".")
+        yield own[first] + dot + rest, condition
     for field_name, _, role in layout:
         if isinstance(role, Part):
             for before, member in below(role, getattr(record, field_name), own[field_name], prefix):

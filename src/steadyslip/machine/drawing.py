@@ -179,15 +179,15 @@ class Drawing:
     def _contacts(self, name: str) -> None:
         """What a body slides on: pads beside each other on ground or drive, or another body above or below."""
         place = self.places[name]
-        own = [(n, one) for n, one in self.machine.contacts.items() if one.body == name]
-        beside = [(n, one) for n, one in own if one.against in (GROUND, LOAD_POINT)]
+        own = [(n, one) for n, one in self.machine.contacts.items() if one.held == name]
+        beside = [(n, one) for n, one in own if one.base in (GROUND, LOAD_POINT)]
         wide = max(_WIDE, 1.25 * len(beside)) / max(len(beside), 1)
         for i, (contact, one) in enumerate(beside):
             x = place.x + (i - (len(beside) - 1) / 2) * wide
             self._pad(x, place, wide, contact, one)
         for contact, one in own:
-            if one.against in self.machine.bodies:
-                self._interface(place, self.places[one.against], contact, one)
+            if one.base in self.machine.bodies:
+                self._interface(place, self.places[one.base], contact, one)
 
     def _pad(self, x: float, place: _Place, wide: float, name: str, one: Surface) -> None:
         top = place.y - _HIGH / 2
@@ -203,7 +203,7 @@ class Drawing:
             self.pencil.line((x, top), (x, foot))
             self.pencil.line((place.x, top), (x, top))
         self.pencil.hatched(x - half, foot - 0.2, 2 * half, 0.2)
-        if one.against == LOAD_POINT:
+        if one.base == LOAD_POINT:
             self.pencil.arrow((x - 0.3, foot - 0.1), (x + 0.3, foot - 0.1))
         self.pencil.words(x, foot - 0.28, self._told(name, self._load(name, one)), va="top")
 

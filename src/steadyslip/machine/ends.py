@@ -18,7 +18,7 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
         for end in ends if isinstance(ends, list) else ():
             yield from _unknown(f"links.{name}.between", end, [*bodies, GROUND, LOAD_POINT])
     for name, touch in contacts.items():
-        yield from _unknown(f"contacts.{name}.body", touch.get("body"), list(bodies))
+        yield from _unknown(f"contacts.{name}.body", touch.get("body"), [*bodies, LOAD_POINT])
         yield from _unknown(f"contacts.{name}.against", touch.get("against"), [*bodies, GROUND, LOAD_POINT])
         if isinstance(by := touch.get("loaded_by"), str) and by not in links:
             yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", by, links))
@@ -28,7 +28,29 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
         yield from _unknown(f"drive.{key}", driven.get(key), list(bodies))
     named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
     named += [touch.get(key) for touch in contacts.values() for key in ("body", "against")]
-    yield from unnamed(bodies, [*named, driven.get("body")])
+    lost = list(unnamed(bodies, [*named, driven.get("body")]))
+    yield from lost
+    if all(end in (*bodies, GROUND, LOAD_POINT) for end in named if isinstance(end, str)):
+        told = {problem.name for problem in lost}
+        yield from (one for one in _floating(bodies, links, driven.get("body")) if one.name not in told)
+
+
+def _floating(bodies: Iterable[str], links: Mapping[str, Mapping[str, Any]], driven: Any) -> Iterator[Problem]:
+    """Bodies that no chain of links with stiffness reaches from drive or ground, be the numbers what they may."""
+    stiff = [link for link in links.values() if "stiffness" in link and link.get("direction") != "normal"]
+    ties = [link["between"] for link in stiff if isinstance(link.get("between"), list)]
+    reached = [GROUND, LOAD_POINT, *([driven] if isinstance(driven, str) else [])]
+    for one in reached:  # grows while it is gone through
+        reached += [end for ends in ties if one in ends for end in ends if end not in reached]
+    yield from (floats(name) for name in bodies if name not in reached)
+
+
+def floats(name: str) -> Problem:
+    """A body whose speed in steady sliding nothing settles."""
+    return Problem(
+        f"bodies.{name}", "floats: no chain of links with stiffness ties it to the drive or the ground, so that its "
+        "speed in steady sliding is open",
+    )  # fmt: skip
 
 
 def unnamed(bodies: Iterable[str], named: Sequence[Any]) -> Iterator[Problem]:

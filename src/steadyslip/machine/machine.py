@@ -12,7 +12,7 @@ from steadyslip.core.errors import Problem, unknown_name
 from steadyslip.core.quantities import is_per_area, stress_name, total_unit
 from steadyslip.core.records import Address, Condition, Members, members, part
 from steadyslip.machine.bodies import Body
-from steadyslip.machine.ends import unnamed
+from steadyslip.machine.ends import floats, unnamed
 from steadyslip.machine.links import Link
 from steadyslip.machine.mechanism import (
     GROUND,
@@ -93,10 +93,12 @@ class Machine(Rig):
             if set(link.between) == {GROUND, LOAD_POINT}:
                 yield Problem(f"links.{name}.between", "links no body; allowed: a body at one end at least")
         for name, touch in self.contacts.items():
-            yield from self._end(f"contacts.{name}.body", touch.body, ())
+            yield from self._end(f"contacts.{name}.body", touch.body, (LOAD_POINT,))
             yield from self._end(f"contacts.{name}.against", touch.against)
             if touch.body == touch.against:
                 yield Problem(f"contacts.{name}.against", f"{touch.body!r} cannot slide on itself")
+            if {touch.body, touch.against} == {GROUND, LOAD_POINT}:
+                yield Problem(f"contacts.{name}.against", "no body slides there; name one as body or against")
             if touch.loaded_by is not None and touch.loaded_by not in self.links:
                 yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", touch.loaded_by, self.links))
         if self.drive.driven() is not None:
@@ -137,8 +139,11 @@ class Machine(Rig):
                     f"motion = 'plane' for {touch.body!r}",
                 )  # fmt: skip
             link = self.links.get(touch.loaded_by)
-            if link is not None and touch.body not in link.between:
-                yield Problem(f"{where}.loaded_by", f"the link {touch.loaded_by!r} does not hold {touch.body!r}")
+            if link is not None and touch.held not in link.between:
+                yield Problem(f"{where}.loaded_by", f"the link {touch.loaded_by!r} does not hold {touch.held!r}")
+            elif link is not None and "x" not in link.directions():
+                message = f"the link {touch.loaded_by!r} pulls away from the surface only; allowed: one along the slide"
+                yield Problem(f"{where}.loaded_by", message)
         for name, body in self.bodies.items():
             carried = any(name in (c.body, c.against) and c.contact.is_compliant() for c in self.contacts.values())
             held = any(name in link.between and "y" in link.directions() for link in self.links.values())
@@ -151,10 +156,7 @@ class Machine(Rig):
         speeds, _ = self._speeds()
         for name in self.bodies:
             if name not in speeds:
-                yield Problem(
-                    f"bodies.{name}", "floats: no chain of links with stiffness ties it to the drive or the ground, so "
-                    "that its speed in steady sliding is open",
-                )  # fmt: skip
+                yield floats(name)
 
         for body in () if self.drive.driven() is None else dict.fromkeys(self.drive.watched()):
             if body in speeds and not speeds[body]:
@@ -170,10 +172,10 @@ class Machine(Rig):
         for name, touch in self.contacts.items():
             slip = self._slip_rate(touch, speeds)
             message = (
-                f"contact {name}: its slip rate in steady sliding is {{}} m/s; allowed: > 0; bodies that move together "
+                "its slip rate in steady sliding is {} m/s; allowed: > 0; bodies that move together "
                 "do not slide, and where it is negative exchange body and against"
             )
-            yield Condition("contacts", np.asarray(slip) > 0, message, (slip,))
+            yield Condition(f"contacts.{name}", np.asarray(slip) > 0, message, (slip,))
 
     # -- how it moves
 
@@ -245,7 +247,7 @@ class Machine(Rig):
         return {end: share for end, share in row.items() if end != GROUND}
 
     def _apart(self, touch: Surface) -> dict[str, Any]:
-        row = {touch.body: 1, touch.against: -1}
+        row = {touch.held: 1, touch.base: -1}
         return {end + NORMAL: share for end, share in row.items() if self._lifts(end)}
 
     def _element(self, name: str, link: Link) -> Element:

@@ -8,7 +8,7 @@ from steadyslip.core.records import FrozenRecord, parameter, part, setting
 from steadyslip.core.roles import Text, positive
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
-from steadyslip.machine.mechanism import GROUND
+from steadyslip.machine.mechanism import GROUND, LOAD_POINT
 
 
 class Surface(FrozenRecord):
@@ -20,7 +20,7 @@ class Surface(FrozenRecord):
     has_area: ClassVar[bool] = True
     in_totals: ClassVar[bool] = True
 
-    body: str = setting(Text("the body that slides"))
+    body: str = setting(Text("the body that slides; drive where that moves beneath a body, as a belt does"))
     against: str = setting(Text("what it slides on: a body, ground or drive"), default=GROUND)
     friction: FrictionLaw = part(FrictionLaw, "friction law")
     contact: ContactLaw = part(ContactLaw, "contact law")
@@ -31,3 +31,13 @@ class Surface(FrozenRecord):
     loaded_by: str | None = setting(
         Text("the link whose force the contact law sees as T; what pulls at the body unless given"), default=None
     )
+
+    @property
+    def held(self) -> str:
+        """The body that the contact rubs on: that which slides, or lies on what the drive moves."""
+        return self.against if self.body == LOAD_POINT else self.body
+
+    @property
+    def base(self) -> str:
+        """The other end."""
+        return self.body if self.body == LOAD_POINT else self.against

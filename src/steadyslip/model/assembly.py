@@ -268,7 +268,7 @@ class _Assembly:
 
     def _seen(self, place: _Place) -> Motion:
         """What a contact law sees; defines T, the pull at the body as a stress of the contact."""
-        touch, body = place.touch, next(iter(place.touch.slip))
+        touch, body = place.touch, next(name for name in place.touch.slip if name != LOAD_POINT)
         pulling = [one for one in self.mechanism.elements if not one.grounded]
         if touch.loaded_by:
             pulling = [one for one in self.mechanism.elements if one.name == touch.loaded_by]

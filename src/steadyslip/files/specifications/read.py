@@ -228,9 +228,11 @@ def read_tables(
 
 
 def _not_empty(text: str, source: str) -> str:
+    text = text.removeprefix("\ufeff")
     if not text.strip():
         names = ", ".join(f"[{section.name}]" for section in sections())
-        raise _failed(source, f"is empty; a rig file has the tables {names}")
+        others = ", ".join(f"[{one.name}.NAME]" if one.keyed else f"[{one.name}]" for one in machine_sections())
+        raise _failed(source, f"is empty; a rig file has the tables {names}, one of a machine {others}")
     return text
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import Field, fields, replace
 from typing import Any
 
-from steadyslip.core.errors import ParameterError, Problem, came, unknown_name
+from steadyslip.core.errors import ParameterError, Problem, came, legible, unknown_name
 from steadyslip.core.quantities import is_per_area, total_unit
 from steadyslip.core.records import (
     Declared,
@@ -106,13 +106,18 @@ class TableReader:
 
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
         """Tables by names that the user gives."""
-        if not isinstance(raw, dict) or not all(isinstance(member, dict) for member in raw.values()):
+        if not isinstance(raw, dict):
             self.problem(name, f"got {came(raw)}; allowed: a table for each, [{name}.NAME]")
             return None
         before, found = len(self.problems), {}
         for key, member in raw.items():
             if wrong := unfit_name(key):
-                self.problem(f"{name}.{key}", wrong)
+                self.problem(f"{name}.{legible(key)}", wrong)
+            elif not isinstance(member, dict):
+                message = (
+                    f"got {came(member)}; allowed: a table [{name}.{key}]; what stands in [{name}] is a table for each"
+                )
+                self.problem(f"{name}.{key}", message)
             elif (one := self.record(role.family, member, f"{name}.{key}.")) is not None:
                 found[key] = one
         return Members(found) if len(self.problems) == before else None
@@ -156,7 +161,8 @@ class TableReader:
             elif is_required(item):
                 self.problem(prefix + key, _missing(self.told(role)))
         for name, value in rest.items():
-            self.problem(prefix + name, unknown_name("key", name, keys) + _key_of_another(law, name, value))
+            another = _key_of_another(law, name, value)
+            self.problem(prefix + legible(name), unknown_name("key", name, keys, guess=not another) + another)
         return arguments
 
     def _by_name(self, role: Part, rest: Table, prefix: str) -> tuple[FrozenRecord, ...]:
@@ -214,7 +220,8 @@ class TableReader:
         here = self.outside(role)
         if self.area is not None and is_per_area(here.unit):
             here = replace(here, unit=total_unit(here.unit))
-        word = "torque" if here.unit == "N m" else "force" if here.unit.startswith("N") else "stress"
+        forces = here.unit.startswith("N") or (self.in_totals and self.area is None)
+        word = "torque" if here.unit == "N m" else "force" if forces else "stress"
         return replace(here, doc=here.doc.replace("stress", word))
 
     def _part(self, role: Part, raw: Any, name: str) -> Any:
@@ -344,6 +351,6 @@ def _part_of_another(family: type[FrozenRecord], name: object) -> str:
     """Which law of a family has a part of this name, where the family itself has no such law."""
     for word, law in family.registry.items():
         for item, role in own_fields(law):
-            if isinstance(role, Part) and role.inline and name in role.family.registry:
+            if isinstance(role, Part) and role.inline and isinstance(name, str) and name in role.family.registry:
                 return f'; write {selector(family)[0]} = "{word}" and {item.name} = "{name}"'
     return ""

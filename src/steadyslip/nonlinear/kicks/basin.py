@@ -195,7 +195,7 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
         return _Plane(("x", "v"), ("m", "m/s"), float(rest.way[0]), heights, drive)
     model, scales = rest.reduction.model, natural_scales(rest.point, rest.reduction)[0]
     touch = list(rig.contacts)[rest.contact]
-    body = at or rig.contacts[touch].body
+    body = at or rig.contacts[touch].held
     by_name = {item.name: item for item in model.variables}
     place, speed = by_name[f"{body}.x"], f"{body}.v"
     length = float(np.ravel(scales[place.name])[0])

@@ -10,7 +10,7 @@ import pytest
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.condensed import Condensed, condensed
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 
 
 @pytest.fixture(scope="module")

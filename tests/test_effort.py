@@ -9,7 +9,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.effort import MODELS, Budget, work_of_search
 from steadyslip.experiments.fitting.forward import Forward
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.kernels.layout import Setting
 
 

@@ -12,7 +12,7 @@ from scipy.stats import binom
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.fit import finished
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe
 

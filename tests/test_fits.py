@@ -441,6 +441,9 @@ def test_bad_records_are_named():
     flat = ss.record_from_arrays(record.time, friction=np.full(100, 0.9), displacement=record.displacement)
     with pytest.raises(ss.ParameterError, match=r"friction is 0\.9 in all samples"):
         ss.fit(ss.lab_rig(), flat)
+    calm = ss.record_from_arrays(record.time, friction=record.friction, displacement=1e-6 * record.time)
+    with pytest.raises(ss.ParameterError, match="no change of the load point's rate"):
+        ss.fit(ss.lab_rig(), calm)
     with pytest.raises(ss.ParameterError, match="allowed: a Record"):
         ss.fit(ss.lab_rig(), "record.csv")
     with pytest.raises(ss.ParameterError, match="allowed: a Slider"):

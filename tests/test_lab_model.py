@@ -12,7 +12,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.inputs import MeasuredInputs, Sharp, sharp_changes
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.kernels.experiment import ExperimentProgram
 from steadyslip.kernels.runner import Runner
 from steadyslip.model.reducing import reduce_model
@@ -214,7 +214,9 @@ def space_index(space, name):
 def test_no_steady_sliding_to_start_from_is_no_crash():
     rig = replace(lab.rig(), contact=ss.InclinedSpring(preload=8e6, angle=0.3))
     record = ss.record_from_arrays(
-        np.linspace(0, 10, 50), friction=np.full(50, 0.6), displacement=np.linspace(0, 1e-5, 50)
+        np.linspace(0, 10, 50),
+        friction=np.full(50, 0.6),
+        displacement=np.interp(np.arange(50), [0, 25, 49], [0, 5e-6, 2e-5]),
     )
     plan = make_plan(rig, record, free=["contact.angle"], fixed=["friction.mu_ref"])
     seen, _ = plan.comparison().model(plan.space().coordinates(np.array([[0.3], [-1.2]])))

@@ -164,13 +164,75 @@ def test_a_change_among_very_many_samples_is_found_to_the_sample(monkeypatch, at
     assert change.time == pytest.approx(at, abs=5e-3)
 
 
-@pytest.mark.parametrize(("at", "count"), [(93.3, 1), (27990.0, 1), (45.0, 0)])
+@pytest.mark.parametrize(("at", "count"), [(93.3, 1), (27990.0, 1), (45.0, 1), (17.0, 1), (28070.0, 1), (7.0, 0)])
 def test_a_short_run_at_an_end_of_the_record_is_one(at, count):
-    """Seven samples of another rate where nothing is noisy; two may be the sensor's."""
+    """Two samples of another rate where nothing is noisy; one has no rate."""
     time = np.linspace(0.0, 28087.0, 2000)
     moved = 1e-6 * np.minimum(time, at) + 1e-7 * np.maximum(time - at, 0.0)
     found = load_course(time, moved).changes
     assert [change.time for change in found] == [pytest.approx(at, abs=0.1)] * count
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    ("rate", "noise", "enough"), [(10.0, 0.0, 2), (10.0, 0.03, 12), (0.0, 0.001, 2), (3.5, 0.001, 5)]
+)
+def test_a_rate_of_few_samples_at_an_end_is_found_where_they_tell_it(turned, rate, noise, enough):
+    """It and its time within their errors; of fewer samples nothing, or the same; never another story."""
+    time = np.arange(0.0, 40.0, 0.02)
+    for count in range(1, 21):
+        at = (count - 0.63) * 0.02
+        changes = [(time[-1] - at, 3.0, rate)] if turned else [(at, rate, 3.0)]
+        course = load_course(time, measured(time, changes, noise, 0, 0, count))
+        assert len(course.changes) == 1 or (count < enough and not course.changes)
+        lead = (count - 0.63) * abs(rate - 3.0) * 0.02
+        assert len(course.changes) or lead < 10 * noise or course.late + course.early > 0
+        for change in course.changes:
+            end = -1 if turned else 0
+            assert change.earliest - 2e-4 <= changes[0][0] <= change.latest + 2e-4
+            assert abs(1e6 * course.levels[end] - rate) < 5e6 * course.errors[end] + 1e-3
+
+
+def test_a_flank_of_a_glitch_at_an_end_is_no_rate():
+    """Half of a glitch as it fades, or a level of its own: left out, and said."""
+    time = np.arange(0.0, 40.0, 0.02)
+    rng = np.random.default_rng(5)
+    for width, height in ((0.1, -3.0), (0.1, 3.0), (0.3, -4.0), (0.05, 2.0)):
+        off = height * np.exp(-0.5 * (time / width) ** 2)
+        for faulty in (off, -off[::-1]):
+            course = load_course(time, 1e-6 * (3 * time + faulty + 0.03 * rng.standard_normal(len(time))))
+            assert course.changes == ()
+            assert course.levels == pytest.approx(3e-6, rel=1e-3)
+            assert course.early + course.late > 1
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 2e-3])
+def test_a_step_of_normal_stress_is_found_from_two_samples_on(noise):
+    """One alone at an end may be the sensor's, and is left out."""
+    time = np.arange(0.0, 40.0, 0.02)
+    for count in range(1, 21):
+        for at in ((count - 0.63) * 0.02, time[-1] - (count - 0.63) * 0.02):
+            rng = np.random.default_rng(count)
+            course = stress_course(time, np.where(time > at, 2.1e7, 2e7) * (1 + noise * rng.standard_normal(len(time))))
+            assert course.curve is None
+            assert len(course.changes) == (count > 1)
+            assert all(change.earliest <= at <= change.latest for change in course.changes)
+            assert course.early + course.late == (count == 1)
+
+
+def test_a_record_whose_ends_do_not_tell_is_fitted_without_them_and_says_so():
+    run = lab.columns(lab.rig(), lab.STEP)
+    rng = np.random.default_rng(0)
+    early, late = np.zeros(1000), np.zeros(1000)
+    early[:3], late[-2:] = (2e-7, 5e-7, -4e-7), (3e-7, -8e-7)
+    run["friction"] = run["friction"] + lab.NOISE * rng.standard_normal(1000)
+    run["friction"][-6:] += 0.01
+    run["displacement"] = run["displacement"] + early + late + 1e-8 * rng.standard_normal(1000)
+    words = str(ss.fit(ss.lab_rig(), ss.record_from_arrays(**run))).replace("\n  ", " ")
+    assert (
+        "of the load point, the first 3 (until 0.3003003 s) and the last 2 (from 149.8498 s) samples are off" in words
+    )
+    assert "friction ends +0.0" in words
 
 
 # -- tables

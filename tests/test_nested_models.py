@@ -12,7 +12,7 @@ import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting import search
 from steadyslip.experiments.fitting.nested import simpler
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.search import in_order, ordered
 from steadyslip.experiments.fitting.starts import features_of, starting_points
 from steadyslip.experiments.numerics.least_squares import Minima

@@ -7,7 +7,7 @@ import pytest
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 
 RELOADS = ss.Protocol(
     pieces=(ss.Hold(at=40.0, duration=60.0), ss.VelocityStep(at=160.37, to=4e-6)), until=260.0

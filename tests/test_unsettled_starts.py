@@ -9,7 +9,7 @@ import pytest
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 
 STEPS = ss.Protocol(
     pieces=(ss.VelocityStep(at=20.0, to=3e-6), ss.VelocityStep(at=80.37, to=9e-6), ss.VelocityStep(at=130.21, to=3e-6)),

@@ -15,7 +15,7 @@ from steadyslip.core.quantities import shown
 from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.fitting.identify import Combination, combinations
-from steadyslip.experiments.fitting.plan import make_plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.measured.read import record_from_arrays
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import steady_state

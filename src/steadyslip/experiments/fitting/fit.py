@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.options import checked
+from steadyslip.experiments.fitting.checks import check_friction
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.numbers import SearchStory
-from steadyslip.experiments.fitting.plan import Plan, check_friction, check_width, make_plan
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.planning import check_width, make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.search import MOST, Told, in_order, searched
 from steadyslip.experiments.fitting.settings import STARTS

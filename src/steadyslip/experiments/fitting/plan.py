@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.quantities import shown
-from steadyslip.core.records import Address, parameters, resolve
+from steadyslip.core.errors import InternalError
+from steadyslip.core.records import parameters
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.comparison import (
     Comparison,
@@ -25,27 +23,21 @@ from steadyslip.experiments.fitting.comparison import (
 )
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.forward import Forward
-from steadyslip.experiments.fitting.inputs import LEAST_RATE, MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
-from steadyslip.experiments.fitting.settings import faults
+from steadyslip.experiments.fitting.inputs import MeasuredInputs, ProtocolInputs, Sharp, sharp_changes
 from steadyslip.experiments.fitting.unknowns import Space, Unknown, unknown
 from steadyslip.experiments.loading.kinks import smooth_load
 from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.kernels.experiment import experiment_program
 from steadyslip.laws.contact import pressed_at
-from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 from steadyslip.model.scales import natural_scales
-from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
-from steadyslip.protocol.protocol import LOAD_POINT, NORMAL_STRESS
+from steadyslip.protocol.protocol import NORMAL_STRESS
 
 Array = np.ndarray
-MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
-"""Samples of a record beyond which a fit works with means of them, and how many."""
 FRICTION = 0.01  # of friction: what matters
-NEVER_FREE = ("drive.velocity", "slider.area")
 
 
 @dataclass(frozen=True)
@@ -226,57 +218,6 @@ def _pressed_with(rig: Slider, stress: float) -> Slider:
     return replace(rig, contact=pressed_at(stress))
 
 
-def make_plan(
-    rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
-    separate: Sequence[str] = (), protocol: Any = None, **options: Any,
-) -> Plan:  # fmt: skip
-    """A plan from what a user gives; see `steadyslip.fit`.
-
-    Raises
-    ------
-    ParameterError
-        Listing everything that is wrong.
-    """
-    if not isinstance(rig, Slider):
-        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig or lab_rig gives")])
-    many = (records,) if isinstance(records, Record) else tuple(records)
-    if not many or not all(isinstance(record, Record) for record in many):
-        raise ParameterError(
-            [Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
-        )
-    plan_protocol = None if protocol is None else in_units_of(rig, Protocol.of(protocol))
-    if plan_protocol is not None:
-        push, press = targets(rig, plan_protocol)
-        if push or press:
-            raise NotAvailable("fits are not offered for creep and injection; allowed: other pieces, that move the "
-                               "load point or change the normal stress")  # fmt: skip
-    problems: list[Problem] = []
-    known = _can_be_free(rig, plan_protocol)
-    names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
-    if free is not None:  # the level of friction is not asked for, but never known beforehand
-        names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
-    held = _resolved("fixed", fixed, rig.parameters(), problems)
-    names = [name for name in dict.fromkeys(names) if name not in held]
-    apart = _resolved("separate", separate, dict.fromkeys(names), problems)
-    problems += faults({name: value for name, value in options.items() if name != "weights"})
-    for name in ("errors", "starts", "effort"):  # of the search, not of what is compared
-        options.pop(name, None)
-    if not names and not problems:
-        problems.append(Problem("free", f"nothing is free; name parameters such as {', '.join(list(known)[:3])}"))
-    weights = options.get("weights")
-    if weights is not None and not problems:
-        options["weights"] = _checked_weights(weights, many, problems)
-    if problems:
-        raise ParameterError(problems)
-    if weights is None:
-        many, options["weights"] = _weighed(many)
-    if plan_protocol is not None:
-        options["drive"] = "protocol"
-    plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
-    _check_records(plan)
-    return with_loading(plan)
-
-
 def with_loading(plan: Plan) -> Plan:
     """The plan knowing what drives the model in its records, which thinned ones no longer tell."""
     if plan.drive == "measured":
@@ -289,119 +230,3 @@ def with_loading(plan: Plan) -> Plan:
             loading = replace(loading, load=smooth_load(record.time, record.displacement))
         found.append(loading)
     return replace(plan, sharp=tuple(Sharp() for _ in plan.records), loading=tuple(found))
-
-
-def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
-    found = {
-        name: a for name, a in rig.parameters().items()
-        if a.value is not None and name not in NEVER_FREE and not a.role.gauge
-        and not (a.role.kind == "reference rate" and name.startswith("friction."))
-    }  # fmt: skip
-    if protocol is not None:
-        found |= {n: a for n, a in parameters(protocol, "protocol.").items() if n.endswith(".at")}
-    return found
-
-
-def _default_free(rig: Slider) -> list[str]:
-    """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
-    found = [name for name in _can_be_free(rig, None) if name.startswith("friction.")]
-    return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
-
-
-def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
-    if isinstance(names, str):
-        names = [names]
-    found = []
-    for name in names:
-        try:
-            found.append(resolve(name, known))
-        except (UnknownNameError, AttributeError) as error:
-            message = (
-                str(error) if isinstance(error, UnknownNameError) else f"got {name!r}; allowed: names of parameters"
-            )
-            problems.append(Problem(what, message))
-    return found
-
-
-def _weighed(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
-    """Long records as means that a fit can work with, and the weights of means; None where all was measured."""
-    handy = tuple(r if len(r) <= MOST_SAMPLES else r.decimated(HANDY_SAMPLES) for r in records)
-    if all(record.worth is None for record in handy):
-        return handy, None
-    worth = [np.ones(len(r)) if r.worth is None else r.worth for r in handy]
-    return handy, tuple(np.sqrt(own / np.mean(own)) for own in worth)
-
-
-def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[Problem]) -> tuple[Array, ...] | None:
-    rows = [weights] if len(records) == 1 and np.ndim(weights[0]) == 0 else list(weights)
-    found = []
-    for i, record in enumerate(records):
-        row = np.asarray(rows[i], dtype=float) if i < len(rows) else np.empty(0)
-        if row.shape != (len(record),) or not np.all((row >= 0) & np.isfinite(row)):
-            problems.append(Problem("weights", f"allowed: {len(record)} finite numbers >= 0 for record {i + 1}"))
-            return None
-        found.append(row)
-    return tuple(found)
-
-
-def check_friction(records: Iterable[Record]) -> None:
-    """Refuse measured friction that never changes, which is another column than that of friction."""
-    problems = [
-        Problem("record", f"{record.source}: friction is {record.friction[0]:.6g} in all samples; is it its column?")
-        for record in records
-        if np.ptp(record.friction) == 0
-    ]
-    if problems:
-        raise ParameterError(problems)
-
-
-def _check_records(plan: Plan) -> None:
-    problems = []
-    drives = plan.protocol is not None and any(piece.channel == LOAD_POINT for piece in plan.protocol.pieces)
-    given = float(plan.rig.drive.velocity)
-    for i, record in enumerate(plan.records, start=1):
-        where = "record" if len(plan.records) == 1 else f"record {i}"
-        if plan.protocol is None and record.displacement is None:
-            problems.append(Problem(where, f"{record.source} has no column for the load point's displacement or rate; "
-                                    "name it, or give the protocol of the experiment"))  # fmt: skip
-        elif plan.protocol is None and not (record.initial_rate or 0.0) > 0 and not _begins_at_rest(plan, record):
-            problems.append(Problem(where, f"{record.source}: the load point does not move forward at the start "
-                                    f"({record.initial_rate:.3g} m/s); a fit starts from steady sliding or, driven by "
-                                    "commanded loading, at rest; cut it with between=(start, end)"))  # fmt: skip
-        if plan.lag and (plan.protocol is not None or plan.drive != "commanded" or _curved(record.loading)):
-            problems.append(Problem("lag", f"{record.source} is not driven by steps and ramps found in it; allowed: "
-                                    "false, or drive = 'commanded' and a record of steps and ramps"))  # fmt: skip
-        rate = record.initial_rate or 0.0
-        if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
-            message = f"got {shown(given, 'm/s')}, but {record.source} begins at {shown(rate, 'm/s')}; make them agree"
-            problems.append(Problem("drive.velocity", message))
-        if plan.protocol is not None and not drives and record.displacement is not None:
-            problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "
-                                    "away, or give it a velocity-step, hold or velocity-table"))  # fmt: skip
-        if plan.protocol is not None and record.time[0] < 0:
-            problems.append(
-                Problem(where, f"{record.source} starts at {record.time[0]:.6g} s, before the protocol's 0 s")
-            )
-        needed = len(plan.free) + plan.trend + plan.offset + (plan.initial == "free")
-        if len(record) <= needed:
-            problems.append(Problem(where, f"{len(record)} samples for {needed} unknowns"))
-    if problems:
-        raise ParameterError(problems)
-
-
-def _begins_at_rest(plan: Plan, record: Record) -> bool:
-    return plan.drive == "commanded" and resting_rate(record.loading) is not None
-
-
-def _curved(loading: Loading) -> bool:
-    return any(course is not None and course.curve is not None for course in (loading.load, loading.stress))
-
-
-def check_width(plan: Plan, residuals: Array) -> Plan:
-    """The plan with a width for its loss: 1.345 standard deviations of most residuals, unless given."""
-    if plan.loss == "linear" or plan.width is not None:
-        return plan
-    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
-    if not spread > 0:
-        raise NotAvailable("residuals have no width; use loss='linear'")
-    return replace(plan, width=1.345 * spread)

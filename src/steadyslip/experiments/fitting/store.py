@@ -12,7 +12,8 @@ import numpy as np
 from steadyslip.core.errors import ParameterError, SteadyslipError
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers, SearchStory
-from steadyslip.experiments.fitting.plan import Plan, make_plan
+from steadyslip.experiments.fitting.plan import Plan
+from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.loading.loading import Change, Course, Loading
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
@@ -29,7 +30,7 @@ _OPTIONS = {
     "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "lag": bool,
     "initial": str, "loss": str, "width": {float, None}, "rtol": float,
 }  # fmt: skip
-_COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int)
+_COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int, int, int)
 _FORMS = {
     "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
@@ -171,7 +172,8 @@ def _written(loading: Loading | None) -> Any:
 
 def _course(course: Course) -> list[Any]:
     changes = [list(astuple(change)) for change in course.changes]
-    return [course.first, changes, list(course.errors), course.strays, course.slips, course.glitches]
+    return [course.first, changes, list(course.errors), course.strays, course.slips, course.glitches,
+            course.early, course.late]  # fmt: skip
 
 
 def _read(written: list[Any]) -> Loading | None:

@@ -16,7 +16,8 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.sliding import steady_state
 
 WIDTH = 100
-AWAY = 3.0  # root mean squares of the residuals by which the first of them, on average, may be off
+AWAY = 3.0  # root mean squares of the residuals by which the first and last of them, on average, may be off:
+BRIEFLY = 5  # of them, or one in two hundred
 SURE = 9.0  # fall of the sum of squares, in variances of an independent sample, that tells a ramp from a step
 VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
 
@@ -94,7 +95,7 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _unsettled(fit) + _vague_jumps(fit) + _untold_ramps(fit)
+    found += list(fit.at_bounds) + _unsettled(fit) + _off_the_loading(fit) + _vague_jumps(fit) + _untold_ramps(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
@@ -110,16 +111,42 @@ def _cut_off(fit: FitNumbers) -> str:
 
 
 def _unsettled(fit: FitNumbers) -> list[str]:
-    """Records whose friction begins elsewhere than the model, which begins with steady sliding."""
+    """Records whose friction begins, or ends, elsewhere than the model, which begins with steady sliding."""
     found = []
     for i, record in enumerate(fit.plan.records):
         own = fit.part(fit.residuals, i)
-        first = float(np.mean(own[: max(5, len(own) // 200)]))
-        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(first) > AWAY * fit.rms:
+        few = {BRIEFLY, max(BRIEFLY, len(own) // 200)}
+        begins, ends = (max((float(np.mean(side[:n])) for n in few), key=abs) for side in (own, own[::-1]))
+        if fit.plan.initial == "steady" and not fit.plan.rests(i) and abs(begins) > AWAY * fit.rms:
             found.append(
-                f"{record.source}: friction begins {first:+.2g} beside the model, which begins with steady sliding; "
+                f"{record.source}: friction begins {begins:+.2g} beside the model, which begins with steady sliding; "
                 "where the record does not, let its beginning be free (initial = 'free'), or cut it off (between)"
             )
+        if abs(ends) > AWAY * fit.rms:
+            found.append(
+                f"{record.source}: friction ends {ends:+.2g} beside the model; where the loading changed at the very "
+                "end, cut that off (between)"
+            )
+    return found
+
+
+def _off_the_loading(fit: FitNumbers) -> list[str]:
+    """Records that begin or end with samples off their loading, too few to tell why."""
+    found = []
+    for record, loading in zip(fit.plan.records, fit.plan.loading, strict=False):
+        courses = {"load point": loading.load, "normal stress": loading.stress if fit.plan.pressed else None}
+        for channel, course in courses.items():
+            if course is None:
+                continue
+            sides = [f"the first {course.early} (until {record.time[course.early - 1]:.7g} s)"] if course.early else []
+            sides += [f"the last {course.late} (from {record.time[-course.late]:.7g} s)"] if course.late else []
+            if sides:
+                cure = ", and let its beginning be free (initial = 'free')" if course.early else ""
+                found.append(
+                    f"{record.source}: of the {channel}, {_listed(sides)} samples are off what is found in the others, "
+                    "too few to tell a change from a fault of the sensor; the model does not follow them; where the "
+                    f"loading did change there, cut that off (between){cure}"
+                )
     return found
 
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from steadyslip.experiments.loading.ends import STILL, off_the_line, turned
 from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
 from steadyslip.experiments.numerics.noise import describe
@@ -19,8 +20,10 @@ RAMP = 40.0  # how much better a ramp must fit a displacement than a step, in un
 OUTLYING = 9.0  # squared deviation, in those units, from which on a sample weighs less
 BRIEF = 0.1  # of the samples of a run: a level of the sensor so short-lived may be the bottom of a glitch
 AT_REST = 1e-3  # of the highest rate: a hold
+SLOW = 0.02  # of it: a hold, if the error allows it
 MOST_CHANGES = 40  # beyond, and
 MOST_BETWEEN = 0.35  # share of the record that lies between runs: there is no piecewise-linear loading
+TELLING = 30  # samples that tell how noisy they are
 EXACT = 1e-2  # of a sampling interval: times known so well are not fitted
 
 
@@ -34,10 +37,11 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     between = sum(time[b.first] - time[a.last - 1] for a, b in pairwise(runs))
     if len(runs) - 1 > MOST_CHANGES or between > MOST_BETWEEN * (time[-1] - time[0]):
         return smooth_load(time, displacement)
-    strays, errors, inflation = zip(*(_errors(run, time, displacement) for run in runs), strict=True)
+    strays, errors, inflation = _errors(runs, time, displacement)
     rates = np.array([run.rate for run in runs])
     top = float(np.max(np.abs(rates)))
-    rest = np.abs(rates) <= np.maximum(AT_REST * top, np.minimum(4 * np.array(errors), 0.02 * top))
+    slow = np.array([SLOW if len(run.rows) >= TELLING else STILL for run in runs]) * top
+    rest = np.abs(rates) <= np.maximum(AT_REST * top, np.minimum(4 * np.array(errors), slow))
     rest &= len(runs) > 1
     rates = np.where(rest, 0.0, rates)
     changes = []
@@ -45,10 +49,13 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
         scale, worth = max(strays[k - 1 : k + 1]), max(inflation[k - 1 : k + 1])
         kink = _Kink(time, displacement, runs[k - 1], runs[k], (errors[k - 1], errors[k]), scale, worth)
         changes.append(kink.change(float(rates[k - 1]), float(rates[k]), blurred))
+    found = tuple(_inside(one, time) for one in _in_order(changes))
     return Course(
-        float(rates[0]), tuple(_in_order(changes)), np.where(rest, 0.0, errors), None, float(np.median(strays)),
+        float(rates[0]), found, np.where(rest, 0.0, errors), None, float(np.median(strays)),
         sum(max(run.groups) for run in runs),
         sum(sum(b[0] > a[1] for a, b in pairwise(run.members)) for run in runs),
+        off_the_line(time, displacement, runs[0], max(strays)),
+        off_the_line(turned(time), turned(displacement), runs[-1].turned(time), max(strays)),
     )  # fmt: skip
 
 
@@ -59,8 +66,26 @@ def smooth_load(time: Array, displacement: Array) -> Course:
     return Course(0.0, curve=spline.derivative(), strays=1.4826 * float(np.median(np.abs(strays))))
 
 
-def _errors(run: Run, time: Array, displacement: Array) -> tuple[float, float, float]:
-    """How far a run strays from its line, the error of its rate, and how many samples are worth one."""
+def _errors(runs: list[Run], time: Array, displacement: Array) -> tuple[list[float], list[float], list[float]]:
+    """How far runs stray from their lines, the errors of their rates, and how many samples are worth one.
+
+    A run of few samples does not tell its noise; it is as noisy as the longest.
+    """
+    found = [_error(run, time, displacement) for run in runs]
+    longest = max(range(len(runs)), key=lambda k: len(runs[k].rows))
+    scale, _, inflation = found[longest]
+    for k, run in enumerate(runs):
+        count = len(run.rows)
+        if count < TELLING and count < len(runs[longest].rows) and found[k][0] < scale:
+            size = float(np.sum((time[run.rows] - time[run.rows].mean()) ** 2))
+            noisy = scale > 1e-9 * max(float(np.ptp(displacement)), 1e-300)
+            found[k] = scale, scale * float(np.sqrt(inflation / size)) if noisy else 0.0, inflation
+    strays, errors, worth = (list(one) for one in zip(*found, strict=True))
+    return strays, errors, worth
+
+
+def _error(run: Run, time: Array, displacement: Array) -> tuple[float, float, float]:
+    """Of one run, by itself."""
     rows = run.rows
     own = np.repeat(run.groups, [j - i for i, j in run.members])
     t = time[rows] - time[0]
@@ -175,6 +200,13 @@ def _levels(run: Run, edge: int) -> list[float]:
     if len(counts) > 1 and counts[edge] < BRIEF * np.sum(counts):
         found.append(float(run.levels[1 if edge == 0 else -2]))
     return found
+
+
+def _inside(change: Change, time: Array) -> Change:
+    """A change that begins within the record: two samples at least lie on each side of it."""
+    low, high = float(time[1]), float(time[-2])
+    begin, earliest, latest = (min(max(at, low), high) for at in (change.time, change.earliest, change.latest))
+    return replace(change, time=begin, earliest=earliest, latest=latest)
 
 
 def _in_order(changes: list[Change]) -> list[Change]:

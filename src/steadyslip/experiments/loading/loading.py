@@ -78,6 +78,9 @@ class Course(ReadOnly):
         Sudden changes of the level of a displacement sensor that were left out.
     glitches : int
         Stretches of the column that were left out besides.
+    early, late : int
+        Samples at the beginning and at the end of the record that do not lie on it: whether the sensor or the loading
+        was another there, so few do not tell.
     """
 
     first: float
@@ -87,6 +90,8 @@ class Course(ReadOnly):
     strays: float = 0.0
     slips: int = 0
     glitches: int = 0
+    early: int = 0
+    late: int = 0
 
     @property
     def levels(self) -> Array:

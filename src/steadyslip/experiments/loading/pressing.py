@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,11 @@ class StressWave:
 
 
 def stress_course(time: Array, normal: Array) -> Course:
-    """The normal stress that was commanded."""
+    """The normal stress that was commanded; one sample by itself at an end of the record is not."""
+    early, late = (_alone(column) for column in (normal, normal[::-1]))
+    if early or late:
+        inner = slice(early, len(time) - late)
+        return replace(stress_course(time[inner], normal[inner]), early=early, late=late)
     noise = level_noise(normal)
     if (wave := oscillation(time, normal)) is not None:
         level, knots = float(np.mean(normal)), int(PER_PERIOD * (time[-1] - time[0]) / wave.period)
@@ -59,9 +63,21 @@ def stress_course(time: Array, normal: Array) -> Course:
     return Course(levels[0], changes, errors, _Spans(curves) if curves else None, noise)
 
 
+def _alone(normal: Array) -> int:
+    """Whether the first sample is far from those that follow, which agree: 0 or 1."""
+    if len(normal) < 4 * FEWEST:
+        return 0
+    following = normal[1 : 1 + FEWEST]
+    least = max(LEAST_STRESS * float(np.max(np.abs(following))), APART * level_noise(normal))
+    return int(abs(normal[0] - np.mean(following)) > least and float(np.ptp(following)) < least)
+
+
 def _transitions(time: Array, normal: Array, ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """For every change: the sample behind the last before it, and the first after it."""
     levels = np.array([float(np.median(normal[i:j])) for i, j in ranges])
+    for k, edge in ((0, slice(0, 2)), (-1, slice(-2, None))):  # the shortest range at an end may have two levels
+        if ranges[k][1] - ranges[k][0] < 2 * FEWEST:
+            levels[k] = float(np.mean(normal[edge]))
     lengths = np.array([time[j - 1] - time[i] for i, j in ranges])
     noise = level_noise(normal)
     found: list[tuple[int, int]] = []

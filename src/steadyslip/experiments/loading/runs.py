@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from steadyslip.experiments.loading.ends import run_at_start, turned
 from steadyslip.experiments.numerics.splitting import displacement_noise, split
 
 Array = np.ndarray
@@ -65,6 +66,13 @@ class Run:
     def rows(self) -> Array:
         return np.concatenate([np.arange(i, j) for i, j in self.members])
 
+    def turned(self, time: Array) -> Run:
+        """The run as it is in turned columns."""
+        count, span = len(time), float(time[-1] - time[0])
+        members = [(count - j, count - i) for i, j in reversed(self.members)]
+        groups = [self.groups[-1] - group for group in reversed(self.groups)]
+        return Run(members, self.rate, groups, -self.levels[::-1] - self.rate * span)
+
 
 class _Pieces:
     """Lines through ranges of samples, and how well they are known."""
@@ -114,7 +122,26 @@ def straight_runs(time: Array, displacement: Array) -> list[Run]:
         count = len(groups)
         groups = _without_wander(_without_excursions(_of_one_rate(groups, pieces), pieces), pieces)
     runs = [levelled(Run([pieces.ends[k] for k in members]), time, displacement) for members in groups]
-    return _without_returns(runs, time, displacement, pieces.usual)
+    return _with_ends(_without_returns(runs, time, displacement, pieces.usual), time, displacement, pieces.usual)
+
+
+def _with_ends(runs: list[Run], time: Array, displacement: Array, noise: float) -> list[Run]:
+    """Runs of their own of the few samples before the first run and behind the last, where they tell a rate.
+
+    A run so short at an end is asked again, as the ranges that it is made of may have a kink within.
+    """
+    found, count = list(runs), len(time)
+    if len(found) > 1 and found[0].last <= RELIABLE:
+        found = found[1:]
+    if len(found) > 1 and count - found[-1].first <= RELIABLE:
+        found = found[:-1]
+    sides = ((found[0], time, displacement), (found[-1].turned(time), turned(time), turned(displacement)))
+    own = [run_at_start(t, x, run, noise) for run, t, x in sides]
+    if own[0]:
+        found.insert(0, levelled(Run([(0, own[0])]), time, displacement))
+    if own[1]:
+        found.append(levelled(Run([(count - own[1], count)]), time, displacement))
+    return found
 
 
 def _parted(runs: list[Run], step: int, time: Array, displacement: Array) -> list[Run]:

@@ -1,0 +1,141 @@
+"""From what a user asks for to the plan of a fit; whatever is wrong with it is said at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.records import Address, parameters, resolve
+from steadyslip.experiments.fitting.checks import check_changes, check_records
+from steadyslip.experiments.fitting.plan import Plan, with_loading
+from steadyslip.experiments.fitting.settings import faults
+from steadyslip.experiments.measured.record import Record
+from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.slider import Slider
+from steadyslip.motion.targets import targets
+from steadyslip.protocol import Protocol
+
+Array = np.ndarray
+MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
+"""Samples of a record beyond which a fit works with means of them, and how many."""
+NEVER_FREE = ("drive.velocity", "slider.area")
+
+
+def make_plan(
+    rig: Slider, records: Any, free: Sequence[str] | None = None, *, fixed: Sequence[str] = (),
+    separate: Sequence[str] = (), protocol: Any = None, **options: Any,
+) -> Plan:  # fmt: skip
+    """A plan from what a user gives; see `steadyslip.fit`.
+
+    Raises
+    ------
+    ParameterError
+        Listing everything that is wrong.
+    """
+    if not isinstance(rig, Slider):
+        raise ParameterError([Problem("rig", f"got {rig!r}; allowed: a Slider, such as read_rig or lab_rig gives")])
+    many = (records,) if isinstance(records, Record) else tuple(records)
+    if not many or not all(isinstance(record, Record) for record in many):
+        raise ParameterError(
+            [Problem("record", f"got {records!r}; allowed: a Record, as read_record gives, or several")]
+        )
+    plan_protocol = None if protocol is None else in_units_of(rig, Protocol.of(protocol))
+    if plan_protocol is not None:
+        push, press = targets(rig, plan_protocol)
+        if push or press:
+            raise NotAvailable("fits are not offered for creep and injection; allowed: other pieces, that move the "
+                               "load point or change the normal stress")  # fmt: skip
+    problems: list[Problem] = []
+    known = _can_be_free(rig, plan_protocol)
+    names = _default_free(rig) if free is None else _resolved("free", free, known, problems)
+    if free is not None:  # the level of friction is not asked for, but never known beforehand
+        names = [*names, *(name for name in rig.of_kind("friction level") if name in known and name not in names)]
+    held = _resolved("fixed", fixed, rig.parameters(), problems)
+    names = [name for name in dict.fromkeys(names) if name not in held]
+    apart = _resolved("separate", separate, dict.fromkeys(names), problems)
+    problems += faults({name: value for name, value in options.items() if name != "weights"})
+    for name in ("errors", "starts", "effort"):  # of the search, not of what is compared
+        options.pop(name, None)
+    if not names and not problems:
+        problems.append(Problem("free", f"nothing is free; name parameters such as {', '.join(list(known)[:3])}"))
+    weights = options.get("weights")
+    if weights is not None and not problems:
+        options["weights"] = _checked_weights(weights, many, problems)
+    if problems:
+        raise ParameterError(problems)
+    if weights is None:
+        many, options["weights"] = _weighed(many)
+    if plan_protocol is not None:
+        options["drive"] = "protocol"
+    plan = Plan(rig, many, tuple(names), tuple(apart), protocol=plan_protocol, **options)
+    check_records(plan)
+    plan = with_loading(plan)
+    check_changes(plan)
+    return plan
+
+
+def _can_be_free(rig: Slider, protocol: Protocol | None) -> dict[str, Address]:
+    found = {
+        name: a for name, a in rig.parameters().items()
+        if a.value is not None and name not in NEVER_FREE and not a.role.gauge
+        and not (a.role.kind == "reference rate" and name.startswith("friction."))
+    }  # fmt: skip
+    if protocol is not None:
+        found |= {n: a for n, a in parameters(protocol, "protocol.").items() if n.endswith(".at")}
+    return found
+
+
+def _default_free(rig: Slider) -> list[str]:
+    """What experiments are made for: the friction law's parameters, and the machine's stiffness."""
+    found = [name for name in _can_be_free(rig, None) if name.startswith("friction.")]
+    return [*found, "slider.axial_stiffness" if rig.axial_stiffness is not None else "slider.stiffness"]
+
+
+def _resolved(what: str, names: Any, known: Any, problems: list[Problem]) -> list[str]:
+    if isinstance(names, str):
+        names = [names]
+    found = []
+    for name in names:
+        try:
+            found.append(resolve(name, known))
+        except (UnknownNameError, AttributeError) as error:
+            message = (
+                str(error) if isinstance(error, UnknownNameError) else f"got {name!r}; allowed: names of parameters"
+            )
+            problems.append(Problem(what, message))
+    return found
+
+
+def _weighed(records: tuple[Record, ...]) -> tuple[tuple[Record, ...], tuple[Array, ...] | None]:
+    """Long records as means that a fit can work with, and the weights of means; None where all was measured."""
+    handy = tuple(r if len(r) <= MOST_SAMPLES else r.decimated(HANDY_SAMPLES) for r in records)
+    if all(record.worth is None for record in handy):
+        return handy, None
+    worth = [np.ones(len(r)) if r.worth is None else r.worth for r in handy]
+    return handy, tuple(np.sqrt(own / np.mean(own)) for own in worth)
+
+
+def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[Problem]) -> tuple[Array, ...] | None:
+    rows = [weights] if len(records) == 1 and np.ndim(weights[0]) == 0 else list(weights)
+    found = []
+    for i, record in enumerate(records):
+        row = np.asarray(rows[i], dtype=float) if i < len(rows) else np.empty(0)
+        if row.shape != (len(record),) or not np.all((row >= 0) & np.isfinite(row)):
+            problems.append(Problem("weights", f"allowed: {len(record)} finite numbers >= 0 for record {i + 1}"))
+            return None
+        found.append(row)
+    return tuple(found)
+
+
+def check_width(plan: Plan, residuals: Array) -> Plan:
+    """The plan with a width for its loss: 1.345 standard deviations of most residuals, unless given."""
+    if plan.loss == "linear" or plan.width is not None:
+        return plan
+    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
+    if not spread > 0:
+        raise NotAvailable("residuals have no width; use loss='linear'")
+    return replace(plan, width=1.345 * spread)

@@ -179,7 +179,10 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
         patch: dict[str, Any] = {"facecolor": _AREAS[names[index]], "edgecolor": GREY}
         doubts = np.unique(found.doubt[found.outcome == names[index]])
         for why in doubts:
-            ax.fill_between([], [], label=_undecided(why) if why else names[index], **patch)
+            label = _undecided(why) if why else names[index]
+            if where := ", ".join(sorted({*found.contact[found.outcome == names[index]].ravel()} - {""})):
+                label = fill(f"{label} at {where}", WRAPPED)
+            ax.fill_between([], [], label=label, **patch)
     if found.v.min() > 0 and found.units[1].endswith("/s"):
         ax.set_yscale("log")
     ax.set_xlim(found.x.min() / length, found.x.max() / length)

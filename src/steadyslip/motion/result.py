@@ -43,12 +43,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def contact(self) -> str:
         """The contact of a machine at which a run ended that was to go on: lost, or the fastest; else empty."""
         last = next((e for e in reversed(self.events) if e.kind == self.status), None)
-        if isinstance(last, ContactEvent):
-            return last.contact
-        if self.status != "contact lost" or not isinstance(self.rig, Machine) or not len(self.data["t"]):
-            return ""
-        forces = {name: self.data[f"{name}.normal_force"] for name in self.rig.contacts}
-        return str(min(forces, key=lambda name: float(forces[name][-1] / forces[name].max())))
+        return last.contact if isinstance(last, ContactEvent) else ""
 
     @cached_property
     def slip_events(self) -> tuple[AnySlip, ...]:

@@ -19,8 +19,8 @@ from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, OperatingPoint
-from steadyslip.model.scales import slip_rates
 from steadyslip.model.sliding import steady_state
+from steadyslip.motion.ends import BLOWN_UP, LOST, ending_contact
 from steadyslip.motion.engine import Outcome, run_single
 from steadyslip.motion.events import AnyEvent, ContactEvent, event_of, events_of
 from steadyslip.motion.jobs import Jobs, Options, prepare
@@ -166,8 +166,8 @@ def _history(
     contacts = tuple(contact.name for contact in model.contacts)
     surfaces = _surfaces(jobs.point)
     events = events_of(outcome.log, contacts, surfaces)
-    if status == "blow-up":
-        events += (_last_event("blow-up", jobs, machine, outcome, surfaces),)
+    if status in (BLOWN_UP, LOST) and not any(event.kind == status for event in events):
+        events += (_last_event(status, jobs, machine, outcome, surfaces),)
     if status in ("done", "blow-up") and np.any(bad := out_of_range(found)):
         first = int(np.argmax(bad))
         if status == "done":
@@ -218,7 +218,7 @@ def _velocities(
 
 
 def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome, surfaces: tuple[float, ...]) -> AnyEvent:
-    """The end of a run that could not go on, as an event: of a machine at the contact that is fastest."""
+    """The end of a run that could not go on, as an event: of a machine at the contact that is lost, or fastest."""
     zero, final = np.zeros(1, dtype=int), outcome.final[0]
     segment, time = final[[Final.SEGMENT]].astype(int), final[[Final.TIME]]
     found = observe(jobs, machine, 0, zero, segment, time, outcome.point, outcome.tables)
@@ -226,8 +226,8 @@ def _last_event(kind: str, jobs: Jobs, machine: Runner, outcome: Outcome, surfac
     if not names[0]:
         wanted = ("v", "normal_stress", "shear_stress", "spring_stress", "slip")
         return event_of(kind, "", 1.0, [float(time[0]), *(float(found[name][0]) for name in wanted)])
-    steady = [float(speed) for speed in slip_rates(jobs.point)]
-    fastest = max(range(len(names)), key=lambda i: abs(float(found[f"{names[i]}.slip_rate"][0])) / steady[i])
+    stresses, rates = ([found[f"{name}.{what}"] for name in names] for what in ("normal_stress", "slip_rate"))
+    place = int(ending_contact(jobs.point, kind, stresses, rates)[0])
     wanted = ("slip_rate", "normal_stress", "shear_stress", "spring_stress", "slip")
-    numbers = [float(found[f"{names[fastest]}.{name}"][0]) for name in wanted]
-    return event_of(kind, names[fastest], surfaces[fastest], [float(time[0]), *numbers])
+    numbers = [float(found[f"{names[place]}.{name}"][0]) for name in wanted]
+    return event_of(kind, names[place], surfaces[place], [float(time[0]), *numbers])

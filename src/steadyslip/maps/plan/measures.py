@@ -181,16 +181,20 @@ class Events(Measure, name="events"):
     most_steps: float = parameter("1", steps, "steps after which a run is given up", default=1_000_000)
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
-        ended = (
+        ended: tuple[Output, ...] = (
             Output("outcome", "1", "how the run ended", tuple(WORDS)),
             Output("end_time", "s", "time reached"),
         )
+        if isinstance(rig, Machine):
+            meaning = "contact that was lost where a run ended so"
+            ended = (*ended, Output("outcome_contact", "1", meaning, ("none", *rig.contacts)))
         meant = (Output(name, event_unit(name), _in_words(name)) for name in event_names(rig))
         return (*ended, *meant)
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
         found = self._run(rig, protocol, vary)
-        return {"outcome": found.status_code, "end_time": found.end, **found.events}
+        ended = {"outcome": found.status_code, "end_time": found.end}
+        return {**ended, **_numbered(rig, "outcome_contact", found.contact), **found.events}
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         if self.until is None and protocol.until is None:
@@ -202,10 +206,19 @@ class Events(Measure, name="events"):
         return float(np.mean(found.steps + found.rejected)) * SECONDS_A_STEP + 1e-6
 
     def _run(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Any:
+        seen = tuple(f"{name}.normal_force" for name in rig.contacts) if isinstance(rig, Machine) else ()
         return simulate_many(
-            rig, vary, protocol, until=self.until, observables=(), method=self.method, rtol=self.rtol,
+            rig, vary, protocol, until=self.until, observables=seen, method=self.method, rtol=self.rtol,
             most_steps=int(self.most_steps), arrest=self.arrest, threads=1, progress=False,
         )  # fmt: skip
+
+
+def _numbered(rig: Slider | Machine, name: str, contact: np.ndarray) -> dict[str, np.ndarray]:
+    """Names of contacts of a machine as numbers, for the words of an output; nothing of a slider."""
+    if not isinstance(rig, Machine):
+        return {}
+    numbers = {own: number for number, own in enumerate(("", *rig.contacts))}
+    return {name: np.vectorize(numbers.__getitem__, otypes=[int])(contact)}
 
 
 def _in_words(name: str) -> str:
@@ -226,11 +239,14 @@ class KickThreshold(Measure, name="threshold"):
     precision: float = parameter("1", small, "relative, of the size found", default=1e-4)
 
     def outputs(self, rig: Slider | Machine, varied: Sequence[str]) -> tuple[Output, ...]:
+        lost = "contact that is lost beyond, or fastest in a blow-up"
+        names = ("none", *rig.contacts) if isinstance(rig, Machine) else ()
         return (
             Output("threshold", "1", f"size of the smallest {self.kick} kick not survived, not given where undecided"),
             Output("threshold_low", "1", f"size up to which {self.kick} kicks are known to be survived"),
             Output("threshold_high", "1", f"size of the smallest {self.kick} kick known not to be survived"),
             Output("threshold_limit", "1", f"what limits the {self.kick} kicks that are survived", BEYOND),
+            *((Output("threshold_contact", "1", lost, names),) if names else ()),
         )
 
     def arrays(self, rig: Slider | Machine, protocol: Protocol, vary: Vary) -> Mapping[str, Any]:
@@ -240,7 +256,7 @@ class KickThreshold(Measure, name="threshold"):
             threads=1, progress=False,
         )  # fmt: skip
         return {"threshold": found.size, "threshold_low": found.low, "threshold_high": found.high,
-                "threshold_limit": found.beyond}  # fmt: skip
+                "threshold_limit": found.beyond} | _numbered(rig, "threshold_contact", found.contact)  # fmt: skip
 
     def problems(self, rig: Slider | Machine, protocol: Protocol) -> Iterator[Problem]:
         if self.kick not in (known := kicks_of(rig)):

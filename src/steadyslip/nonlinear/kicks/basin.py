@@ -23,11 +23,11 @@ from steadyslip.motion import History, simulate
 from steadyslip.motion.jobs import prepare
 from steadyslip.nonlinear.kicks.kicks import options_for
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
 from steadyslip.nonlinear.kicks.places import steady_speeds
 from steadyslip.nonlinear.kicks.rest import Rest
 from steadyslip.nonlinear.kicks.settled import rest_of
-from steadyslip.nonlinear.kicks.spans import INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
+from steadyslip.nonlinear.kicks.spans import BLOW_UP, CONTACT_LOST, INTERRUPTED, OUTCOMES, Judged, StepBudget, doubt_of
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.cycles import cycles
 
@@ -60,6 +60,8 @@ class Basin(ReadOnly):
     units : tuple of str
     steady : tuple of float
         Where steady sliding is in the plane.
+    contact : ndarray of str (m, n)
+        Of a machine: the contact that is lost, or fastest in a blow-up; else empty.
     """
 
     rig: Slider | Machine
@@ -71,6 +73,7 @@ class Basin(ReadOnly):
     names: tuple[str, str] = ("x", "v")
     units: tuple[str, str] = ("m", "m/s")
     steady: tuple[float, float] = (0.0, 0.0)
+    contact: Array = field(default_factory=lambda: np.empty((0, 0), dtype=str), repr=False)
 
     @property
     def share(self) -> float:
@@ -169,11 +172,15 @@ def basin(
     runs = Judged(replace(jobs, size=count), *one, np.zeros(count), every, budget=budget)
     with progress_bar(count, progress, "starting points") as advanced:
         found = outcomes_of(runs, threads, advanced)
+    contact = contacts_of(runs, np.flatnonzero(np.isin(found, (CONTACT_LOST, BLOW_UP))), threads)
     reasons = [doubt_of(code) for code in range(len(OUTCOMES))]
     outcome, doubt = (np.array(words)[found].reshape(width.shape) for words in (OUTCOMES, reasons))
     along = "stiffness" if along is None and isinstance(rig, Slider) else along
     orbits = () if along is None or np.any(found == INTERRUPTED) else _unstable_cycles(rig, along, branch, progress)
-    return Basin(rig, across, up, outcome, doubt, orbits, plane.names, plane.units, (0.0, plane.steady))
+    return Basin(
+        rig, across, up, outcome, doubt, orbits, plane.names, plane.units, (0.0, plane.steady),
+        contact.reshape(width.shape),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

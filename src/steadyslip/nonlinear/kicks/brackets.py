@@ -14,7 +14,16 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.many import broadcast_arrays, regimes
 from steadyslip.nonlinear.kicks.kicks import Kicked, kicks_of
-from steadyslip.nonlinear.kicks.spans import CERTAIN, DOUBTS, INTERRUPTED, OUTCOMES, RETURNS, UNDECIDED
+from steadyslip.nonlinear.kicks.spans import (
+    BLOW_UP,
+    CERTAIN,
+    CONTACT_LOST,
+    DOUBTS,
+    INTERRUPTED,
+    OUTCOMES,
+    RETURNS,
+    UNDECIDED,
+)
 from steadyslip.nonlinear.kicks.threshold import edges
 from steadyslip.protocol import Protocol
 
@@ -40,12 +49,15 @@ class Brackets:
         Size up to which all kicks that were tried return, and smallest known not to.
     beyond : ndarray of int
         What limits, an index into `BEYOND`.
+    contact : ndarray of str
+        Of machines: the contact that is lost beyond, or fastest in a blow-up; else empty.
     """
 
     size: Array
     low: Array
     high: Array
     beyond: Array
+    contact: Array
 
 
 @checked(
@@ -91,7 +103,8 @@ def threshold_map(
         undecided (`Threshold` of a single rig says more). After Ctrl-C, NaN too where nothing is known yet, and the
         middle of the bracket reached where something is. A DataArray has a coordinate ``limit`` beside it: what comes
         of larger kicks, ``edge``, ``unstable``, ``no steady sliding``, ``out of range`` (of floating point) or
-        ``undecided`` with the reason; ``returns`` where none fails.
+        ``undecided`` with the reason; ``returns`` where none fails. Of machines another, ``contact``: that which
+        is lost beyond, or fastest in a blow-up.
     """
     found, dims, coords = threshold_brackets(
         rig, vary, kick, at=at, direction=direction, reference=reference, precision=precision, rtol=rtol,
@@ -102,10 +115,10 @@ def threshold_map(
     import xarray as xr
 
     about = {"units": "1", "long_name": f"{kick} kick that is survived, {kicks_of(rig)[kick].size}"}
-    limit = np.array(BEYOND)[found.beyond]
-    return xr.DataArray(
-        found.size, dims=dims, coords={**coords, "limit": (dims, limit)}, name=f"{kick}_threshold", attrs=about
-    )
+    beside = {"limit": (dims, np.array(BEYOND)[found.beyond])}
+    if isinstance(rig, Machine):
+        beside["contact"] = (dims, found.contact)
+    return xr.DataArray(found.size, dims=dims, coords={**coords, **beside}, name=f"{kick}_threshold", attrs=about)
 
 
 def threshold_brackets(
@@ -126,7 +139,7 @@ def threshold_brackets(
     flat, _, together = broadcast_arrays(rig, Protocol(), vary, {})
     shape = together.shape
     size = int(np.prod(shape, dtype=int))
-    columns = [*(np.full(size, np.nan) for _ in range(3)), np.full(size, INTERRUPTED)]
+    columns = [*(np.full(size, np.nan) for _ in range(3)), np.full(size, INTERRUPTED), np.full(size, "", dtype=object)]
     rounds = COARSE + int(np.ceil(np.log2(0.35 / precision)))
     with progress_bar(size * rounds, progress) as advanced:
         for group_rig, chosen, index in regimes(rig, flat, size):
@@ -211,8 +224,8 @@ class _Search:
         self.low[rig[~beyond_doubt]] = size[~beyond_doubt]
         return np.asarray(~failed & (found != INTERRUPTED))
 
-    def result(self) -> tuple[Array, Array, Array, Array]:
-        """Size, low, high, beyond."""
+    def result(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Size, low, high, beyond, contact."""
         with np.errstate(invalid="ignore"):
             middle = np.where(self.beyond == EDGE, self.high, 0.5 * (self.low + self.high))
             known = np.isfinite(self.high) & (~self.whole | (self.high - self.low <= WIDE * self.high))
@@ -223,4 +236,8 @@ class _Search:
         low, high = (np.where(self.beyond >= ABSENT, np.nan, a) for a in (self.low, self.high))
         high = np.where(self.beyond == UNSTABLE, 0.0, high)
         low = np.where(self.beyond == INTERRUPTED, np.where(low > 0, low, np.nan), low)
-        return size, low, high, beyond
+        contact = np.full(len(size), "", dtype=object)
+        ends = np.flatnonzero(np.isin(beyond, (CONTACT_LOST, BLOW_UP)) & self.whole)
+        if len(ends) and self.kicked.rest.is_machine:
+            contact[ends] = self.kicked.contacts(self.rig[ends], self.high[ends], self.threads)
+        return size, low, high, beyond, contact

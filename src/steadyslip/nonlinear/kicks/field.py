@@ -122,6 +122,13 @@ def normal_stresses(rest: Rest, state: Array, unknowns: Array) -> Array:
     return in_columns(found, len(state))
 
 
+def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
+    """The same of slip rates."""
+    found = field_of(rest.reduction)(*rest.given(), *state.T, *unknowns.T)
+    n = state.shape[1]
+    return in_columns(found[n : n + len(rest.reduction.slidings)], len(state))
+
+
 @question
 def _normal_of(reduction: Reduction) -> Callable[..., list[Any]]:
     """Normal stresses."""

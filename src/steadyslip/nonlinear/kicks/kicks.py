@@ -21,7 +21,7 @@ from steadyslip.model.reducing import reduce_model
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
-from steadyslip.nonlinear.kicks.outcomes import outcomes_of
+from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
 from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, steady_speeds
 from steadyslip.nonlinear.kicks.rest import Rest, picked
 from steadyslip.nonlinear.kicks.settled import rest_of
@@ -253,6 +253,10 @@ class Kicked:
     ) -> Array:  # fmt: skip
         """What comes of kicks: indices into `OUTCOMES`, (n,); see `Judged` for `effort`."""
         return outcomes_of(self.runs(which, sizes, effort), threads, advanced)
+
+    def contacts(self, which: Array, sizes: Array, threads: int | None = None) -> Array:
+        """Where kicks lead to loss of contact or blow-up: at which contact of a machine; names (n,), else empty."""
+        return contacts_of(self.runs(which, sizes), np.arange(len(which)), threads)
 
     def _jobs(self, which: Array) -> Jobs:
         """The rigs `which` in steady sliding."""

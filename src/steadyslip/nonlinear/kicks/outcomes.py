@@ -15,8 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from steadyslip.kernels.runner import STATUSES, TALLY
+from steadyslip.motion.ends import BLOWN_UP, LOST, ending_contact
 from steadyslip.motion.jobs import automatic_method
 from steadyslip.nonlinear.kicks.closed_orbits import attracted, on_long_cycle
+from steadyslip.nonlinear.kicks.field import normal_stresses, slip_rates_at
 from steadyslip.nonlinear.kicks.fold import at_fold
 from steadyslip.nonlinear.kicks.shells import Shells
 from steadyslip.nonlinear.kicks.spans import (
@@ -59,6 +61,29 @@ def outcomes_of(
     `advanced` is told now and then how many more have been decided.
     """
     return _Course(runs, threads, start).run(advanced)
+
+
+def contacts_of(runs: Judged, which: Array, threads: int | None = None) -> Array:
+    """At which contact of a machine motions `which` lose contact, or blow up: names, (m,); empty elsewhere.
+
+    They are run once more, to where they end.
+    """
+    contacts = runs.rest.reduction.model.contacts
+    found = np.full(len(runs.rest.velocity), "", dtype=object)
+    for method in (runs.jobs.options.method, STIFF):
+        if not len(which) or not contacts[0].name:
+            break
+        options = replace(runs.jobs.options, method=method)
+        ended = advanced_runs(runs, which, None, runs.times()[1][which], False, threads, options)
+        rest = runs.rest.part(which)
+        rates = slip_rates_at(rest, ended.state, ended.unknowns).T
+        stresses = normal_stresses(rest, ended.state, ended.unknowns).T
+        for status in (LOST, BLOWN_UP):
+            here = ended.status == CODE[status]
+            own = ending_contact(rest.point, status, stresses, rates)
+            found[which[here]] = [contacts[i].name for i in own[here]]
+        which = which[ended.status == CODE["too many steps"]]
+    return found.astype(str)
 
 
 class _Course:

@@ -12,14 +12,13 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, total
-from steadyslip.kernels.runner import STATUSES
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import beyond_range
 from steadyslip.model.sliding import steady_state, steady_states
-from steadyslip.nonlinear.kicks.field import normal_stresses
 from steadyslip.nonlinear.kicks.kicks import PATIENCE, Kicked
 from steadyslip.nonlinear.kicks.spans import (
+    BLOW_UP,
     CERTAIN,
     CONTACT_LOST,
     INTERRUPTED,
@@ -28,7 +27,6 @@ from steadyslip.nonlinear.kicks.spans import (
     RETURNS,
     UNDECIDED,
     StepBudget,
-    advanced_runs,
     doubt_of,
 )
 from steadyslip.protocol import DisplacementStep, DisturbanceStep, NormalStressStep, VelocityStep
@@ -80,7 +78,7 @@ class Threshold(Displayed):
     at : str
         Of a machine: the body or contact that is kicked; empty for its drive.
     contact : str
-        Of a machine, where contact is lost beyond: which; else empty.
+        Of a machine, where contact is lost beyond: which; in a blow-up the one that is fastest; else empty.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -345,25 +343,13 @@ class _Search:
         amount, survived = (float(kicked.amount(s)[0]) if np.isfinite(s) else s for s in (size, low))
         doubt = doubt_of(self.doubt) or doubt_of(self.outcome)
         word = "" if self.outcome == RETURNS else OUTCOMES[self.outcome]
-        contact = lost_contact(kicked, high) if self.outcome == CONTACT_LOST and np.isfinite(high) else ""
+        contact = ""
+        if self.outcome in (CONTACT_LOST, BLOW_UP) and np.isfinite(high):
+            contact = str(kicked.contacts(np.zeros(1, dtype=int), np.array([high]))[0])
         return Threshold(
             rig, kicked.kick.name, int(kicked.sign), size, (low, high), amount, kicked.unit_name, word, kicked.highest,
             self.at_edge, decided and not self.interrupted, self.interrupted, doubt, survived, kicked.at, contact,
         )  # fmt: skip
-
-
-def lost_contact(kicked: Kicked, size: float) -> str:
-    """The contact of a machine that lifts off after a kick, that least pressed at the end; empty where none is seen."""
-    one = np.zeros(1, dtype=int)
-    runs = kicked.runs(one, np.array([size]), PATIENCE)
-    names = [contact.name for contact in runs.rest.reduction.model.contacts]
-    if len(names) == 1:  # of a slider it has no name
-        return names[0]
-    ended = advanced_runs(runs, one, None, runs.times()[1])
-    if ended.status[0] != STATUSES.index("contact lost") or not np.all(np.isfinite(ended.state)):
-        return ""
-    pressed = normal_stresses(runs.rest, ended.state, ended.unknowns)[0] / np.stack(runs.rest.sigmas, axis=1)[0]
-    return names[int(np.argmin(pressed))]
 
 
 def edges(kicked: Kicked, which: Array, sizes: Array) -> Array:

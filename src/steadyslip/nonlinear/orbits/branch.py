@@ -50,6 +50,9 @@ class CycleBranch(Displayed):
         Which steady sliding, where there are several.
     rtol : float or None
         Error allowed per step, as asked for.
+    contact : str
+        Of a machine whose branch ends where a contact is lost, or with a blow-up: the contact that lifts off, or that
+        is the fastest; else empty.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -64,6 +67,7 @@ class CycleBranch(Displayed):
     broken: tuple[str, ...] = ()
     steady: int = 0
     rtol: float | None = None
+    contact: str = ""
 
     def __len__(self) -> int:
         return len(self.cycles)
@@ -179,6 +183,7 @@ class CycleBranch(Displayed):
             "unit": self.unit,
             "onset": {"kind": self.onset.kind, "value": self.onset.value} | total(self.onset.value, self.unit, area),
             "end": self.end,
+            **({"contact": self.contact} if self.contact else {}),
             "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
             "cycles": [plain(cycle) for cycle in self.cycles],
             "special": [

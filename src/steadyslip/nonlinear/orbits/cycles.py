@@ -120,7 +120,7 @@ def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: 
     found = tuple(known.cycle for known in whole.known)
     return CycleBranch(
         onset.rig, onset.along, onset.unit, onset, found, tuple(whole.special), ends[-1], doubled,
-        tuple(gaps), tuple(ends[:-1]), flow.branch, rtol,
+        tuple(gaps), tuple(ends[:-1]), flow.branch, rtol, whole.contact,
     )  # fmt: skip
 
 

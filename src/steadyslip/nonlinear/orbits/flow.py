@@ -17,15 +17,17 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
-from steadyslip.kernels.layout import Recorded, Sampled, Setting
+from steadyslip.kernels.layout import Final, Recorded, Sampled, Setting
 from steadyslip.kernels.runner import LOG_KINDS, SETTINGS, Runner, runner
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.reduction import V_LP, Reduction
 from steadyslip.model.scales import natural_scales, shortest_time
+from steadyslip.model.sliding import explain_absence
 from steadyslip.model.start import initial_values, restored_of
 from steadyslip.model.variational import with_sensitivities
+from steadyslip.motion.ends import BLOWN_UP, LOST, ending_contact
 from steadyslip.motion.engine import INTERRUPTED, Call, Outcome, run_tables
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
 from steadyslip.motion.observe import observe
@@ -46,11 +48,14 @@ DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants
 
 
 class FlowFailure(Failure):
-    """A run that did not reach its end; `status` says why, in the words of `steadyslip.motion.status`."""
+    """A run that did not reach its end.
 
-    def __init__(self, status: str) -> None:
-        super().__init__(f"a run ended with: {status}")
-        self.status = status
+    `status` says why, in the words of `steadyslip.motion.status`, `contact` at which contact of a machine.
+    """
+
+    def __init__(self, status: str, contact: str = "") -> None:
+        super().__init__(f"a run ended with: {status}" + (f" at {contact}" if contact else ""))
+        self.status, self.contact = status, contact
 
 
 @question
@@ -224,7 +229,7 @@ class Runs:
         initial = np.hstack([self._continuous(setting, states), self._unit(count)])
         settings = self._finer(setting.varied[1], amplitude)
         settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, FAR_MORE * self._usual))
-        final = self._advanced(self.sensitive, setting.varied[0], settings, initial, setting.inputs, times)
+        final = self._advanced(setting, settings, initial, times)
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return final[:, :n], matrix, final[:, n + n * n :]
 
@@ -243,17 +248,15 @@ class Runs:
         found = setting.point.evaluate(restored_of(self.reduction), *states.T, *setting.inputs, 0.0)
         return np.column_stack(np.broadcast_arrays(*(np.atleast_1d(c) for c in found)))
 
-    def _advanced(
-        self, machine: Runner, constants: Array, settings: Array, initial: Array, inputs: Array, times: Array
-    ) -> Array:
-        tables = (constants, np.ascontiguousarray(initial), settings, _rows(inputs, times))
-        call = Call(machine, tables, len(times), np.empty(0))
+    def _advanced(self, setting: FlowSetting, settings: Array, initial: Array, times: Array) -> Array:
+        tables = (setting.varied[0], np.ascontiguousarray(initial), settings, _rows(setting.inputs, times))
+        call = Call(self.sensitive, tables, len(times), np.empty(0))
         call.go(2**62)
         outcome = call.outcome()
         taken = np.nansum(outcome.steps, axis=1)
         self.steps += int(taken.sum())
         if np.any(call.status != DONE):
-            raise FlowFailure(WORDS[int(call.status[call.status != DONE][0])])
+            raise self._failure(setting, outcome, int(np.flatnonzero(call.status != DONE)[0]))
         self._usual = int(taken.max())
         return outcome.state
 
@@ -298,8 +301,19 @@ class Runs:
         if outcome.status[0] == INTERRUPTED:
             raise KeyboardInterrupt
         if outcome.status[0] != DONE:
-            raise FlowFailure(WORDS[int(outcome.status[0])])
+            raise self._failure(setting, outcome, 0)
         return outcome
+
+    def _failure(self, setting: FlowSetting, outcome: Outcome, row: int) -> FlowFailure:
+        """Why one of some runs, with sensitivities or without, did not reach its end."""
+        status = WORDS[int(outcome.status[row])]
+        names = [contact.name for contact in self.reduction.model.contacts]
+        end = np.hstack([outcome.point[row, : 1 + self.size], outcome.point[row, 1 + outcome.size :]])[None]
+        if not names[0] or status not in (LOST, BLOWN_UP):
+            return FlowFailure(status)
+        seen = self.observed(setting, outcome.final[row, [Final.TIME]], end)
+        stresses, rates = ([seen[f"{name}.{what}"] for name in names] for what in ("normal_stress", "slip_rate"))
+        return FlowFailure(status, names[int(ending_contact(setting.point, status, stresses, rates)[0])])
 
     def observed(self, setting: FlowSetting, times: Array, points: Array) -> dict[str, Array]:
         """All observables at given points (m, 1 + n)."""
@@ -386,7 +400,8 @@ class Flow(Runs):
             raise Failure(f"{self.name} leaves its domain")
         point = self._varied(np.array([value]))
         if not np.all(point.exists):
-            raise Failure("lock-up or lift-off: steady sliding ceases to exist")
+            rig = self.rig.with_values({self.name: value})
+            raise Failure(str(explain_absence(rig, operating_point(rig))))
         unit = abs(value) or 1.0
         drive = np.ravel(point.drive)[0]
         return self._set(point, np.array([drive, 0.0, 0.0]), value, unit, self._rates(value, unit))

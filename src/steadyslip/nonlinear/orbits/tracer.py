@@ -34,12 +34,12 @@ LOST = 1e-5  # error of the trivial multiplier beyond which others are not belie
 LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
 INTERRUPTED = "interrupted by the user"
 ENDS = {
-    "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the slider a mass or "
-    "radiation_damping to follow the cycles further",
+    "blow-up": "blow-up: the velocity of the massless model becomes infinite; give the {block} a mass or {damping} to "
+    "follow the cycles further",
     "unbounded": "blow-up: the peak velocity grows without bound as the cycle nears the motions of the massless model "
-    "that reach infinite velocity; give the slider a mass or radiation_damping to follow the cycles further",
+    "that reach infinite velocity; give the {block} a mass or {damping} to follow the cycles further",
     "growth": "the cycle is too unstable to matter: deviations grow 1e8-fold in each period",
-    "contact lost": "contact lost: the normal stress falls to zero in the cycle",
+    "contact lost": "contact lost: the normal {force} falls to zero in the cycle",
     "stuck": "the equations have no solution in part of the cycle",
     "too many steps": "the integration needs ever smaller steps, as it does where the cycle comes close to states at "
     "which no velocity balances the forces; mass or damping helps",
@@ -58,25 +58,27 @@ ENDS = {
 class Sheet:
     """Cycles in the order in which they were followed, and special ones with their places among them.
 
-    `whole` tells an end that lies in the matter from one where the cycles could not be followed any further.
+    `whole` tells an end that lies in the matter from one where the cycles could not be followed any further; `contact`
+    is that of a machine which lifts off there, or is the fastest.
     """
 
     known: list[Known] = field(default_factory=list)
     special: list[SpecialCycle] = field(default_factory=list)
     end: str = ""
     whole: bool = False
+    contact: str = ""
 
     def reversed(self) -> Sheet:
         """The same cycles the other way round."""
         count = len(self.known)
         special = [replace(one, index=count - one.index) for one in reversed(self.special)]
-        return Sheet(self.known[::-1], special, self.end, self.whole)
+        return Sheet(self.known[::-1], special, self.end, self.whole, self.contact)
 
     def joined(self, more: Sheet) -> Sheet:
         """This one, and another that begins where it ends."""
         count = len(self.known)
         special = [replace(one, index=one.index + count) for one in more.special]
-        return Sheet(self.known + more.known, self.special + special, more.end, more.whole)
+        return Sheet(self.known + more.known, self.special + special, more.end, more.whole, more.contact)
 
 
 class Tracer:
@@ -217,7 +219,8 @@ class Tracer:
         except KeyboardInterrupt:
             sheet.end, sheet.whole, self.interrupted = INTERRUPTED, True, True
         except FlowFailure as failure:
-            sheet.end, sheet.whole = ENDS.get(failure.status, f"broke off: {failure}"), failure.status == "contact lost"
+            sheet.end = self._ended(failure.status, failure.contact) or f"broke off: {failure}"
+            sheet.whole, sheet.contact = failure.status == "contact lost", failure.contact
         except (Failure, np.linalg.LinAlgError) as failure:
             sheet.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
         return sheet
@@ -327,16 +330,26 @@ class Tracer:
         fast = cycle.peak_velocity > LARGE * setting.speed
         bounded = self.flow.reduction.model.inertial or is_damped(self.flow.rig)
         if abs(cycle.trivial - 1) > IMPRECISE and cycle.amplitude > SMALL:
-            return ENDS["unbounded" if fast and not bounded else "precision"], True
+            return self._ended("unbounded" if fast and not bounded else "precision"), True
         if cycle.growth > TOO_UNSTABLE:
             return ENDS["growth"], True
         if self.onset.kind == "degenerate" and fast and not bounded:
-            return ENDS["unbounded"], True
+            return self._ended("unbounded"), True
         longer = np.log(cycle.period / before.cycle.period)
         further = abs(cycle.value - before.cycle.value) / (abs(before.cycle.value) or 1.0)
         if cycle.period > 1e3 * first.cycle.period and longer > 1e3 * further:
             return ENDS["runs away"], True
         return "", True
+
+    def _ended(self, status: str, contact: str = "") -> str:
+        """An end in words, where there are any for it; of a machine with the name of the contact."""
+        if status not in ENDS:
+            return ""
+        machine = isinstance(self.flow.rig, Machine)
+        words = {"force": "force", "block": "body", "damping": "a dashpot to the ground"} if machine else {
+            "force": "stress", "block": "slider", "damping": "radiation_damping"}  # fmt: skip
+        head, colon, reason = ENDS[status].format(**words).partition(": ")
+        return f"{head} at {contact}{colon}{reason}" if contact else head + colon + reason
 
     def _slows(self, now: Known) -> bool:
         """Whether the block no longer speeds up where the cycle starts: beyond one that has shrunk to nothing.

@@ -7,7 +7,7 @@ import pytest
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.experiments.fitting.effort import MODELS, Budget, work_of_search
+from steadyslip.experiments.fitting.effort import MODELS, Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.forward import Forward
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.kernels.layout import Setting
@@ -30,6 +30,19 @@ def test_what_is_allowed_ends_with_the_budget():
     assert second()
     assert first.was_met
     assert second.was_met
+
+
+def test_motions_much_slower_than_those_that_ended_are_given_up():
+    """With `growth`; the first has no other to be compared with."""
+    plan = make_plan(ss.lab_rig(), lab.record(lab.rig(), lab.STEP, count=300))
+    z = plan.space().coordinates(np.array(list(lab.stepped().values.values())))[None]
+    asked = plan.comparison(Effort(growth=0.7))
+    assert np.all(np.isfinite(asked.model(z)[0]))
+    steps = asked.parts[0].forward.slowest
+    assert 0.7 * steps > 100
+    assert not np.isfinite(asked.model(z + 1e-9)[0][0, -1])
+    assert asked.parts[0].forward.slowest == steps
+    assert np.all(np.isfinite(plan.comparison(Effort(growth=1.1)).model(z)[0]))
 
 
 @pytest.fixture(scope="module")

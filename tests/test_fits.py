@@ -127,6 +127,27 @@ def test_steps_that_follow_each_other_along_one_line_are_stretched():
     assert np.all(found.iterations < 20)  # 13, 58 and 131 one by one
 
 
+def test_starts_a_step_away_from_where_others_ended_are_there():
+    """Of linear problems, whose end one step tells: three starts agree as soon as one is there; none is run again."""
+    rows = np.random.default_rng(3).standard_normal((2, 30))
+    data, asked = np.random.default_rng(4).standard_normal(30), []
+    best = np.linalg.lstsq(rows.T, data)[0]
+    start = best + np.array([[0.0, 0.0], [0.02, -0.01], [-0.01, 0.02], [1.0, 1.0]])
+
+    def linear(z, lanes):
+        asked.append(len(z))
+        return data - z @ rows, np.broadcast_to(rows, (len(z), 2, 30))
+
+    wide = np.full(2, -9.0), np.full(2, 9.0)
+    found = minimise(linear, start, *wide, race=3)
+    assert asked == [4]
+    assert np.all(found.converged)
+    np.testing.assert_allclose(found.coordinates, np.tile(best, (4, 1)), atol=0.02)
+    assert np.all(found.ssq >= found.ssq[0])
+    minimise(linear, start, *wide, race=5)
+    assert len(asked) > 3
+
+
 def test_a_problem_that_cannot_be_computed_is_left_alone():
     def broken(z, _):
         r = np.where(z[:, :1] > 0, z - 1.0, np.nan)

@@ -80,12 +80,15 @@ class Effort:
         All cores if None.
     patience : int
         Steps per row of the table and lane, on average, before a motion is given up.
+    growth : float
+        The same as a multiple of the steps of the slowest motion that came to its end so far.
     budget : Budget
         Of the fit to which the runs belong.
     """
 
     threads: int | None = None
     patience: int = MOST_STEPS
+    growth: float = np.inf
     budget: Budget = field(default_factory=Budget)
 
 

@@ -23,6 +23,7 @@ LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are 
 LOOK = 0.3  # of the work of a step: to look up what is observed at a sample
 SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters
 RICHER = 0.025  # more patience for each parameter: what a simpler model can follow, a richer one can
+LEAST_STEPS = 100  # that a motion is given
 _STEP = 1e-6  # of the central difference through an axis at an angle, where k follows from other parameters
 
 
@@ -104,6 +105,7 @@ class Forward:
     ) -> None:  # fmt: skip
         self.rig, self.names, self.rtol, self.shifts, self.unsettled = rig, tuple(names), rtol, shifts, tuple(unsettled)
         self.effort = effort or Effort()
+        self.slowest = np.inf  # steps of a motion that came to its end
         self._base = _point_of(rig, self.names)
         self.model = self._base.model
         reduction = experiment_program(self.model, 0, "tsit5").reduction
@@ -213,6 +215,11 @@ class Forward:
         elif not run_many(work, len(found), self.effort.threads, LANES, lanes=LANES):
             raise KeyboardInterrupt  # half of the runs would pass for runs that failed
         self.effort.budget.spend(np.sum(taken, axis=1) + LOOK * len(table.times), 1 + chain.shape[1])
+        if self.effort.growth < np.inf:
+            ended = np.sum(taken[np.isfinite(found[:, 0, -1])], axis=1)
+            if len(ended):
+                known = self.slowest if self.slowest < np.inf else 0.0
+                self.slowest = max(known, float(np.max(ended)))
         if found is not seen:
             seen[good] = found
         return seen
@@ -225,7 +232,8 @@ class Forward:
         settings[:, Setting.RTOL] = self.rtol
         settings[:, Setting.Z_SCALE] = unknown
         richer = 1 + RICHER * (len(self.names) + self.shifts + len(self.unsettled))
-        settings[:, Setting.MOST_STEPS] = int(self.effort.patience * richer * len(table.times)) + 1000
+        most = int(self.effort.patience * richer * len(table.times)) + 1000
+        settings[:, Setting.MOST_STEPS] = min(most, max(self.effort.growth * self.slowest, LEAST_STEPS))
         settings[:, Setting.FIRST_STEP] = np.inf
         settings[:, Setting.ATOL : Setting.ATOL + size] = self.rtol * scales
         settings[:, Setting.ATOL + size :] = np.tile(LOOSE * scales, self.size)

@@ -23,6 +23,7 @@ from steadyslip.experiments.numerics.noise import DETECTED, lag_one
 Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
 HASTY = 8  # steps of the model per sample, on average, before a trial on few of them is given up
+SLOWER = 2.0  # times the steps of the slowest motion so far: beyond, one of a trial is given up
 ROUGH = 40  # iterations on few samples
 MOST = 300  # iterations on all samples, or on what stands for them;
 LAST = 12  # on all samples after that
@@ -152,7 +153,7 @@ class _Search:
         self.plan, self.starts, self.effort, self.progress = plan, starts, effort, progress
         self.whole = plan.comparison(effort)
         self.thin = replace(_thinned(plan), rtol=1e-5)
-        self.quick = self.thin.comparison(replace(effort, patience=HASTY))
+        self.quick = self.thin.comparison(replace(effort, patience=HASTY, growth=SLOWER))
         self.told_by_records = features_of(self.whole.parts)
         self.low, self.high = search_bounds(self.whole.parts, self.told_by_records, self.whole.space)
         self.rough = self.best = Minima.none(len(self.whole.space))

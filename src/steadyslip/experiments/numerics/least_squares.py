@@ -26,7 +26,7 @@ SAME = 1e-2  # difference of sums of squares, as a share, between ends at one ro
 PACE = 10  # iterations over which the progress of a problem is judged
 CRAWL = 3e-7  # of its sum of squares in as many: along a valley that data do not tell from its bottom; it ends there
 LARGEST = 1e100  # sum of squares, of residuals and of derivatives
-DAMPED, CLOSE = 1e-2, 1e-4  # damping to begin with, far from a minimum and close to one
+DAMPED, CLOSE = 1e-2, 1e-6  # damping to begin with, far from a minimum and close to one
 LONGEST = 2.0  # step in any coordinate: an e-fold or so of a logarithmic parameter
 
 
@@ -110,8 +110,9 @@ def minimise(
     tolerance : float
         Reduction still to be had, as a share of the sum, at which a problem is done.
     race : int
-        All problems are one, from several starts: once so many are done at the best place, those that promise no
-        better stop too; once one is, those that at their pace will not get there. Zero: they are not.
+        All problems are one, from several starts: once so many are done at the best place, or a step away from it,
+        those that promise no better stop too; once one is, those that at their pace will not get there. Zero: they are
+        not.
     known : float
         Sum of squares that this one problem is known to reach from elsewhere.
     told : callable, optional
@@ -146,20 +147,28 @@ def minimise(
         bottom, top = low[active], high[active]
         free = ~(held[active] | ((z <= bottom) & (gradient < 0)) | ((z >= top) & (gradient > 0)))
         promise, step = _steps(normal, gradient, free, damped[active], curvature)
-        over = (promise <= tolerance * np.maximum(before, 1e-300)) | stuck[active]
-        best = min(known, float(np.min(found.ssq[found.converged], initial=np.inf)))
+        over = done = (promise <= tolerance * np.maximum(before, 1e-300)) | stuck[active]
+        best = min(known, float(np.min(np.append(found.ssq[found.converged], before[done]), initial=np.inf)))
         if iteration % PACE == 0:
             gone = (earlier[active] - before) / PACE
-            over |= gone * PACE <= CRAWL * before
+            over = over | (gone * PACE <= CRAWL * before)
             if race:
                 over |= before - gone * (most - iteration) > best
             earlier = found.ssq.copy()
-        if race and np.sum(found.converged & (found.ssq <= best * (1 + SAME))) >= race:
-            over |= before - promise > (1 - 1e-9) * best
+        if race and best < np.inf:
+            there, ends = found.converged & (found.ssq <= best * (1 + SAME)), before - promise
+            there[active[done]] |= before[done] <= best * (1 + SAME)
+            coming = ~done & (np.abs(ends - best) <= SAME * best) & _near(z + step, found.coordinates[there])
+            if np.sum(there) + np.sum(coming) >= race:
+                worse = ends > (1 - max(tolerance, 1e-9)) * best
+                over, arrived = over | worse, coming & worse
+                found.coordinates[active[arrived]] = np.clip(z + step, bottom, top)[arrived]
+                found.ssq[active[arrived]] = np.maximum(ends[arrived], best)
+                done = done | arrived
         if np.any(over):
             ended = active[over]
             small = promise[over] <= max(STALLED, tolerance) * np.maximum(before[over], 1e-300)
-            found.converged[ended] = small | stuck[ended]
+            found.converged[ended] = small | done[over]
             rest = ~over
             active, normal, gradient, z, before = active[rest], normal[rest], gradient[rest], z[rest], before[rest]
             step, curvature, bottom, top = step[rest], curvature[rest], bottom[rest], top[rest]
@@ -187,6 +196,12 @@ def minimise(
         if told is not None:
             told(found)
     return found
+
+
+def _near(coordinates: Array, places: Array) -> Array:
+    """Which of some points lie at one of some places."""
+    apart = np.max(np.abs(coordinates[:, None] - places), axis=2, initial=0.0)
+    return np.asarray(np.any(apart < NEAR, axis=1))
 
 
 def _stretch(step: Array, last: Array, scale: Array) -> Array:

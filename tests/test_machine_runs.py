@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import steadyslip as ss
-from command import run
+from command import run as cli
 from machines import same_block
 from moving_machines import TIMES, two_tables
 
@@ -120,7 +121,7 @@ def test_starting_values_of_machines():
 
 
 def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
-    done = run(
+    done = cli(
         "simulate", ROOT / "examples/machines/feed-axis.toml", "--until", "10 s",
         "--protocol", "velocity-step at=1s to='0.06 rpm'",
         "--protocol", "disturbance-pulse at=5s by='100 N' duration=1s on=table", "--json", "-o", tmp_path / "run.csv",
@@ -133,7 +134,7 @@ def test_a_file_of_a_machine_is_run_in_its_own_units(tmp_path):
     assert found["final"]["load_velocity"] == pytest.approx(0.06 * 2 * np.pi / 60)
     assert found["final"]["guide.normal_force"] == pytest.approx(3000.0)
     assert "motor.v (rad/s)" in (tmp_path / "run.csv").read_text().splitlines()[0]
-    wrong = run(
+    wrong = cli(
         "simulate", ROOT / "examples/machines/feed-axis.toml", "--until", "10 s",
         "--protocol", "velocity-step at=1s to='1 mm/s'",
     )  # fmt: skip
@@ -150,8 +151,38 @@ def test_the_picture_of_a_run_names_contacts_in_their_units():
     assert "contact lost (oiled)" in panels[0].get_title()
     drawn = {line.get_label(): line.get_ydata() for line in panels[2].lines}
     assert drawn["oiled"] == pytest.approx(run["oiled.normal_force"])
-    with pytest.raises(ss.NotAvailable, match="machine"):
-        run.plot("phase")
+
+
+def test_the_phase_plane_is_that_of_the_contact_that_moves_most_or_of_the_one_that_is_named():
+    machine = two_tables()
+    run = ss.simulate(machine, ss.VelocityStep(at=1.0, to=1.2 * machine.drive.velocity), until=20.0)
+    change = {name: np.ptp(np.log(run[f"{name}.slip_rate"])) for name in machine.contacts}
+    most = max(change, key=change.get)
+    other = min(change, key=change.get)
+    for contact, name in ((None, most), (other, other)):
+        axes = run.plot("phase", ax=Figure().subplots(), contact=contact)
+        assert axes.get_xlabel() == f"slip rate at {name} (m/s)"
+        forces = {f"friction force at {name} (N)": 1.0, f"friction force at {name} (mN)": 1e3}[axes.get_ylabel()]
+        motion, line, dot = axes.lines
+        assert motion.get_ydata() == pytest.approx(forces * run[f"{name}.friction_force"])
+        after = ss.steady_state(machine.with_values({"drive.velocity": 1.2 * machine.drive.velocity})).contacts[name]
+        force = forces * after.friction_force
+        assert (dot.get_xdata()[0], dot.get_ydata()[0]) == pytest.approx((after.slip_rate, force))
+        at = np.interp(after.slip_rate, line.get_xdata(), line.get_ydata())
+        assert at == pytest.approx(force, rel=1e-4)
+    with pytest.raises(ss.ParameterError, match="unknown contact 'drie'; did you mean 'dry'"):
+        run.plot("phase", contact="drie")
+    with pytest.raises(ss.ParameterError, match="contact: got 'dry'; a history shows all"):
+        run.plot(contact="dry")
+
+
+def test_a_command_draws_the_phase_plane_of_a_contact_in_the_units_of_the_file(tmp_path):
+    path = ROOT / "examples" / "machines" / "two-guides.toml"
+    step = ["--protocol", "velocity-step at=1s to='26 um/s'", "--until", "3 s"]
+    done = cli("simulate", str(path), *step, "--phase", "--contact", "seal", "-o", str(tmp_path / "plane.svg"))
+    assert done.returncode == 0
+    wrong = cli("simulate", str(path), *step, "--contact", "seel", "-o", str(tmp_path / "plane.svg"))
+    assert (wrong.returncode, "unknown contact 'seel'; did you mean 'seal'" in wrong.stderr) == (2, True)
 
 
 def test_a_machine_has_one_steady_sliding():

@@ -286,6 +286,10 @@ def simulate(
     output: Annotated[list[Path] | None, outputs("write .nc, .csv, .html, .png, .svg or .pdf")] = None,
     samples: Annotated[int | None, typer.Option(min=2, max=10_000_000, help="report at this many even times")] = None,
     phase: Annotated[bool, typer.Option("--phase", help="draw the phase plane instead of the history")] = False,
+    contact: Annotated[
+        str | None,
+        typer.Option(help="of a machine: draw its phase plane; that which moves most unless given"),
+    ] = None,
     method: Annotated[str, typer.Option(help="auto, explicit or rosenbrock")] = "auto",
     rtol: Annotated[float, typer.Option(help="error allowed per step")] = 1e-7,
     as_json: AsJson = False,
@@ -300,7 +304,7 @@ def simulate(
         history,
         output or (),
         as_json,
-        partial(write_history, kind="phase" if phase else "history", source=rig),
+        partial(write_history, kind="phase" if phase or contact else "history", source=rig, contact=contact),
     )
 
 

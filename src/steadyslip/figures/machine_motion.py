@@ -7,9 +7,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.quantities import shown
-from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, display_unit, labelled
+from steadyslip.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    arrows,
+    axes_or_new,
+    display_unit,
+    labelled,
+)
+from steadyslip.machine.machine import Machine
+from steadyslip.model.sliding import steady_contact_at
 from steadyslip.motion.events import ContactSlip
+from steadyslip.protocol import Protocol
+from steadyslip.protocol.protocol import LOAD_POINT
 
 if TYPE_CHECKING:
     from steadyslip.motion import History
@@ -18,6 +36,9 @@ _CONTACTS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)  # told apart where lines 
 _SPANS = 40  # slip events are shaded only if they are fewer than this
 _LEAST_BAND = 4e-3  # share of the time shown: shorter slip events are drawn so wide, to be seen at all
 _STEADY = 1e-3  # of the size of a velocity: changes below are drawn as none
+_WIDE = 3.0  # highest over lowest slip rate beyond which they are drawn by their logarithm
+_SLOWEST = 1e-3  # of the highest slip rate is where the line of steady states begins
+_FASTEST = 1e12  # times as fast as in steady sliding is out of the picture
 
 
 def history(run: History, panels: np.ndarray) -> np.ndarray:
@@ -49,6 +70,69 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
         title = f"{run.status}{where} at {shown(run.end, 's')}"
         panels[0].set_title(title, color=VERMILION, fontsize="medium", pad=22)
     return panels
+
+
+def phase_plane(
+    run: History, rig: Machine, ax: Axes | None, label: str, color: str, contact: str | None
+) -> Axes:  # fmt: skip
+    """Friction force against slip rate at a contact, with the line of steady states and a dot at the last.
+
+    Slip rates are drawn by their logarithm where they span more than a factor of three and never turn round.
+    """
+    if contact is not None and contact not in rig.contacts:
+        raise ParameterError([Problem("contact", unknown_name("contact", contact, rig.contacts))])
+    name = contact or _moving_most(run, rig)
+    ax, rate, force = axes_or_new(ax), run[f"{name}.slip_rate"], run[f"{name}.friction_force"]
+    steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))
+    own = abs(float(steady["slip_rate"][0]))
+    scale, unit = display_unit("m/s", own)
+    factor, force_unit = display_unit("N", float(np.nanmax(np.abs(force), initial=0.0)) or 1.0)
+    shown_rate = np.where(np.abs(rate) < own * _FASTEST, rate, np.nan) / scale  # a blow-up leaves the picture
+    ax.plot(shown_rate, force / factor, color=color, label=label or None, linewidth=1)
+    low, high = float(np.nanmin(shown_rate)), float(np.nanmax(shown_rate))
+    logarithmic = low > 0 and high > _WIDE * low
+    if ax.get_xlabel():  # beside another run, on its axes
+        arrows(ax, shown_rate, force / factor, color)
+        return ax
+    if logarithmic:
+        ax.set_xscale("log")
+    elif abs(high - low) < _STEADY * max(abs(high), abs(low)):
+        ax.set_xlim(*_around(low, high))
+    arrows(ax, shown_rate, force / factor, color)
+    beside = shown_rate * scale / steady["slip_rate"][0]
+    fastest = max(float(np.nanmax(beside)), 1.0)
+    slowest = min(max(float(np.nanmin(beside)), _SLOWEST * fastest), 1.0)
+    speeds = rig.drive.velocity * np.geomspace(0.9 * slowest, 1.1 * fastest, 81)
+    line = steady_contact_at(rig, name, speeds)
+    pressed = any(piece.channel != LOAD_POINT for piece in Protocol.of(run.protocol).pieces)
+    words = "steady states without what else is done" if pressed else "steady states"
+    ax.plot(line["slip_rate"] / scale, line["friction_force"] / factor, color=BLACK, linewidth=1, label=words)
+    if not pressed and (last := float(run["load_velocity"][-1])) > 0:
+        dot = steady_contact_at(rig, name, np.array([last]))
+        ax.plot(dot["slip_rate"] / scale, dot["friction_force"] / factor, "o", color=BLACK, markersize=4,
+                label="_steady sliding")  # fmt: skip
+    ax.set_xlabel(labelled(f"slip rate at {name}", unit))
+    ax.set_ylabel(labelled(f"friction force at {name}", force_unit))
+    ax.grid(color=GREY, linewidth=0.3)
+    ax.legend(fontsize="small")
+    return ax
+
+
+def _moving_most(run: History, rig: Machine) -> str:
+    """The contact whose slip rate goes through most, beside that of steady sliding; the first of equals."""
+
+    def passed(name: str) -> float:
+        steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))["slip_rate"][0]
+        change = np.ptp(np.arcsinh(run[f"{name}.slip_rate"] / steady))
+        return round(float(np.nan_to_num(change)), 6)
+
+    return str(max(rig.contacts, key=passed))
+
+
+def _around(low: float, high: float) -> tuple[float, float]:
+    """Limits of an axis on which a change that is only rounding is drawn as none."""
+    middle, half = 0.5 * (low + high), 0.5 * _STEADY * (max(abs(high), abs(low)) or 1.0)
+    return middle - half, middle + half
 
 
 def _plain(panel: Axes, size: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
+from steadyslip.core.errors import NoSteadySliding, ParameterError, Problem
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.figures import machine_motion
 from steadyslip.figures.style import (
@@ -20,6 +20,7 @@ from steadyslip.figures.style import (
     GREY,
     ORANGE,
     VERMILION,
+    arrows,
     axes_or_new,
     display_unit,
     labelled,
@@ -157,8 +158,12 @@ def _ticks_between(low: float, high: float) -> int:
     return sum(low <= digit * 10.0**decade <= high for decade in decades for digit in (1, 2, 5))
 
 
-def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: str = BLUE) -> Axes:
+def phase_plane(
+    run: History, ax: Axes | None = None, label: str = "", color: str = BLUE, contact: str | None = None
+) -> Axes:
     """Spring stress against ln(v/v0), with the line of steady states; a dot at the last load-point velocity.
+
+    Of a machine: friction force against slip rate at one of its contacts.
 
     Motion runs along the curve as the arrows show; vertical distance from the line of steady states is out of
     balance. Runs drawn on the same Axes share the line of the first. The line is that of the rig's own
@@ -172,13 +177,22 @@ def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: st
     label : str, optional
         For a legend.
     color : str, optional
+    contact : str, optional
+        Of a machine: which; that whose slip rate changes most unless given.
 
     Returns
     -------
     matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If there is no such contact.
     """
     if isinstance(run.rig, Machine):
-        raise NotAvailable("the phase plane is not offered for a machine, which has more variables; draw the history")
+        return machine_motion.phase_plane(run, run.rig, ax, label, color, contact)
+    if contact is not None:
+        raise ParameterError([Problem("contact", f"got {contact!r}; a slider has one contact, leave it out")])
     ax, area = axes_or_new(ax), run.rig.area
     drive = run.rig.drive.velocity
     moving = run["v"] > 0
@@ -188,28 +202,12 @@ def phase_plane(run: History, ax: Axes | None = None, label: str = "", color: st
     factor, unit = display_unit("Pa", float(np.nanmax(np.abs(run["spring_stress"]), initial=1.0)), area)
     x, y = np.where(shows, u, np.nan), run["spring_stress"] / factor
     ax.plot(x, y, color=color, label=label or None, linewidth=1)
-    _arrows(ax, x, y, color)
+    arrows(ax, x, y, color)
     if not ax.get_xlabel():
         _steady_line(run, run.rig, ax, x, factor)
         ax.set_xlabel("ln(v/v0) (1)")
         ax.set_ylabel(labelled(stress_name("spring stress", area), unit))
     return ax
-
-
-def _arrows(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:
-    """A few arrow heads along the curve, at equal distances in the figure."""
-    finite = np.isfinite(x)
-    x, y = x[finite], y[finite]
-    if len(x) < 3:
-        return
-    width, height = np.ptp(x) or 1.0, np.ptp(y) or 1.0
-    way = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
-    for share in (0.12, 0.37, 0.62):
-        i = int(np.searchsorted(way, share * way[-1]))
-        i = min(max(i, 1), len(x) - 1)
-        ax.annotate(
-            "", (x[i], y[i]), (x[i - 1], y[i - 1]), arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1}
-        )
 
 
 def _steady_pull(rig: Slider, velocity: float) -> float:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -64,6 +66,23 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     name = shown(typical, si_unit, area=area).partition(" ")[2]
     factor = (unit(name)[0] if name else 1.0) / outside(si_unit, area)[0]
     return factor, printed(name)
+
+
+def arrows(ax: Axes, x: Any, y: Any, color: str) -> None:
+    """A few arrow heads along the curve, at equal distances in the figure."""
+    finite = np.isfinite(x)
+    x, y = x[finite], y[finite]
+    if len(x) < 3:
+        return
+    across = np.log(x) if ax.get_xscale() == "log" else x
+    width, height = np.ptp(across) or 1.0, np.ptp(y) or 1.0
+    way = np.concatenate([[0], np.cumsum(np.hypot(np.diff(across) / width, np.diff(y) / height))])
+    for share in (0.12, 0.37, 0.62):
+        i = int(np.searchsorted(way, share * way[-1]))
+        i = min(max(i, 1), len(x) - 1)
+        ax.annotate(
+            "", (x[i], y[i]), (x[i - 1], y[i - 1]), arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1}
+        )
 
 
 def labelled(name: str, unit_name: str) -> str:

@@ -237,6 +237,21 @@ def _observable_function(model: Model) -> tuple[list[str], Callable[..., Any]]:
     return names, model.function(expressions)
 
 
+def steady_contact_at(rig: Machine, contact: str, velocities: np.ndarray) -> dict[str, np.ndarray]:
+    """What is seen of a contact of a machine in steady sliding, its slip rate too, at velocities of its drive (k,).
+
+    NaN where there is no steady sliding.
+    """
+    point = operating_point(rig, {"drive.velocity": velocities})
+    names, function = _observable_function(point.model)
+    own = next(one for one in point.model.contacts if one.name == contact)
+    with np.errstate(all="ignore"):
+        slip = point.evaluate(point.model.function([point.model.steady[own.velocity]]))
+        seen = dict(zip(("slip_rate", *names), (*slip, *point.evaluate(function)), strict=True))
+    found = {name.removeprefix(f"{contact}."): np.broadcast_to(value, velocities.shape) for name, value in seen.items()}
+    return {name: np.where(point.exists, value, np.nan) for name, value in found.items() if "." not in name}
+
+
 def explain_absence(rig: Rig, point: OperatingPoint) -> NoSteadySliding:
     """The exception that says why a rig has no steady sliding, of a machine which contact locks up or lifts off.
 

@@ -110,7 +110,9 @@ def _starting_values(texts: Iterable[str]) -> dict[str, float]:
     return found
 
 
-def write_history(history: History, path: Path, kind: str = "history", source: Path | None = None) -> None:
+def write_history(
+    history: History, path: Path, kind: str = "history", source: Path | None = None, contact: str | None = None
+) -> None:  # fmt: skip
     """Write a run as netCDF, as columns, as a document or as a figure, by the ending of the name.
 
     A document gives the hash of the `source`, the file that the run was made of.
@@ -125,4 +127,4 @@ def write_history(history: History, path: Path, kind: str = "history", source: P
         ".csv": history.to_csv,
         ".html": lambda p: write_page(history, p, "Run", source=source),
     }
-    write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind), dtype=object)))
+    write_by_ending(path, writers, lambda: np.atleast_1d(np.asarray(history.plot(kind, contact=contact), dtype=object)))

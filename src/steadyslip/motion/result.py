@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name, totals
@@ -166,14 +167,18 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         """Write the samples as text, one column for each observable, units in the header."""
         store.to_csv(self, path)
 
-    def plot(self, kind: str = "history", ax: Any = None) -> Any:
+    def plot(self, kind: str = "history", ax: Any = None, contact: str | None = None) -> Any:
         """Draw the run: ``history`` (velocity, friction and normal stress in time) or ``phase`` (phase plane).
+
+        Of a machine the phase plane is that of one contact, which `contact` names; else the one that moves most.
 
         Returns
         -------
         matplotlib.axes.Axes or array of them
         """
-        return draw(self, kind, ax=ax)
+        if contact is not None and kind == "history":
+            raise ParameterError([Problem("contact", f"got {contact!r}; a history shows all, a phase plane one")])
+        return draw(self, kind, ax=ax, **({} if contact is None else {"contact": contact}))
 
 
 @checked()

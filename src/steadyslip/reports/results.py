@@ -36,6 +36,7 @@ from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, to
 LISTED = 24
 FACETS = 6
 PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
+PLANE_OF_CONTACT = "Friction force over slip rate; black: steady sliding at any velocity, the dot at that of the drive."
 
 
 @singledispatch
@@ -182,15 +183,14 @@ def _analysis(result: Analysis) -> Parts:
 @parts_of.register
 def _history(result: History) -> Parts:
     rig, text = result.rig, of_rig.as_file(result.rig, result.protocol)
-    plane = [] if isinstance(rig, Machine) else [
-        figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), PLANE)
-    ]  # fmt: skip
+    said = PLANE_OF_CONTACT if isinstance(rig, Machine) else PLANE
+    plane = figure(drawn(lambda: figures.phase_plane(result), "phase plane", 5.5), said)
     body = [
         *about_rig(rig),
         heading("What was done to it"), *done_to(rig, result.protocol),
         heading("What it did"), *_words(result.summary()),
         figure(drawn(lambda: figures.history(result), "history", 7.0), f"Velocity, friction, {_load(rig)}."),
-        *plane,
+        plane,
         *_slips(result),
     ]  # fmt: skip
     slips = len(result.slip_events)

@@ -26,7 +26,8 @@ import numpy as np
 import steadyslip as ss
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from kicks_at_random import KINDS, Drawn, Reference, drawn, judged, outcome_of, simulated
+from kicks_at_random import KINDS, Drawn, drawn, outcome_of
+from kicks_by_scipy import Reference, judged, simulated
 
 EVERY = 25  # lines of the table
 TURNS, SECONDS = 150.0, 8.0  # that references follow a motion for,

@@ -8,7 +8,7 @@ import xarray as xr
 
 import steadyslip as ss
 from kicked_rigs import heavy, tilted
-from kicks_at_random import KINDS, Reference, drawn, outcome_of
+from kicks_at_random import KINDS, drawn, outcome_of
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Options, prepare
@@ -356,7 +356,7 @@ def test_motion_that_still_grows_is_no_irregular_one():
     assert course._goes_on(np.arange(4), tally).tolist() == [True, False, False, False]
 
 
-@pytest.mark.parametrize("most", [400, 3000])
+@pytest.mark.parametrize("most", [pytest.param(400, marks=pytest.mark.campaign), 3000])
 def test_a_span_with_too_many_steps_goes_on_from_where_it_ended(monkeypatch, most):
     """What comes of a motion does not depend on how many steps are taken at a time."""
     own = kicks_module.options_for
@@ -404,6 +404,8 @@ FEW = ("slip massless tilted", "lugre mass level", "nagata massless level")
 @pytest.mark.campaign
 def test_random_kicks_equal_scipy(kind):
     """Of a few kinds here, that kernels are compiled for anyway; the others by hand."""
+    from kicks_by_scipy import Reference  # compiled by numba, which takes long to import
+
     assert kind in KINDS
     random = np.random.default_rng(11)
     told = 0

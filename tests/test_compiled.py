@@ -11,12 +11,13 @@ from hypothesis import given, strategies as st
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.kernels import build, driver_text, primitives
+from steadyslip.kernels import build, driver_text, linking, primitives
 from steadyslip.kernels.driver.jobs import start_job
 from steadyslip.kernels.layout import TALLIED, Cursor, Out, Routines, Row, make_layout
 from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
 from steadyslip.kernels.printers import python as plain
+from steadyslip.kernels.printers.llvm import assembly
 from steadyslip.kernels.runner import Runner, runner
 from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
@@ -294,6 +295,14 @@ def test_machine_code_equals_the_text(branch):
             ends.append(run_single(jobs, machine, np.empty(0), True, False).final[0])
     assert ends[0][:4] == pytest.approx(ends[1][:4], abs=1.5)  # a step more or less after contraction to fma
     assert ends[0][4:] == pytest.approx(ends[1][4:], rel=1e-6, abs=1e-12)
+
+
+def test_straight_code_needs_no_more_effort():
+    """Machine code of a model's routines is the same byte for byte, however hard LLVM tries."""
+    jobs = prepare(rig(contact=CONTACTS[1], friction=ONE_MEMORY[1]), None, 1.0, {}, {}, Options())
+    programs = Runner(jobs.reduction, jobs.choice(1, True)).kernel.programs
+    text = assembly(programs, 1, {one.name: one.name for one in programs}, linking.pointer())
+    assert linking.machine_code(text, linking.STRAIGHT) == linking.machine_code(text, linking.SPEED)
 
 
 def test_functions_of_the_driver_can_stand_side_by_side():

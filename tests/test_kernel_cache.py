@@ -120,7 +120,7 @@ def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
     try:
         keys = [key(), key()]
         assert keys[0] == keys[1]
-        for change in ({"SPEED": 1}, {"FEATURES": ["-avx"]}):
+        for change in ({"SPEED": 1}, {"STRAIGHT": 3}, {"FEATURES": ["-avx"]}):
             with monkeypatch.context() as patch:
                 for name, value in change.items():
                     patch.setattr(linking, name, value)

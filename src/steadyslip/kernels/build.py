@@ -196,17 +196,20 @@ def machine_code(programs: Sequence[Program], lanes: int) -> dict[str, int]:
     key = _key(text)
     with _lock:
         if key not in _loaded:
-            _loaded[key] = kept_or_made(lambda: text.replace(f".{_MARK}(", f".{key}("), key, "routines", names)
+            named = text.replace(f".{_MARK}(", f".{key}(")
+            _loaded[key] = kept_or_made(lambda: named, key, "routines", names, linking.STRAIGHT)
         return _loaded[key]
 
 
-def kept_or_made(text: Callable[[], str], key: str, what: str, names: Sequence[str]) -> dict[str, int]:
+def kept_or_made(
+    text: Callable[[], str], key: str, what: str, names: Sequence[str], effort: int = linking.SPEED
+) -> dict[str, int]:
     """Addresses of functions of some assembly, there ``name.key``: from a file of the cache, or compiled and kept."""
     file = _file(key, what)
     symbols = {name: f"{name}.{key}" for name in names}
     content = file.read()
     if content is None or not linking.is_machine_code(content, symbols.values()):
-        content = linking.machine_code(text())
+        content = linking.machine_code(text(), effort)
         file.write(content)
     return linking.linked(content, symbols)
 

@@ -11,6 +11,8 @@ from steadyslip.kernels.printers.native.lines import MEMORY, Lines
 
 SPEED = 3
 """How hard LLVM tries."""
+STRAIGHT = 1
+"""The same for routines of a model: it leads to the same machine code, byte for byte, in less time."""
 _MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe")  # LLVM writes ELF for code in memory, on macOS Mach-O
 FEATURES: list[str] = []
 """Features of the processor to be used, or not (``-``), besides those that LLVM finds: for benchmarks."""
@@ -34,7 +36,7 @@ def surroundings() -> list[str]:
     import llvmlite.binding as llvm
 
     version = ".".join(map(str, llvm.llvm_version_info))
-    return [llvmlite.__version__, version, str(SPEED), llvm.get_process_triple(), *_processor()]
+    return [llvmlite.__version__, version, f"{SPEED} {STRAIGHT}", llvm.get_process_triple(), *_processor()]
 
 
 def _processor() -> tuple[str, str]:
@@ -83,14 +85,14 @@ def _head(machine: Any) -> str:
     return f'target triple = "{llvm.get_process_triple()}"\ntarget datalayout = "{machine.target_data}"\n'
 
 
-def machine_code(text: str) -> bytes:
+def machine_code(text: str, effort: int = SPEED) -> bytes:
     """A module of assembly as an object file."""
     import llvmlite.binding as llvm
 
     machine = _target()
     module = llvm.parse_assembly(_head(machine) + text)
     module.verify()
-    options = llvm.create_pipeline_tuning_options(speed_level=SPEED)
+    options = llvm.create_pipeline_tuning_options(speed_level=effort)
     # what has to be fast has no loops, or is written in vectors; the driver's loops would take half of all compilation
     options.loop_unrolling = options.loop_vectorization = options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)

@@ -1,6 +1,6 @@
 """Random examples, which tests are slow, and how long each takes.
 
-Fresh random examples on a developer's machine, the same ones every time in continuous integration. What
+Fresh random examples on a developer's machine, fewer and the same ones every time in continuous integration. What
 ``-m "not slow"`` leaves out is listed in slow.txt: each test, and how many of its parameters come before.
 ``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.
 
@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-settings.register_profile("ci", derandomize=True, deadline=None)
+settings.register_profile("ci", derandomize=True, deadline=None, max_examples=40)
 if os.environ.get("CI"):
     settings.load_profile("ci")
 

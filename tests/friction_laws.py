@@ -41,6 +41,7 @@ def combinations():
 
     Nagata's law has one state and no prakash-clifton.
     """
+    found = {}
     for place in itertools.product(*map(range, (len(EVOLUTIONS), len(MEMORIES), 3, 2))):
         i, j, k, regularised = place
         evolution, memory, states = EVOLUTIONS[i], MEMORIES[j], (ONE, TWO, THREE)[k]
@@ -48,11 +49,33 @@ def combinations():
             continue
         if isinstance(evolution, ss.Nagata) and (states is not ONE or isinstance(memory, ss.PrakashClifton)):
             continue
-        yield ss.RateState(**ROCK, **states, evolution=evolution, normal_memory=memory, regularised=bool(regularised))
+        found[place] = ss.RateState(
+            **ROCK, **states, evolution=evolution, normal_memory=memory, regularised=bool(regularised)
+        )
+    return found
 
+
+def pairs(place):
+    """Any two parts of a law."""
+    return set(itertools.combinations(enumerate(place), 2))
+
+
+def every_pair(places):
+    """Some of the places, in which every two parts that are together somewhere are so too."""
+    left = set().union(*map(pairs, places))
+    while left:
+        best = max(places, key=lambda place: len(pairs(place) & left))
+        yield best
+        left -= pairs(best)
+
+
+COMBINATIONS = combinations()
+
+FURTHER = [law for place, law in COMBINATIONS.items() if place not in set(every_pair(COMBINATIONS))]
+"""Laws whose parts meet in others too."""
 
 LAWS = [
-    *combinations(),
+    *COMBINATIONS.values(),
     ss.RateState(**ROCK, **OWN_ALPHA, normal_memory=ss.LinkerDieterich()),
     ss.RateState(**ROCK, b=0.0, d_c=1e-6),
     ss.RateState(**ROCK, b=0.0, d_c=1e-6, evolution=ss.Aging()),

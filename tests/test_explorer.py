@@ -225,7 +225,7 @@ def page_of_own():
     return Script(f"{code}\n{made}"), known
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(text=TEXT)
 def test_links_bring_only_what_a_rig_may_have(page_of_own, text):
     """Whatever stands in an address: numbers of the rig's own parameters, inside their domains, or nothing at all."""

@@ -3,13 +3,15 @@
 import pytest
 
 import steadyslip as ss
-from friction_laws import LAWS, ONE, OWN_ALPHA, ROCK, TWO, WEAKENING
+from friction_laws import FURTHER, LAWS, ONE, OWN_ALPHA, ROCK, TWO, WEAKENING
 from steadyslip.laws.friction.bristle import StribeckCurve
 from steadyslip.testing import FRICTION_CHECKS, Conditions
 
 
 @pytest.mark.parametrize("check", FRICTION_CHECKS)
-@pytest.mark.parametrize("law", LAWS, ids=repr)
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=[pytest.mark.campaign] * (law in FURTHER)) for law in LAWS], ids=repr
+)
 def test_contract(law, check):
     check(law, WEAKENING if isinstance(law, StribeckCurve) else Conditions())
 

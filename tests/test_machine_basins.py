@@ -6,7 +6,7 @@ import pytest
 import steadyslip as ss
 from machines import same_block, two_mass
 
-X, V = np.linspace(-6.0, 6.0, 5), np.geomspace(0.1, 30.0, 4)
+X, V = np.linspace(-6.0, 6.0, 4), np.geomspace(0.1, 30.0, 3)
 
 
 @pytest.mark.parametrize("seed", [7, pytest.param(1, marks=pytest.mark.campaign)])

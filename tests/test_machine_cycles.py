@@ -29,7 +29,7 @@ def looks(one):
     return np.array([one.period, one.peak_velocity, one.lowest_velocity, one.stress_drop, one.growth, one.slip])
 
 
-@pytest.mark.parametrize("seed", [1, 7])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.campaign), 7])
 def test_a_machine_of_one_body_has_the_cycles_of_its_slider(seed):
     block, machine = same_block(seed)
     k = ss.hopf(block).value

@@ -11,7 +11,7 @@ from charts import RANGES, STIFFNESSES, made, rig
 # -- edges -------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.integers(5, 12), st.integers(5, 12), st.integers(1, 3))
 def test_a_refined_edge_is_that_of_the_fine_grid(tmp_path_factory, columns, rows, rounds):
     """Cells of the fine grid whose corners differ are all found, with the same values; few points are computed."""

@@ -112,7 +112,7 @@ def test_aging_cycles_have_the_period_that_simulation_shows(lam, damping):
     assert np.diff(peaks)[-1] == pytest.approx(cycle.period, rel=1e-7)
 
 
-@pytest.mark.parametrize("mass", [1e-6, 1e-9])
+@pytest.mark.parametrize("mass", [pytest.param(1e-6, marks=pytest.mark.campaign), 1e-9])
 def test_smallest_masses_lead_to_the_stable_cycles(mass):
     """The branch is not lost where rounding over mass is all that is left of the acceleration."""
     branch = ss.cycles(unit_rig("aging", 0.5, 0.5, mass=mass), between=(0.5 * 0.5 * A, 1.2 * 0.5 * A))
@@ -192,12 +192,17 @@ def paper(angle, **more):
         paper(30),
         paper(60),
         unit_rig("slip", 0.2, 0.2, damping=0.05),
-        unit_rig("aging", 1.0, 1.0, damping=0.3),
-        unit_rig("slip", 0.2, 0.2, mass=0.3),
         unit_rig("aging", 0.2, 0.2, mass=0.02),
-        unit_rig("aging", 0.5, 0.5, mass=1.0),
+        *(
+            pytest.param(one, marks=pytest.mark.campaign)
+            for one in (
+                unit_rig("aging", 1.0, 1.0, damping=0.3),
+                unit_rig("slip", 0.2, 0.2, mass=0.3),
+                unit_rig("aging", 0.5, 0.5, mass=1.0),
+            )
+        ),
     ],
-    ids=["-45", "30", "60", "slip H=.05", "aging H=.3", "slip M=.3", "aging M=.02", "aging M=1"],
+    ids=["-45", "30", "60", "slip H=.05", "aging M=.02", "aging H=.3", "slip M=.3", "aging M=1"],
 )
 def test_small_cycles_have_the_predicted_amplitude_stable_or_not(a_rig):
     """Theory 6 against the cycles themselves: velocity and stress, with an error that falls with the amplitude."""
@@ -231,7 +236,7 @@ def test_branch_of_the_paper_s_rig_is_that_of_auto(angle):
     """Numbers of AUTO-07p 0.9.2 (NTST = 300, NCOL = 6); its period in d_c/v0, x in d_c, found with tests/auto."""
     branch = ss.cycles(paper(angle))
     rows = [row for row in table("auto_branch.csv") if float(row["angle_deg"]) == angle]
-    for row in rows:
+    for row in rows[::2]:
         (cycle,) = branch.at(float(row["k_over_kcr"]) * branch.onset.value)
         assert cycle.period == pytest.approx(float(row["period"]), rel=1e-9)
         around = ss.orbit(branch.rig.with_values({"stiffness": cycle.value}), cycle)

@@ -135,7 +135,7 @@ def test_cycles_end_where_no_velocity_balances_the_forces(monkeypatch):
 
     The cycle comes as close to the fold as steps allow, which takes ever more of them, but not minutes.
     """
-    monkeypatch.setattr("steadyslip.nonlinear.orbits.flow.MOST_STEPS", 20_000)
+    monkeypatch.setattr("steadyslip.nonlinear.orbits.flow.MOST_STEPS", 8_000)
     friction = rate_state(evolution=ss.PRZ(), regularised=True)
     lift = next(contact for contact in CONTACTS if contact.name == "lift")
     branch = ss.cycles(

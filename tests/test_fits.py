@@ -204,6 +204,23 @@ def test_robust_losses_bear_outliers(loss):
     assert abs(plain.values["friction.mu_ref"] - 0.62) > 5 * abs(fit.values["friction.mu_ref"] - 0.62)
 
 
+def test_one_wild_sample_is_named_and_a_loss_bears_it():
+    """Neither where the search starts nor the width of the loss follows it."""
+    run = lab.columns(lab.rig(), lab.STEP, count=600)
+    run["friction"] = run["friction"] + lab.NOISE * np.random.default_rng(0).standard_normal(600)
+    clean = ss.fit(ss.lab_rig(), ss.record_from_arrays(**run))
+    run["friction"][300] = 50.0
+    record = ss.record_from_arrays(**run)
+    told = " ".join(str(ss.fit(ss.lab_rig(), record)).split())
+    assert (
+        "1 sample of friction is so far off all others that half of the misfit and more is there (75.12521 s)" in told
+    )
+    assert "so far off" not in str(clean)
+    borne = ss.fit(ss.lab_rig(), record, loss="cauchy")
+    for name in clean.names:
+        assert borne.values[name] == pytest.approx(clean.values[name], abs=2 * clean.errors[name])
+
+
 @pytest.mark.parametrize("loss", ["soft-l1", "huber", "cauchy"])
 def test_losses_are_what_scipy_calls_them(loss):
     r = np.concatenate([-np.geomspace(1e-3, 30, 40), np.geomspace(1e-3, 30, 40)])

@@ -57,6 +57,11 @@ def test_rates_and_their_changes_are_found(changes, noise, glitches, slips):
             assert (1e6 * found.before, 1e6 * found.after) == pytest.approx((before, after), rel=0.01, abs=1e-9)
 
 
+def test_a_load_point_that_never_moves_rests():
+    course = load_course(np.arange(100.0), np.full(100, 3e-3))
+    assert (course.first, course.changes, course.curve) == (0.0, (), None)
+
+
 def test_a_clean_column_leaves_nothing_open():
     time = np.sort(np.random.default_rng(0).uniform(0, 200, 3000))
     course = load_course(time, measured(time, STEPS, 0, 0, 0, 0))

@@ -98,7 +98,8 @@ def population_files(
     records = _read(plan, paths, skip_bad_lines)
     needed = FEWEST + (members.condition is not None)
     if len(records) < needed:
-        raise ParameterError([Problem("population", f"got {len(records)} records; allowed: {needed} or more")])
+        message = f"got {len(records)} record{'s' * (len(records) != 1)}; allowed: {needed} or more"
+        raise ParameterError([Problem("population", message)])
     if members.values is not None and len(members.values) != len(records):
         message = f"got {len(members.values)}; allowed: {len(records)}, one for each record"
         raise ParameterError([Problem("population.values", message)])

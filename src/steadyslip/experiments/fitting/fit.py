@@ -15,9 +15,9 @@ from steadyslip.experiments.fitting.effort import Budget, Effort
 from steadyslip.experiments.fitting.identify import combinations, prior_information
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
-from steadyslip.experiments.fitting.planning import check_width, make_plan
+from steadyslip.experiments.fitting.planning import make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import MOST, Told, in_order, searched
+from steadyslip.experiments.fitting.search import MOST, Found, Told, in_order, searched
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record
@@ -26,6 +26,8 @@ from steadyslip.experiments.numerics.noise import describe, white
 from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
+WIDTHS = 6  # of a loss, tried one after the other as long as each is narrower
+NARROWER = 0.8  # than so much of the one before
 BETTER = 1e-6  # reduction of the sum of squares, as a share, that makes another minimum of it
 
 
@@ -134,11 +136,24 @@ def fit(
     check_friction(plan.records)
     size, unknowns = sum(len(record) for record in plan.records), len(plan.space())
     allowed = Effort(threads, budget=Budget.of_fit(size, unknowns, effort))
-    if plan.loss != "linear" and plan.width is None:
-        first = searched(replace(plan, loss="linear"), starts, allowed, progress)
-        plan = check_width(plan, first.comparison.residuals(first.coordinates[None])[0][0])
-    found = searched(plan, starts, allowed, progress)
+    if plan.loss == "linear" or plan.width is not None:
+        found = searched(plan, starts, allowed, progress)
+    else:  # outliers widen the scatter about a fit that they have pulled; less so each time
+        found = searched(replace(plan, loss="linear"), starts, allowed, progress)
+        last = np.inf
+        for _ in range(WIDTHS):
+            plan = with_width(plan, _scatter(found))
+            if (plan.width or 0.0) > NARROWER * last:
+                break
+            last = plan.width or 0.0
+            found = searched(plan, starts, allowed, progress)
     return finished(plan, found.comparison, found.coordinates, found.story, errors, found.bounds)
+
+
+def _scatter(found: Found) -> Array:
+    """Weighted residuals as they are, whatever the loss."""
+    one = found.comparison
+    return np.asarray((one.data - one.model(found.coordinates[None])[0][0]) * one.weights)
 
 
 def started_from(result: Fit, others: Sequence[Fit]) -> Fit:

@@ -131,10 +131,8 @@ def _checked_weights(weights: Any, records: tuple[Record, ...], problems: list[P
     return tuple(found)
 
 
-def check_width(plan: Plan, residuals: Array) -> Plan:
-    """The plan with a width for its loss: 1.345 standard deviations of most residuals, unless given."""
-    if plan.loss == "linear" or plan.width is not None:
-        return plan
+def with_width(plan: Plan, residuals: Array) -> Plan:
+    """The plan with a width for its loss: 1.345 standard deviations of most residuals."""
     spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
     if not spread > 0:
         raise NotAvailable("residuals have no width; use loss='linear'")

@@ -8,7 +8,7 @@ distance lies between a sample's and the whole record's. Many combinations are t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -28,6 +28,7 @@ from steadyslip.model.sliding import steady_state
 
 Array = np.ndarray
 NEARBY = 0.5  # share of the window of a time over which starts are spread
+SPIKE = 2.0  # ranges of nearly all friction by which a sample alone is off its neighbours: no motion does that
 STIFFEST = 100.0  # k d_c/(aσ) of a start: beyond, a record shows no more of the stiffness
 _DIRECT = (0.004, 0.01, 0.025)  # values of a where no step of the rate tells
 
@@ -64,6 +65,7 @@ class Features:
 @question
 def features(record: Record, rate: float) -> Features:
     """Read the features off a record; `rate` is the load-point rate at its start, m/s."""
+    record = replace(record, friction=_without_spikes(record.friction))
     time, mu = record.time, record.friction
     moved = _moved(record, 0.0 if resting_rate(record.loading) is not None else rate)
     first = max(5, len(mu) // 50)
@@ -78,6 +80,13 @@ def features(record: Record, rate: float) -> Features:
     if steps:
         direct, drop = _response(record, moved, steps[0])
     return Features(level, direct, drop, slope, float(np.ptp(mu)) / total, shortest, total / 2)
+
+
+def _without_spikes(friction: Array) -> Array:
+    """Friction with single samples far outside of all that it is elsewhere put back between their neighbours."""
+    around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(friction, 2, mode="edge"), 5), axis=1)
+    low, high = np.quantile(friction, [0.01, 0.99])
+    return np.where(np.abs(friction - around) > SPIKE * (high - low), around, friction)
 
 
 def _moved(record: Record, rate: float) -> Array:

@@ -18,6 +18,8 @@ from steadyslip.model.sliding import steady_state
 WIDTH = 100
 AWAY = 3.0  # root mean squares of the residuals by which the first and last of them, on average, may be off:
 BRIEFLY = 5  # of them, or one in two hundred
+FAR = 20.0  # root mean squares of the others that an outlier is off,
+RARE = 2e-3  # of the samples at most: more are no outliers
 SURE = 9.0  # fall of the sum of squares, in variances of an independent sample, that tells a ramp from a step
 VAGUE = 0.1  # standard deviation of the time of a jump, as a share of the sampling interval that it lies in
 
@@ -95,7 +97,8 @@ def warnings(fit: FitNumbers) -> list[str]:
     close = [ratio for ratio in fit.search.others if ratio < 1.05]
     if close:
         found.append(f"another minimum is nearly as good ({close[0]:.4g} times the sum of squares); look at both")
-    found += list(fit.at_bounds) + _unsettled(fit) + _off_the_loading(fit) + _vague_jumps(fit) + _untold_ramps(fit)
+    found += list(fit.at_bounds) + _outliers(fit) + _unsettled(fit) + _off_the_loading(fit) + _vague_jumps(fit)
+    found += _untold_ramps(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
     return found
@@ -108,6 +111,26 @@ def _cut_off(fit: FitNumbers) -> str:
         f"the search ended when all the work that it may be was done; this is the best that it found{rough}, and there "
         "may be better; most often the model is not that of the experiment; otherwise let it search longer (effort)"
     )
+
+
+def _outliers(fit: FitNumbers) -> list[str]:
+    """Records of which a few samples, far off all others, decide the fit."""
+    found = []
+    for i, record in enumerate(fit.plan.records if fit.plan.loss == "linear" else ()):
+        squares = fit.part(fit.residuals, i) ** 2
+        order = np.argsort(-squares)
+        gone = np.cumsum(squares[order])
+        half = int(np.searchsorted(gone, 0.5 * gone[-1])) + 1
+        rest = (gone[-1] - gone[half - 1]) / len(squares)
+        if half <= max(RARE * len(squares), 1) and squares[order[half - 1]] > FAR**2 * rest:
+            far = np.sort(order[:half])
+            where = f"{record.time[far[0]]:.7g} s" + (f" to {record.time[far[-1]]:.7g} s" if len(far) > 1 else "")
+            what = "1 sample of friction is" if len(far) == 1 else f"{len(far)} samples of friction are"
+            found.append(
+                f"{record.source}: {what} so far off all others that half of the misfit and more is there ({where}); "
+                "if it is a fault of the sensor, mend or cut it, or let outliers weigh less (loss = 'cauchy')"
+            )
+    return found
 
 
 def _unsettled(fit: FitNumbers) -> list[str]:

@@ -33,6 +33,8 @@ def load_course(time: Array, displacement: Array, blurred: bool = False) -> Cour
     A displacement that was integrated from a rate is `blurred`: it does not tell when, within a sampling interval, the
     rate changed.
     """
+    if not np.ptp(displacement) > 0:
+        return Course(0.0)
     runs = straight_runs(time, displacement)
     between = sum(time[b.first] - time[a.last - 1] for a, b in pairwise(runs))
     if len(runs) - 1 > MOST_CHANGES or between > MOST_BETWEEN * (time[-1] - time[0]):

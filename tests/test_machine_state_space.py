@@ -11,7 +11,7 @@ def response(system, s):
     return system.C @ np.linalg.solve(s * np.eye(len(system.A)) - system.A, system.B) + system.D
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(s, marks=pytest.mark.campaign) for s in (2, 4, 5))])
 def test_places_answer_to_forces_as_the_matrix_typed_by_hand(seed):
     machine, matrix = at_random(seed)
     system, names = ss.state_space(machine), list(machine.bodies)

@@ -175,7 +175,7 @@ NAGATA = rate_state(evolution=ss.Nagata(c_nagata=0.7), normal_memory=ss.LinkerDi
 NONLINEAR = rig(friction=NAGATA, contact=ss.LeadScrew(lead_angle=0.2, axial_load=5e6), stiffness=9e9)
 
 
-@pytest.mark.parametrize("mass", [1e6, 1e4, 1.0, 1e-4])
+@pytest.mark.parametrize("mass", [1e6, pytest.param(1e4, marks=pytest.mark.campaign), 1.0, 1e-4])
 def test_light_blocks_move_as_those_without_mass(mass):
     """The lighter a block, the more its acceleration is rounding; what is not are forces."""
     protocol, when = ss.VelocityStep(at=1.0, to=2e-6), np.linspace(1.5, 20.0, 40)

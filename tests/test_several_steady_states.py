@@ -71,7 +71,7 @@ def test_branch_remembers_its_steady_sliding():
     assert below == pytest.approx(ss.hopf(rig(ss.Constant(preload=LOW))).value, rel=1e-6)
 
 
-@pytest.mark.parametrize("kick", ["velocity", "displacement"])
+@pytest.mark.parametrize("kick", [pytest.param("velocity", marks=pytest.mark.campaign), "displacement"])
 def test_thresholds_of_each(kick):
     law = ss.RateState(a=0.01, b=0.015, d_c=1e-5, mu_ref=0.6, v_ref=1e-6, evolution=ss.Slip())
     shut, latch = (rig(one.contact, friction=law, stiffness=9e9, radiation_damping=0.0) for one in (SHUT, LATCH))

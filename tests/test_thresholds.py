@@ -27,7 +27,7 @@ survived = cache(ss.threshold)
 # -- closed forms of theory 7, slip law at the edge
 
 
-@pytest.mark.parametrize("lam", [0.0015 / 0.0145, 0.3, 1.0])
+@pytest.mark.parametrize("lam", [0.0015 / 0.0145, pytest.param(0.3, marks=pytest.mark.campaign), 1.0])
 def test_velocity_step_at_the_edge(lam):
     """ln(v_new/v_old) = ln(b/(b − a))."""
     found = survived(unit_rig("slip", lam, lam))

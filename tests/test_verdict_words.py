@@ -180,8 +180,10 @@ def test_where_one_root_is_zero_and_another_grows_sliding_is_unstable(mass):
     assert list(on) == [True, False]
 
 
-@pytest.mark.parametrize("mass", [0.0, 1e12])
-@pytest.mark.parametrize("stiffness", [1e3, 1e9, 1e14])
+@pytest.mark.parametrize(
+    ("stiffness", "mass"), [(1e3, 1e12), (1e9, 0.0), (1e14, 1e12), *(pytest.param(k, m, marks=pytest.mark.campaign)
+     for k, m in ((1e3, 0.0), (1e9, 1e12), (1e14, 0.0)))],
+)  # fmt: skip
 def test_no_oscillation_is_said_to_grow_where_roots_are_real(stiffness, mass):
     """(α − μ) tan ψ > 1: two roots lie on the right at every stiffness, a pair only at some."""
     friction = rate_state(normal_memory=ss.LinkerDieterich(alpha=2.5))

@@ -100,7 +100,9 @@ def test_two_state_law_doubles_its_period_where_theory_says():
     assert (stable.min() > 0.857, stable.max() < 0.8663) == (True, True)
 
 
-@pytest.mark.parametrize(("lam", "damping"), [(0.25, 1e-8), (1.0, 1e-8), (2.0, 1e-4)])
+@pytest.mark.parametrize(
+    ("lam", "damping"), [(0.25, 1e-8), pytest.param(1.0, 1e-8, marks=pytest.mark.campaign), (2.0, 1e-4)]
+)
 def test_aging_cycles_have_the_period_that_simulation_shows(lam, damping):
     """Of the issue's scan: the smaller the damping, the more the branch stands on end at the edge."""
     a_rig = unit_rig("aging", lam, 0.5 * lam, damping=damping)

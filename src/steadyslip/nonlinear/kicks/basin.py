@@ -73,7 +73,10 @@ class Basin(ReadOnly):
     names: tuple[str, str] = ("x", "v")
     units: tuple[str, str] = ("m", "m/s")
     steady: tuple[float, float] = (0.0, 0.0)
-    contact: Array = field(default_factory=lambda: np.empty((0, 0), dtype=str), repr=False)
+    contact: Array = field(default_factory=lambda: np.array(""), repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "contact", np.broadcast_to(self.contact, self.outcome.shape))
 
     @property
     def share(self) -> float:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
+import llvmlite.binding as llvm
 import pytest
 
 from steadyslip.files import sealed
@@ -62,6 +63,22 @@ def test_sound_file_of_another_kind_is_compiled_again(folder, content):
         write_sealed(file, content, build.KERNEL, file.name, private=True)
     assert ask(6) == 6
     assert ask(6) == 6
+
+
+@pytest.mark.parametrize(
+    ("system", "triple"),
+    [("nt", "x86_64-pc-windows-msvc"), ("posix", "arm64-apple-darwin"), ("posix", "aarch64-linux-gnu")],
+)
+def test_machine_code_of_other_systems_is_known(system, triple, monkeypatch):
+    """What LLVM writes there for code in memory, is taken for machine code when it is read again."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(triple)
+    monkeypatch.setattr("os.name", system)  # by which llvmlite chooses the format
+    machine = target.create_target_machine(codemodel="jitdefault", jit=True)
+    monkeypatch.undo()
+    module = llvm.parse_assembly(f'target triple = "{triple}"\ndefine void @nothing() {{\n  ret void\n}}\n')
+    assert linking.is_machine_code(machine.emit_object(module), ["nothing"])
 
 
 def test_a_file_of_another_function_is_not_opened(folder, monkeypatch):

@@ -13,7 +13,7 @@ SPEED = 3
 """How hard LLVM tries."""
 STRAIGHT = 1
 """The same for routines of a model: it leads to the same machine code, byte for byte, in less time."""
-_MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe")  # LLVM writes ELF for code in memory, on macOS Mach-O
+_MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe")  # for code in memory, LLVM writes ELF, on Windows too, and on macOS Mach-O
 FEATURES: list[str] = []
 """Features of the processor to be used, or not (``-``), besides those that LLVM finds: for benchmarks."""
 

@@ -77,7 +77,8 @@ def test_lanes_see_what_single_runs_see(case):
         assert tally["last_peak_time"][i] == pytest.approx(peaks[-1].time, rel=1e-9)
         assert tally["peak_velocity"][i] >= max(peak.velocity for peak in peaks) * (1 - 1e-9)
         if len(peaks) > 1:
-            assert tally["peak_period"][i] == pytest.approx(peaks[-1].time - peaks[-2].time, rel=1e-9)
+            blurred = 1e-12 / abs(peaks[-1].velocity - 1.0)  # rounding of velocity moves a peak that is hardly one
+            assert tally["peak_period"][i] == pytest.approx(peaks[-1].time - peaks[-2].time, rel=1e-9, abs=blurred)
         if run.slip_events:
             last = run.slip_events[-1]
             found = [
@@ -303,3 +304,13 @@ def test_numbers_that_are_none_are_not_done():
     assert alone.end == 1.0
     assert all(np.all(np.isfinite(values)) for values in alone.values())
     assert "1e308" in str(alone)
+
+
+def test_hardly_any_step_is_refused():
+    """Steps follow how fast motion quickens before a slip event: predicted from the last two, not tried."""
+    rig = unit_rig("aging", 0.5, 0.4, 1e-3)
+    for method in ("explicit", "dop853", "rosenbrock"):
+        found = ss.simulate_many(
+            rig, {"stiffness": np.linspace(0.3, 0.45, 24)}, until=60.0, initial={"v": 1.2}, method=method
+        )
+        assert found.rejected.sum() <= 0.03 * found.steps.sum(), method

@@ -57,6 +57,8 @@ class Row(IntEnum):
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 61, 62, 63, 64, 65, 66
     Z_OLD = 67
     """The first unknown of the balances at the start of the last step."""
+    H_OLD = 68
+    """Length of the last step that was accepted."""
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1

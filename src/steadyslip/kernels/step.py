@@ -16,8 +16,15 @@ from steadyslip.kernels.source import Formulas
 
 INSTANT = 1e-13  # share of the time so far below which a step is none, if no state changes
 NOTHING = 1e-9  # by more than this share of the error allowed
-PROPORTIONAL, INTEGRAL = 0.7, 0.4  # step control after Gustafsson, with the safety factor below:
-# hardly any rejections, and an end error near rtol after tens of cycles
+AIM = math.log(0.5)  # share of the step that the error would allow: hardly any is refused, and the error at the end is
+# near rtol after tens of cycles
+PROPORTIONAL, EARLIER = (
+    0.7,
+    0.3,
+)  # weights of the errors of the last two steps: without the second, steps that stability
+# limits swing about the limit, and every sixth is refused
+LITTLE = -3.0  # errors below that aimed at by this in ln e² say nothing about where errors are going
+AGAIN = math.log(0.8)  # the share after a step that was refused
 
 
 class Step(Evaluator):
@@ -50,12 +57,26 @@ class Step(Evaluator):
         self.good = as_node(error <= 1.0, "bool") & after
         self.size = primitive("rough_log", smaller(larger(error, 1e-10), 1e30))
         self.earlier = self.program.load(Row.ERROR)
-        kept = -0.5 * PROPORTIONAL / method.order * self.size + 0.5 * INTEGRAL / method.order * self.earlier
-        factor = 0.8 * exp(select(self.good, kept, -0.5 / method.order * self.size))
+        factor = exp(select(self.good, self._wanted(), AGAIN - 0.5 / method.order * self.size))
         factor = select(error < 1e60, smaller(larger(factor, 0.2), 6.0), 0.2)
         self.after = select(self.last, self.end, self.tau + self.h)
         next_h = self.h * factor
         self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
+
+    def _wanted(self) -> Node:
+        """Logarithm of the next step as a share of this one, after a good one.
+
+        The smaller of what the errors ask for and of what they ask for if steps and errors go on changing as between
+        the last two (both after Gustafsson 1991, 1994): before a slip event every step has to be shorter than the one
+        before, by the same factor. After one they grow in the same way, and there errors alone are the better guide.
+        """
+        per = 0.5 / self.kernel.method.order
+        goal = AIM / per
+        before = larger(self.earlier, goal + LITTLE)
+        asked = per * (PROPORTIONAL * (goal - self.size) - EARLIER * (goal - before))
+        trend = primitive("rough_log", self.h * (1.0 / larger(self.program.load(Row.H_OLD), 1e-300)))
+        wanted: Node = smaller(asked, AIM - per * self.size + trend + per * (before - self.size))
+        return wanted
 
     def _squared(self, errors: Sequence[Value]) -> Value:
         """Sum of squares of errors as shares of what is allowed."""
@@ -220,6 +241,7 @@ class Step(Evaluator):
             store(layout.state + i, select(good, self.new[i], self.old[i]))
             store(layout.rate + i, select(good, self.rates[i], self.first[i]))
         store(Row.ERROR, select(good, self.size, self.earlier))
+        store(Row.H_OLD, select(good, self.h, self.program.load(Row.H_OLD)))
         for k, z in enumerate(self.z):
             place = guess_at(layout, k)
             store(place, select(good, z, self.program.load(place)))

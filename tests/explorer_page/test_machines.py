@@ -82,7 +82,7 @@ def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
     with Visit(browser, tmp_path / "pad.html") as visit:
         assert "bodies.pad.press → 0 N" in visit.page.locator(".edges button").all_text_contents()
         edges = visit.page.locator(".edges li")
-        assert "bodies.pad.press → 0 N it lifts off" in edges.all_text_contents()
+        assert "bodies.pad.press → 0 N disc lifts off" in edges.all_text_contents()
         visit.type("bodies.pad.press", "-1 N")
         edges.filter(has_text="bodies.pad.press").filter(has_text="slides steadily, but unstable").wait_for()
         assert visit.page.locator(".verdict p").first.inner_text().startswith("Lift-off at contact disc.")

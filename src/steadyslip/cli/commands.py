@@ -312,7 +312,13 @@ def simulate(
 def cycles(
     rig: RigFile,
     changes: Changes = None,
-    along: Annotated[str, typer.Option(help="the parameter that is varied")] = "stiffness",
+    along: Annotated[
+        str | None,
+        typer.Option(
+            help="the parameter that is varied; stiffness unless given, of a machine the one of a link or the drive "
+            "whose edge of oscillation is nearest"
+        ),
+    ] = None,
     between: Annotated[
         tuple[str, str] | None, typer.Option(metavar="LOW HIGH", help="range of it, such as '1 GPa/m' '50 GPa/m'")
     ] = None,

@@ -117,11 +117,14 @@ class NoSteadySliding(SteadyslipError, ValueError):
     shortfall : float
         By how much: the amount that would have to be positive (Pa for lift-off, dimensionless
         for lock-up), NaN where no number tells it.
+    contact : str
+        Of a machine: the contact at which; empty where it is no single one.
     """
 
-    def __init__(self, message: str, condition: str, shortfall: float = float("nan")) -> None:
+    def __init__(self, message: str, condition: str, shortfall: float = float("nan"), contact: str = "") -> None:
         self.condition = condition
         self.shortfall = shortfall
+        self.contact = contact
         super().__init__(message)
 
 

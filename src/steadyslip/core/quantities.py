@@ -424,7 +424,8 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
     if si_unit == "1":
         return _few(value, digits)
     own = _own.get().get(unit(si_unit)[1])
-    if own is not None and (value == 0 or 1e-3 <= abs(value / unit(own)[0]) < 1e5):
+    scaled = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)  # of a power, a prefix would be one of the base
+    if own is not None and (value == 0 or scaled is None or 1e-3 <= abs(value / unit(own)[0]) < 1e5):
         return f"{_few(value / unit(own)[0], digits)} {own}"
     if si_unit == "rad":
         return f"{_few(value / units.deg, digits)} deg"
@@ -434,7 +435,7 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
                 return f"{_few(value / size, digits)} {name}"
-    first = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)  # of a power, a prefix would be one of the base
+    first = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)
     if first is None or value == 0 or not math.isfinite(value):
         return f"{_few(value, digits)} {si_unit}"
     size = abs(value)

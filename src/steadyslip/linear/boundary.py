@@ -165,3 +165,9 @@ def _checked_range(name: str, role: Parameter, between: Sequence[Any]) -> tuple[
     if not low < high:
         raise ParameterError([Problem(name, f"between={between!r}; allowed: low < high")])
     return low, high
+
+
+def oscillatory_edge(distances: Sequence[Margin]) -> Boundary | None:
+    """The nearest edge at which oscillations begin, of the parameters of a rig, nearest first; None without one."""
+    edges = [one.edge for one in distances if one.edge is not None]
+    return next((edge for edge in edges if edge.kind == "oscillatory" and edge.stable != "neither"), None)

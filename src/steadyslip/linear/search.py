@@ -63,6 +63,8 @@ class Boundary(Displayed):
     unit : str
     area : float or None
         Of the rig, m²: people are told totals then.
+    contact : str
+        Of a machine: the contact that locks up or lifts off beyond.
     """
 
     parameter: str
@@ -73,9 +75,12 @@ class Boundary(Displayed):
     stable: str
     unit: str
     area: float | None = None
+    contact: str = ""
 
     def __str__(self) -> str:
         text = f"{self.parameter} = {shown(self.value, self.unit, 6, self.area)}: {self.kind}"
+        if self.contact:
+            text += f" at contact {self.contact}"
         if self.kind == "oscillatory":
             text += f", period {shown(2 * np.pi / self.angular_frequency, 's')}"
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
@@ -214,13 +219,15 @@ class Search:
     def _described(self, low: float, high: float) -> Boundary:
         low, high = self._past_rounding(low, high)
         below, above = (int(s) for s in self.status(np.array([low, high])))
-        kind, frequency = self._kind(low, high, below, above)
+        lost = self._why_none(low if below == ABSENT else high) if ABSENT in (below, above) else None
+        kind, frequency = self._kind(low, high) if lost is None else (lost.condition, 0.0)
         stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         bracket = float(low), float(high)
         return Boundary(
-            self.name, float(middle), bracket, kind, frequency, stable, self.role.unit, self.rig.area_of(self.name)
-        )
+            self.name, float(middle), bracket, kind, frequency, stable, self.role.unit, self.rig.area_of(self.name),
+            "" if lost is None else lost.contact,
+        )  # fmt: skip
 
     def _past_rounding(self, low: float, high: float) -> tuple[float, float]:
         """A wider bracket where steady sliding ends within rounding of the edge.
@@ -236,12 +243,10 @@ class Search:
         ends &= ~np.any(status == UNKNOWN, axis=0)
         return tuple(wide[:, np.argmax(ends)].tolist()) if np.any(ends) else (low, high)
 
-    def _kind(self, low: float, high: float, below: int, above: int) -> tuple[str, float]:
-        if ABSENT in (below, above):
-            outside = low if below == ABSENT else high
-            point = self.values(outside)
-            reason: NoSteadySliding = explain_absence(self.rig.with_values({self.name: outside}), point)
-            return reason.condition, 0.0
+    def _why_none(self, value: float) -> NoSteadySliding:
+        return explain_absence(self.rig.with_values({self.name: value}), self.values(value))
+
+    def _kind(self, low: float, high: float) -> tuple[str, float]:
         both = self.values(np.array([low, high]))
         posed, static = is_ill_posed(both), static_sum(both)
         if posed[0] != posed[1]:

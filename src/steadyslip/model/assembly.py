@@ -416,7 +416,8 @@ class _Assembly:
         integral = self.mechanism.integral
         if integral is not None:
             what = "time integral of x (controller)" if self.single else "time integral of the controller's error"
-            variables.append(Variable("integral", INTEGRAL, "m s", what, "integral"))
+            unit = next(one.unit for one in self.mechanism.coordinates if one.name in integral.acts)
+            variables.append(Variable("integral", INTEGRAL, f"{unit} s", what, "integral"))
             rates.append(row_of(integral.senses, self.x))
         return tuple(variables), tuple(rates)
 

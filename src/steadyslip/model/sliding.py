@@ -278,26 +278,26 @@ def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | No
     at = _at(name)
     force = "force" if name else "stress"
     if equation.parts is None:
-        return _absence("no solution", ABSENT["no solution"].format(at=at, force=force))
+        return _absence("no solution", name, ABSENT["no solution"].format(at=at, force=force))
     load, offset, slope = (float(part) for part in equation.parts(*point.arguments))
     mu = _friction_coefficient(point, place)
     if not slope < 1:
         margin = 1 - slope
         hint = law.lock_up(mu)
         words = ABSENT["lock-up"].format(at=at, margin=f"{margin:.4g}") + (f"; {hint}" if hint else "")
-        return _absence("lock-up", words, margin)
+        return _absence("lock-up", name, words, margin)
     left = load + offset
     had, taken, remains = (shown(one, "Pa", area=area) for one in (load, -offset, left))
     words = ABSENT["lift-off"].format(at=at, force=force, load=had, taken=taken, left=remains)
-    return _absence("lift-off", words, left)
+    return _absence("lift-off", name, words, left)
 
 
 def _at(name: str) -> str:
     return ABSENT["at"].format(name=name) if name else ""
 
 
-def _absence(kind: str, words: str, *margin: float) -> NoSteadySliding:
-    return NoSteadySliding(f"no steady sliding: {words}", kind, *margin)
+def _absence(kind: str, contact: str, words: str, margin: float = math.nan) -> NoSteadySliding:
+    return NoSteadySliding(f"no steady sliding: {words}", kind, margin, contact)
 
 
 def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySliding:
@@ -310,11 +310,11 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
         leading = np.abs(modes[:, np.argmin(np.abs(gains - gain))])
         name = contacts[int(np.argmax(leading))].name
         words = ABSENT["together"].format(at=_at(name), margin=f"{1 - gain:.4g}")
-        return _absence("lock-up", words, float(1 - gain))
+        return _absence("lock-up", name, words, float(1 - gain))
     least = int(np.argmin(sigma))
     force = point.evaluate(point.model.function([contacts[least].area]))[0] * sigma[least]
     words = ABSENT["lifted"].format(at=_at(contacts[least].name), left=shown(float(force), "N"))
-    return _absence("lift-off", words, float(force))
+    return _absence("lift-off", contacts[least].name, words, float(force))
 
 
 @question

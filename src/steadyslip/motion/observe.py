@@ -47,7 +47,8 @@ def _machine_units(model: Model, push: str) -> dict[str, str]:
     for contact in model.contacts:
         units |= {f"{contact.name}.slip": "m", f"{contact.name}.slip_rate": "m/s"}
     unit = model.roles["drive.velocity"].unit.removesuffix("/s")
-    pushed = unit if push == LOAD_POINT else next((one.unit for one in model.coordinates if one.name == push), "m")
+    turning = "rad" if all(one.unit == "rad" for one in model.coordinates) else "m"  # where nothing is pushed
+    pushed = unit if push == LOAD_POINT else next((one.unit for one in model.coordinates if one.name == push), turning)
     disturbance = "N m" if pushed == "rad" else "N"
     units |= {"load_displacement": unit, "load_velocity": f"{unit}/s", "disturbance": disturbance}
     units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}

@@ -10,15 +10,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
 from steadyslip.files.standalone import write_page
+from steadyslip.linear.boundary import margins, oscillatory_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.kicks.basin import Basin, basin
+from steadyslip.nonlinear.kicks.kicks import kick_problems
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
 from steadyslip.nonlinear.orbits.branch import CycleBranch
 from steadyslip.nonlinear.orbits.cycle import Cycle
@@ -29,16 +32,32 @@ KICKED = (".html", *FIGURES)
 
 
 def cycles_of_file(
-    path: str | os.PathLike[str], changes: Iterable[str], along: str, between: Sequence[str] | None, doublings: int
-) -> CycleBranch:
-    """`steadyslip.cycles` for the rig of a file; shows progress on a terminal."""
+    path: str | os.PathLike[str], changes: Iterable[str], along: str | None, between: Sequence[str] | None,
+    doublings: int,
+) -> CycleBranch:  # fmt: skip
+    """`steadyslip.cycles` for the rig of a file; shows progress on a terminal.
+
+    Unless a parameter is given along the stiffness of a slider, of a machine along the parameter of a link or of the
+    drive whose edge of oscillation is the nearest.
+    """
     rig = read_rig(path, changes)
+    along = along or ("stiffness" if isinstance(rig, Slider) else _nearest_oscillation(rig))
     with progress_text("following cycles; Ctrl-C keeps what there is") as said:
 
         def progress(count: int, cycle: Cycle) -> None:
             said(f"{count} cycles, period {shown(cycle.period, 's')}; Ctrl-C keeps what there is")
 
         return cycles(rig, along, between=between, doublings=doublings, progress=progress)
+
+
+def _nearest_oscillation(machine: Machine) -> str:
+    """The parameter of a link or the drive whose edge of oscillation is nearest, or any other where none has one."""
+    found = margins(machine)
+    built = [one for one in found if one.parameter.startswith(("links.", "drive."))]
+    nearest = oscillatory_edge(built) or oscillatory_edge(found)
+    if nearest is None:
+        raise NotAvailable("no parameter has an edge in its range at which oscillations begin; name one, --along NAME")
+    return nearest.parameter
 
 
 def write_branch(branch: CycleBranch, path: Path, source: Path | None = None) -> None:
@@ -95,6 +114,9 @@ def thresholds_of_file(
 
 def thresholds_shown(rig: Slider | Machine, kicks: Sequence[str], **options: Any) -> Thresholds:
     """`steadyslip.threshold` for several kinds of kick; shows progress on a terminal, and ends with Ctrl-C."""
+    problems = [one for kick in dict.fromkeys(kicks) for one in kick_problems(rig, kick, options.get("at"))]
+    if problems:
+        raise ParameterError(problems)
     found: list[Threshold] = []
     with progress_text("starting") as said:
         for kick in kicks:

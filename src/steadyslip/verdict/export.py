@@ -115,6 +115,7 @@ def _edges(margin: Margin, area: float | None) -> list[dict[str, Any]]:
             "value": edge.value,
             "bracket": list(edge.bracket),
             "kind": edge.kind,
+            **({"contact": edge.contact} if edge.contact else {}),
             "angular_frequency": edge.angular_frequency,
             "stable": edge.stable,
             "own_value": margin.value,

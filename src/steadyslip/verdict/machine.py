@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.errors import NoSteadySliding, NotAvailable
+from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown
 from steadyslip.linear import formula as linear_formula
-from steadyslip.linear.boundary import Margin, margins
+from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
 from steadyslip.linear.modes import Mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
@@ -24,7 +24,16 @@ from steadyslip.nonlinear.onset.hopf import Onset, onset_at
 from steadyslip.verdict.export import common_numbers, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.words import BEYOND, disturbance, headline, lines_of, margin_table, onset_words, survived
+from steadyslip.verdict.words import (
+    BEYOND,
+    beyond,
+    disturbance,
+    headline,
+    lines_of,
+    margin_table,
+    onset_words,
+    survived,
+)
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -108,8 +117,7 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
 
 def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:
     """What happens at the oscillatory edge that is nearest, of all parameters."""
-    edges = [one.edge for one in distances if one.edge is not None]
-    nearest = next((edge for edge in edges if edge.kind == "oscillatory" and edge.stable != "neither"), None)
+    nearest = oscillatory_edge(distances)
     try:
         return None if nearest is None else onset_at(machine, nearest)
     except NotAvailable:  # lost in rounding
@@ -118,13 +126,17 @@ def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:
 
 def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
     """Those that are not survived, from words such as ``force at table``."""
-    found: tuple[Threshold, ...] = ()
-    if kinds:
-        from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
-    for words in kinds:
-        kick, _, at = words.partition(" at ")
-        found += thresholds_shown(machine, (kick.strip(),), at=at.strip() or None).found
-    return found
+    if not kinds:
+        return ()
+    from steadyslip.nonlinear.commands import thresholds_shown  # compiles; only where asked for
+    from steadyslip.nonlinear.kicks.kicks import kick_problems
+
+    asked = [(kick.strip(), at.strip() or None) for kick, _, at in (words.partition(" at ") for words in kinds)]
+    problems = [one for kick, at in asked for one in kick_problems(machine, kick, at)]
+    if problems:
+        raise ParameterError(problems)
+    found = [one for kick, at in asked for one in thresholds_shown(machine, (kick,), at=at).found]
+    return tuple(found)
 
 
 PHRASES = {
@@ -159,8 +171,8 @@ def _nearest(found: MachineAnalysis, margin: Margin) -> str:
         return ""
     side = "above" if edge.value > margin.value else "below"
     value = shown(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
-    beyond = PHRASES["stable"] if edge.stable == side else PHRASES.get(edge.kind, edge.kind)
-    return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=beyond)
+    what = PHRASES["stable"] if edge.stable == side else beyond(edge)
+    return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=what)
 
 
 def _sliding(steady: SteadyMachine | None) -> str:

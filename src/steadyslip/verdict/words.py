@@ -14,6 +14,7 @@ from steadyslip.verdict.holding import gain_words, holding
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
+    from steadyslip.linear.search import Boundary
     from steadyslip.nonlinear.kicks.threshold import Threshold
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings, Verdict
@@ -36,6 +37,12 @@ BEYOND = {
     "lift-off": "it lifts off",
     "no solution": "steady sliding ceases to exist",
 }
+
+
+def beyond(edge: Boundary) -> str:
+    """What happens where sliding is not stable any more; of a machine at which contact."""
+    words = BEYOND.get(edge.kind, edge.kind)
+    return f"{edge.contact} {words.removeprefix('it ')}" if edge.contact and words.startswith("it ") else words
 
 
 def verdict(analysis: Findings) -> str:
@@ -178,22 +185,34 @@ def onset_words(onset: Onset) -> str:
     return f"{text}; this rig is too far from it to say how large it is" if math.isfinite(amplitude) else text
 
 
+_KICKS = {
+    "velocity": ("velocity step", "a velocity step{at} to"),
+    "displacement": ("displacement step", "a displacement step{at} of"),
+    "normal-stress": ("normal-stress step", "a normal-stress step{at} of"),
+    "normal-force": ("normal-force step", "a step of the normal force{at} of"),
+    "force": ("force step", "a step of the force{at} of"),
+    "impulse": ("blow", "a blow{at} of"),
+}
+
+
 def survived(kick: Threshold) -> str:
     """A threshold in a few words."""
+    name, what = _KICKS[kick.kick]
+    at = f" at {kick.at}" if kick.at else ""
     if kick.size == 0:
-        return "none is survived: steady sliding is unstable"
+        return f"no {name}{at} is survived: steady sliding is unstable"
     if math.isinf(kick.size):
-        return f"every {kick.kick} step in the range searched is survived"
+        return f"every {name}{at} in the range searched is survived"
     reason = f" ({kick.doubt})" if kick.doubt else ""
     why = "stopped, not known" if kick.interrupted else "undecided"
     if math.isnan(kick.size) and kick.bracket[0] == 0:
-        return f"{why} from the smallest {kick.kick} step on{reason}"
+        return f"{why} from the smallest {name}{at} on{reason}"
     if math.isnan(kick.size):
-        return f"every {kick.kick} step tried up to size {kick.bracket[0]:.4g} is survived; {why} beyond{reason}"
-    what = {"velocity": "a velocity step to", "displacement": "a displacement step of",
-            "normal-stress": "a normal-stress step of", "impulse": "a blow of"}[kick.kick]  # fmt: skip
+        return f"every {name}{at} tried up to size {kick.bracket[0]:.4g} is survived; {why} beyond{reason}"
+    what = what.format(at=at)
     edge = ", the edge of the sliding that it leads to" if kick.edge else ""
-    after = f"{kick.outcome}{reason}" if kick.outcome == "undecided" else f"more leads to {kick.outcome}"
+    where = f" at {kick.contact}" if kick.contact else ""
+    after = f"{kick.outcome}{reason}" if kick.outcome == "undecided" else f"more leads to {kick.outcome}{where}"
     amount = shown(kick.amount, kick.unit, area=kick.area)
     if kick.decided:
         return f"survives {what} {amount}{edge}; {after}"
@@ -286,7 +305,7 @@ def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, 
     elif analysis.stable is None:
         words = "slides steadily, but unstable"
     else:
-        words = BEYOND.get(edge.kind, edge.kind)
+        words = beyond(edge)
     return (
         margin.parameter,
         shown(margin.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),

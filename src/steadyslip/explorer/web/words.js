@@ -71,7 +71,7 @@ export function machineReason(answer, { phrases, facts, areas }, edge) {
   if (answer.illPosed) return sentence(phrases["are ill-posed"]);
   if (answer.onEdge) return sentence(phrases["on edge"]);
   const what = answer.status === STABLE ? phrases["dies out"] : phrases[answer.eigenvalues[0].im ? "oscillatory" : "divergence"];
-  return sentence(edge ? `${what}; ${fill(phrases.nearest, { ...edge, beyond: phrases[edge.kind] })}` : what);
+  return sentence(edge ? `${what}; ${fill(phrases.nearest, edge)}` : what);
 }
 
 /** What kind of change an edge is, by what is behind it. @param {any} answer there */
@@ -81,10 +81,17 @@ export function kindBeyond(answer) {
   return answer.illPosed ? "ill-posed" : answer.eigenvalues[0]?.im ? "oscillatory" : "divergence";
 }
 
+/** "it lifts off" of a machine: which contact does. @param {string} words @param {any} answer @param {any} facts */
+export const ofContact = (words, answer, facts) =>
+  answer.status === ABSENT && facts?.contacts ? words.replace(/^it /, `${facts.contacts[answer.contact]} `) : words;
+
 /** What happens beyond an edge; where nothing slides steadily there, why. @param {any} edge @param {any} page */
 export function beyondWords({ i, beyond, behind }, page) {
   if (beyond === STABLE) return "becomes stable";
-  if (beyond === ABSENT) return { "lift-off": "it lifts off", "lock-up": "it locks up", "no solution": "steady sliding ceases to exist" }[kindBeyond(page.rig.assess(page.with(i, behind)))];
+  if (beyond === ABSENT) {
+    const answer = page.rig.assess(page.with(i, behind));
+    return ofContact({ "lift-off": "it lifts off", "lock-up": "it locks up", "no solution": "steady sliding ceases to exist" }[kindBeyond(answer)], answer, page.rig.data.facts);
+  }
   return page.rig.status(i, page.rig.values[i]) === ABSENT ? "slides steadily, but unstable" : "becomes unstable";
 }
 

@@ -82,6 +82,23 @@ def kicks_of(rig: Slider | Machine) -> dict[str, Kick]:
     return KICKS if isinstance(rig, Slider) else OF_MACHINES
 
 
+def kick_problems(rig: Slider | Machine, kick: str, at: str | None = None) -> list[Problem]:
+    """What is wrong with a kick and where it is to act.
+
+    Raises
+    ------
+    NotAvailable
+        If it would be an infinite force.
+    """
+    known = kicks_of(rig)
+    if kick not in known:
+        return [Problem("kick", unknown_name("kick", kick, known))]
+    found = place_problems(rig, kick, at)
+    if not found and kick == "displacement" and not at:
+        refuse_jump(rig)
+    return found
+
+
 def options_for(model: Model, rtol: float | None) -> Options:
     """How kicked motion is integrated: less finely with mass or bristles, which need a Rosenbrock method.
 
@@ -126,15 +143,11 @@ class Kicked:
         self, rig: Slider | Machine, kick: str, direction: int, reference: str, vary: Mapping[str, Any], branch: int,
         rtol: float | None, at: str | None = None,
     ) -> None:  # fmt: skip
-        problems, known = [], kicks_of(rig)
-        if kick not in known:
-            problems.append(Problem("kick", unknown_name("kick", kick, known)))
+        problems, known = kick_problems(rig, kick, at), kicks_of(rig)
         if direction not in (1, -1):
             problems.append(Problem("direction", f"got {direction!r}; allowed: 1 or -1"))
         if reference not in ("before", "after"):
             problems.append(Problem("reference", f"got {reference!r}; allowed: 'before' or 'after'"))
-        if not problems:
-            problems += place_problems(rig, kick, at)
         if problems:
             raise ParameterError(problems)
         self.kick, self.sign, self.budget, self.at = known[kick], float(direction), StepBudget(), at or ""
@@ -154,8 +167,6 @@ class Kicked:
             push, press = (self.at, "") if kick == "force" else ("", self.at)
             reduction = reduce_model(jobs.point.model, jobs.eliminate, push, press)
             jobs = replace(jobs, push=push, press=press, reduction=reduction)
-        if kick == "displacement" and self.of_drive:
-            refuse_jump(rig)
         self.jobs = jobs
         self.drive = np.broadcast_to(np.asarray(values.drive, dtype=float), (self.size,))
         self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))

@@ -49,7 +49,7 @@ def refuse_jump(rig: Slider | Machine) -> None:
     if isinstance(rig, Machine) and any(e.damping and LOAD_POINT in e.senses for e in rig.mechanism().elements):
         raise NotAvailable(
             "a displacement step of the drive acts through a dashpot (of a link, a kd) as an infinite force; kick a "
-            "body instead, with at='NAME', or by another kick"
+            "body instead, with at='NAME' (--at NAME; --kick 'displacement at NAME' of analyze), or by another kick"
         )
 
 

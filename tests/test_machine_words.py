@@ -1,0 +1,93 @@
+"""What people are told of machines: which contact, which kick, which parameter, in which unit."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from command import run
+from machines import brake, rate_state, two_mass
+from steadyslip.core.errors import ParameterError
+from steadyslip.core.quantities import shown, told_in
+from steadyslip.model.point import operating_point
+from steadyslip.nonlinear import commands
+from steadyslip.nonlinear.kicks.kicks import OF_MACHINES
+from steadyslip.nonlinear.kicks.threshold import Threshold
+from steadyslip.verdict.words import survived
+
+PAD = brake(rate_state(1.0, -0.1, 1.0, mu=0.3))
+
+
+def test_an_edge_of_steady_sliding_names_the_contact():
+    found = ss.analyze(PAD)
+    (edge,) = [one for one in found.boundaries if one.parameter == "bodies.pad.press" and one.kind == "lift-off"]
+    assert edge.contact == "disc"
+    assert "lift-off at contact disc" in str(edge)
+    assert "disc lifts off" in str(found)
+    assert "it lifts off" not in str(found)
+    (row,) = [r for r in found.to_dict()["boundaries"] if r["kind"] == "lift-off" and r["parameter"].endswith("press")]
+    assert row["contact"] == "disc"
+    with pytest.raises(ss.NoSteadySliding) as caught:
+        ss.steady_state(PAD.with_values({"bodies.pad.press": -5.0}))
+    assert caught.value.contact == "disc"
+
+
+@pytest.mark.parametrize("kick", OF_MACHINES)
+@pytest.mark.parametrize("size", [0.0, 0.3, np.inf, np.nan])
+def test_every_kick_of_a_machine_can_be_told(kick, size):
+    at = "disc" if kick == "normal-force" else "pad"
+    one = Threshold(PAD, kick, 1, size, (0.2, 0.4), 0.3, "N", "contact lost", 25.0, survived=0.2, at=at, contact="disc")
+    text = survived(one)
+    assert f" at {at}" in text
+    assert ("more leads to contact lost at disc" in text) == (size == 0.3)
+    assert "nan" not in text
+    assert "inf" not in text
+
+
+def test_all_kicks_are_checked_before_the_first_is_computed(monkeypatch):
+    monkeypatch.setattr(commands, "threshold", lambda *_, **__: pytest.fail("computed"))
+    with pytest.raises(ss.NotAvailable, match="infinite force"):
+        ss.analyze(two_mass(kp=4.0), kick=["velocity", "displacement"])
+    with pytest.raises(ParameterError, match="unknown body 'tble'"):
+        ss.analyze(two_mass(kp=4.0), kick=["velocity", "force at tble"])
+    with pytest.raises(ParameterError, match="unknown kick 'push'"):
+        commands.thresholds_shown(two_mass(kp=4.0), ("velocity", "push"))
+
+
+def test_cycles_follow_the_drive_or_link_nearest_to_an_edge(monkeypatch, tmp_path):
+    """Of a machine, which has no one stiffness; a parameter of friction only where no other has an edge."""
+    path = tmp_path / "axis.toml"
+    path.write_text(ss.rig_to_text(two_mass(kp=4.0)), encoding="utf-8")
+    asked = []
+    monkeypatch.setattr(commands, "cycles", lambda rig, along, **_: asked.append(along))
+    commands.cycles_of_file(path, (), None, None, 1)
+    commands.cycles_of_file(path, (), "drive.kd", None, 1)
+    commands.cycles_of_file("examples/stick-slip.toml", (), None, None, 1)
+    assert asked == ["drive.kp", "drive.kd", "stiffness"]
+
+
+def test_what_turns_is_in_angles():
+    """The integral of an angle, and what pushes shafts."""
+    telescope = ss.read_rig("examples/machines/telescope.toml")
+    units = {one.name: one.unit for one in operating_point(telescope).model.variables}
+    assert units["integral"] == "rad s"
+    slides = replace(two_mass(), drive=ss.PositionPID(velocity=1.0, body="motor", kp=1.0, ki=0.1))
+    assert {one.name: one.unit for one in operating_point(slides).model.variables}["integral"] == "m s"
+    assert ss.simulate(telescope, until=1e-3).units["disturbance"] == "N m"
+
+
+def test_speeds_stay_in_the_unit_of_the_file_however_small():
+    """Rad/s has no prefixes that would read better."""
+    with told_in(["rpm", "mm/yr"]):
+        assert shown(2.396e-5, "rad/s") == "0.0002288 rpm"
+        assert shown(1.0, "m/s") == "1 m/s"
+
+
+def test_kicks_of_the_command_line_end_with_words(tmp_path):
+    path = tmp_path / "axis.toml"
+    path.write_text(ss.rig_to_text(two_mass(kp=1.0)), encoding="utf-8")
+    done = run("analyze", path, "--kick", "force at table")
+    assert "no force step at table is survived: steady sliding is unstable" in " ".join(done.stdout.split())
+    assert json.loads(run("analyze", path, "--kick", "force at table", "--json").stdout)["kicks"][0]["at"] == "table"

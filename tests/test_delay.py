@@ -13,7 +13,8 @@ from delays import some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
 from steadyslip.linear import quasi
 from steadyslip.linear.spectrum import unstable_roots
-from steadyslip.linear.windows import delay_set, linear_windows
+from steadyslip.linear.waves import Waves
+from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.range import quasi as operating_quasi
 from steadyslip.model.reducing import reduce_model
@@ -126,11 +127,11 @@ def test_edges_of_delays_are_those_of_the_discretised_equation():
 
 
 def test_windows_of_what_enters_linearly_are_those_of_counting():
-    """On a grid of θ, for random P + θ Q with one delay and with two."""
+    """On a grid of θ, for random P + θ Q with one delay, with two and with three."""
     both = 0
     for seed in range(30):
-        c, h = some(seed, 2 + seed % 2)
-        q, _ = some(seed + 500, 2 + seed % 2)
+        c, h = some(seed, 2 + seed % 3)
+        q, _ = some(seed + 500, 2 + seed % 3)
         q = q[:, : c.shape[1]] if q.shape[1] >= c.shape[1] else np.pad(q, ((0, 0), (0, c.shape[1] - q.shape[1])))
         q[:, -1] = 0.0
         c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 3.0
@@ -144,6 +145,64 @@ def test_windows_of_what_enters_linearly_are_those_of_counting():
         assert np.array_equal(inside[known], stable[known]), seed
         both += 0 < stable.sum() < len(stable)
     assert both > 10
+
+
+def test_stable_values_of_a_delay_among_others_are_those_of_counting():
+    """On a grid of it, for random sums in which it comes on top of one or two of the others; alone by the formula."""
+    changes = 0
+    for seed in range(24):
+        random, terms = np.random.default_rng(seed), 3 + seed % 2
+        c, h = some(seed, terms)
+        c[0] += np.poly(-np.ones(c.shape[1] - 1))[::-1] * 2.0
+        late = np.arange(terms) >= terms - 1 - int(random.integers(0, terms - 2))
+        h = np.where(late, random.choice([0.0, 0.5], terms), h)
+        found = delay_set_among(c, h, late)
+        grid = np.geomspace(1e-2, 20.0, 40)
+        stable = np.array([quasi.count_right(c, h + late * one) == 0 for one in grid])
+        inside = np.any((found.intervals[:, :1] < grid) & (grid < found.intervals[:, 1:]), axis=0)
+        assert np.array_equal(inside, stable), seed
+        changes += 0 < stable.sum() < len(stable)
+        alone, same = delay_set_among(c[:2], h[:2] * 0, np.array([False, True])), delay_set(c[0], c[1])
+        np.testing.assert_allclose(alone.intervals, same.intervals, rtol=1e-9)
+    assert changes > 3
+
+
+def test_two_crossings_that_nearly_touch_are_found_and_what_only_touches_is_told():
+    """(ω² − w²)(ω² − (w + δ)²) cos ωd, δ ever smaller, beside the zeros of the cosine."""
+    for gap in (1e-3, 1e-6):
+        w, d = 0.7123456, 3.0
+        polynomial = np.polynomial.Polynomial([-(w**2), 0, 1]) * np.polynomial.Polynomial([-((w + gap) ** 2), 0, 1])
+        f = Waves(np.array([d]), polynomial.coef[None], np.zeros((1, 5)))
+        at, way = f.zeros(5.0)
+        cosine = (np.arange(5) + 0.5) * np.pi / d
+        expected = np.sort(np.concatenate([[w, w + gap], cosine[cosine < 5.0]]))
+        np.testing.assert_allclose(at, expected, rtol=1e-9)
+        assert np.all(way[1:] == -way[:-1])
+    touching = np.polynomial.Polynomial([-(w**2), 0, 1]) ** 2
+    at, way = Waves(np.array([0.0]), touching.coef[None], np.zeros((1, 5))).zeros(5.0)
+    assert np.all(np.abs(at - w) < 1e-6)
+    assert np.sum(np.abs(way)) % 2 == 0
+
+
+def test_stable_values_with_two_delays_are_those_of_a_typed_equation():
+    """Late controller and late friction: of each delay and of a gain, counted by how the typed function winds."""
+    machine = replace(
+        lagging(10.0), drive=ss.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.Spring(between=("ground", "block"), damping=0.4)},
+    )  # fmt: skip
+
+    def whole(s, kp=2.0, lag=1.0, delay=0.2):
+        return s**2 + 0.4 * s + 0.1 * s * np.exp(-lag * s) + (kp + 0.5 * s) * np.exp(-delay * s)
+
+    cases = {"drive.kp": "kp", "contacts.guide.friction.lag": "lag", "drive.delay": "delay"}
+    for name, own in cases.items():
+        intervals = ss.stable_values(machine, name)
+        ends = intervals[(intervals > 0) & np.isfinite(intervals)]
+        probes = np.concatenate([[0.3 * np.min(ends, initial=1.0)], ends * 0.999, ends * 1.001, [0.7, 2.1]])
+        for probe in probes:
+            turned = winding(lambda s, given={own: probe}: np.array([[whole(s, **given)]]), 200.0)
+            inside = np.any((intervals[:, 0] < probe) & (probe < intervals[:, 1]))
+            assert inside == (turned == 0), (name, probe)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -8,7 +8,7 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.crossing import APART, linear_split
 from steadyslip.linear.polynomials import Array, StableSet, columns, most_intervals, quietly, stable_set
-from steadyslip.linear.windows import delay_set, linear_windows
+from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model.linearisation import characteristic_terms
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import quasi
@@ -131,9 +131,20 @@ def linear_set(point: OperatingPoint, name: str, size: float | None = None) -> S
 
 
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
-    """That of a delay, where it is the only one."""
+    """That of a delay that no term has twice; None elsewhere."""
     terms = characteristic_terms(point.model)
-    if [term.delay for term in terms] != [0, symbol]:
+    c, h = quasi(point)
+    if not np.all(np.isfinite(c)):
         return None
-    c, _ = quasi(point)
-    return delay_set(c[0], c[1]) if np.all(np.isfinite(c)) else None
+    if [term.delay for term in terms] == [0, symbol]:
+        return delay_set(c[0], c[1])
+    late = np.array([sp.sympify(term.delay).has(symbol) for term in terms])
+    if any(sp.diff(term.delay, symbol) != 1 for term, own in zip(terms, late, strict=True) if own):
+        return None
+    others = h - late * float(point.named()[name_of(point, symbol)])
+    return delay_set_among(c, np.where(np.abs(others) < 1e-12 * np.max(h), 0.0, others), late)
+
+
+def name_of(point: OperatingPoint, symbol: sp.Symbol) -> str:
+    """The dotted name of a parameter."""
+    return next(name for name, own in point.model.parameters.items() if own == symbol)

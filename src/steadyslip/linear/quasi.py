@@ -88,9 +88,9 @@ def count_right(c: Array, h: Array, shift: Any = 0.0) -> NDArray[np.int64]:
     h = np.broadcast_to(h, (*lead, h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full(len(c), -1, dtype=np.int64)
     good = np.all(np.isfinite(c), axis=(-2, -1)) & np.all(np.isfinite(h), axis=-1)
-    outweighed = good & _outweighed(c) & np.any(h[:, 1:] > 0, axis=-1)
-    found[outweighed] = INFINITE
-    rows = np.flatnonzero(good & ~outweighed)
+    ahead = good & outweighed(c) & np.any(h[:, 1:] > 0, axis=-1)
+    found[ahead] = INFINITE
+    rows = np.flatnonzero(good & ~ahead)
     if c.shape[-2] <= 2 and rows.size:
         q = c[rows, 1] if c.shape[-2] == 2 else np.zeros_like(c[rows, 0])
         found[rows] = _count_by_crossings(c[rows, 0], q, h[rows, -1])
@@ -100,7 +100,7 @@ def count_right(c: Array, h: Array, shift: Any = 0.0) -> NDArray[np.int64]:
     return found.reshape(lead)
 
 
-def _outweighed(c: Array) -> NDArray[np.bool_]:
+def outweighed(c: Array) -> NDArray[np.bool_]:
     """Whether the highest derivative is delayed as much as it is not, or more."""
     present = np.any(c != 0, axis=-2)
     top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
@@ -139,7 +139,7 @@ def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
     return np.asarray(start + crossed, dtype=np.int64)
 
 
-def _bound(c: Array) -> float:
+def bound_on_axis(c: Array) -> float:
     """A size that no root to the right of the imaginary axis has (Fujiwara), delayed terms at their largest."""
     size = np.abs(c)
     top = int(np.flatnonzero(np.any(size > 0, axis=0))[-1])
@@ -177,7 +177,7 @@ def _along(c: Array, h: Array, most: float) -> tuple[Array, ComplexArray]:
 def _count_by_argument(c: Array, h: Array) -> int:
     """Roots to the right by the argument principle: n/2 less the turns of the function along the positive axis."""
     top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
-    _, found = _along(c, h, _bound(c))
+    _, found = _along(c, h, bound_on_axis(c))
     turned = float(np.sum(np.angle(found[1:] / found[:-1])))
     turned += float(np.angle(1j**top * c[0, top] / found[-1]))  # beyond, the highest power leads by less than π/2
     return round(top / 2 - turned / np.pi)
@@ -204,7 +204,7 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
         exact = roots(np.sum(c, axis=0))
         return np.append(exact, np.full(count, np.nan + 0j))[:count]
     numbers = np.arange(1, count + 1)
-    high = np.full(count, 1.01 * _bound(c))
+    high = np.full(count, 1.01 * bound_on_axis(c))
     low = -np.ones(count) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave the range of floating point
     for _ in range(60):
         short = count_right(c, h, low) < numbers
@@ -251,7 +251,7 @@ def _near_axis(c: Array, h: Array) -> Iterator[float]:
     if len(c) == 2:
         yield from (float(one) for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one))
         return
-    omega, found = _along(c, h, _bound(c))
+    omega, found = _along(c, h, bound_on_axis(c))
     size = np.abs(found) / _size(c, h, 1j * omega)
     dips = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
     yield from omega[dips[np.argsort(size[dips])[:20]]]
@@ -290,6 +290,14 @@ def crossing_delays(p: Array, q: Array) -> tuple[Array, Array, Array]:
     omega, direction, phase = (one[0] for one in crossings(scaled[:1], scaled[1:]))
     known = np.isfinite(omega)
     omega, direction, phase = omega[known], direction[known], phase[known]
+    delays, frequencies, ways = repeated(omega, direction, phase)
+    return delays / rate, frequencies * rate, ways
+
+
+def repeated(omega: Array, direction: Array, phase: Array) -> tuple[Array, Array, Array]:
+    """Delays (φ + 2πk)/ω of crossings, ω falling, up to where there are roots to the right for good; rising, with ω
+    and the direction of each.
+    """
     if not omega.size:
         return np.empty(0), np.empty(0), np.empty(0, dtype=int)
     ahead = float(np.sum(direction * omega))  # > 0
@@ -302,4 +310,4 @@ def crossing_delays(p: Array, q: Array) -> tuple[Array, Array, Array]:
         way.append(np.full(len(times), int(sign)))
     every = np.concatenate(delays)
     order = np.argsort(every)
-    return every[order] / rate, np.concatenate(at)[order] * rate, np.concatenate(way)[order]
+    return every[order], np.concatenate(at)[order], np.concatenate(way)[order]

@@ -1,23 +1,34 @@
 """Exact stable sets of machines with delay: of the delay itself, and of a parameter θ that enters linearly.
 
 Of θ in P(s) + θ Q(s), both with delays, edges are θ = −P(iω)/Q(iω) where that is real, as without delay; ω follows from
-a function that oscillates, so that there are ever more of them and the set is one of windows (theory 4, 10). Where it
-changes sign is found along the axis; roots counted on both sides of every edge tell whether one was missed.
+a function that oscillates, so that there are ever more of them and the set is one of windows (theory 4, 10). Its zeros
+are enclosed (`waves`), so that none is missed; between two neighbours one count of roots holds.
+
+Of one delay θ among several, A(s) + B(s) exp(−sθ), roots are on the axis only at the ω with |A(iω)| = |B(iω)|, enclosed
+in the same way, and cross to the right where |A| − |B| rises with ω.
 """
 
 from __future__ import annotations
+
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.linear.polynomials import Array, StableSet, quietly, roots
-from steadyslip.linear.quasi import count_right, crossing_delays, value
+from steadyslip.linear.quasi import (
+    bound_on_axis,
+    count_right,
+    crossing_delays,
+    in_own_time,
+    outweighed,
+    repeated,
+    value,
+)
+from steadyslip.linear.waves import where_alike, where_real
 
-_PER_TURN = 24  # places on the axis for every turn of the longest delay
-_PER_DECADE = 120
 _TURNS = 100  # of an oscillation during the delay, beyond which windows are not looked for any more,
 _MANY = 20_000  # where the rig itself has none so fast
-_FINER = 4  # times as many places where an edge was missed, up to twice
 
 
 def none() -> StableSet:
@@ -34,6 +45,30 @@ def delay_set(p: Array, q: Array) -> StableSet:
     delays, frequencies, directions = crossing_delays(p, q)
     right = np.sum(roots((p + q)[None])[0].real > 0) + np.concatenate([[0], np.cumsum(2 * directions)])
     return _of_cells(delays, frequencies, right == 0)
+
+
+@quietly
+def delay_set_among(c: Array, h: Array, late: NDArray[np.bool_]) -> StableSet | None:
+    """Every value above zero of one delay, at which a sum with other delays is stable.
+
+    `c` (m, n+1) are the coefficients of Σ p_j(s) exp(−s h_j), `h` (m,) the other delays, `late` (m,) says where the one
+    that is sought comes on top of them. None where its edges cannot be told apart.
+    """
+    (scaled,), (others,), (rate,) = in_own_time(c[None], h[None])
+    top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
+    if outweighed(scaled[None])[0] or np.sum(c[:, 0]) == 0 or c[0, top] <= 0 or top < c.shape[1] - 2:
+        return none()
+    start = int(count_right(scaled, others))
+    parts = [(scaled[which], others[which]) for which in (~late, late)]
+    zeros = where_alike(*parts[0], *parts[1]).zeros(bound_on_axis(scaled))
+    if zeros is None:
+        return None
+    omega, direction = (one[zeros[1] != 0] for one in zeros)
+    at_once, delayed = (value(*part, 1j * omega) for part in parts)
+    phase = np.mod(np.angle(-delayed / at_once), 2 * np.pi)
+    delays, frequencies, ways = repeated(omega[::-1], direction[::-1], np.where(phase == 0, 2 * np.pi, phase)[::-1])
+    right = start + np.concatenate([[0], np.cumsum(2 * ways)])
+    return _of_cells(delays / rate, frequencies * rate, right == 0)
 
 
 def _of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -> StableSet:
@@ -63,26 +98,21 @@ def linear_windows(p: Array, q: Array, h: Array, low: float, high: float) -> Sta
     end = high if not above.size else float(scale[above[0] - 1])
     start = low if not below.size else float(scale[below[-1] + 1])
     found = _windows(p, q, h, start, end, min(most, float(np.max(bound))))
+    if found is None:
+        return None
     cut = [0.0 if start == low else start, np.inf if end == high else end]
     intervals = np.where(found.intervals == 0, cut[0], np.where(np.isinf(found.intervals), cut[1], found.intervals))
     return StableSet(intervals, found.edges, found.frequencies, found.changes)
 
 
-def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float) -> StableSet:
-    finer = 1
-    while True:
-        theta, beta = _candidates(p, q, h, low, high, fast, finer)
-        ends = np.concatenate([[low], theta, [high]])
-        left, right = ends[:-1], ends[1:]
-        probes = np.sqrt(left) * np.sqrt(right)
-        near = (0.02, 0.98)
-        counts = [_right(p, q, h, probes)] + [_right(p, q, h, left ** (1 - x) * right**x) for x in near]
-        missed = np.any((counts[1] != counts[0]) | (counts[2] != counts[0]))
-        if not missed or finer >= _FINER**2:
-            break
-        finer *= _FINER
-    posed = _posed(p, q, probes)
-    return _of_cells(theta, beta, (counts[0] == 0) & posed)
+def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float) -> StableSet | None:
+    candidates = _candidates(p, q, h, low, high, fast)
+    if candidates is None:
+        return None
+    theta, beta = candidates
+    ends = np.concatenate([[low], theta, [high]])
+    probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours nothing crosses the axis
+    return _of_cells(theta, beta, (_right(p, q, h, probes) == 0) & _posed(p, q, probes))
 
 
 def _right(p: Array, q: Array, h: Array, theta: Array) -> NDArray[np.int64]:
@@ -106,35 +136,22 @@ def _fastest(p: Array, q: Array, theta: Array) -> Array:
     return np.asarray(np.where(np.isfinite(bound), bound, np.nanmax(bound) if np.any(np.isfinite(bound)) else 1.0))
 
 
-def _candidates(p: Array, q: Array, h: Array, low: float, high: float, fast: float, finer: int) -> tuple[Array, Array]:
+def _candidates(p: Array, q: Array, h: Array, low: float, high: float, fast: float) -> tuple[Array, Array] | None:
     """Values of θ at which a root may be on the axis, rising, and the frequencies: zero, or infinite at the top."""
-    longest = float(np.max(h))
-    slow = np.geomspace(1e-9 * fast, fast, 9 * _PER_DECADE * finer)
-    even = np.linspace(0.0, fast, int(_PER_TURN * finer * fast * longest / (2 * np.pi)) + 2)[1:]
-    omega = np.unique(np.concatenate([slow, even]))
-
-    def crossing(w: Array) -> Array:
-        return np.asarray((value(p, h, 1j * w) * np.conj(value(q, h, 1j * w))).imag)
-
-    at = crossing(omega)
-    cells = np.flatnonzero(np.sign(at[1:]) * np.sign(at[:-1]) < 0)
-    left, right, falls = omega[cells], omega[cells + 1], at[cells] > 0
-    for _ in range(60):
-        middle = 0.5 * (left + right)
-        before = (crossing(middle) > 0) == falls
-        left, right = np.where(before, middle, left), np.where(before, right, middle)
-    beta = np.concatenate([0.5 * (left + right), omega[at == 0]])
+    zeros = where_real(p, q, h).zeros(fast)
+    if zeros is None:
+        return None
+    beta = zeros[0]
     above, below = value(p, h, 1j * beta), value(q, h, 1j * beta)
     theta = -(above * np.conj(below)).real / np.abs(below) ** 2
     static = -np.sum(p[:, 0]) / np.sum(q[:, 0])
-    tops = [-p[0, -1] / q[0, -1]]
-    if len(p) == 2:
-        tops += [-(p[0, -1] - p[1, -1]) / (q[0, -1] - q[1, -1]), -(p[0, -1] + p[1, -1]) / (q[0, -1] + q[1, -1])]
+    late = np.array(list(product((-1.0, 0.0, 1.0), repeat=len(p) - 1)))  # signs of what is delayed, in the highest
+    tops = -(p[0, -1] + late @ p[1:, -1]) / (q[0, -1] + late @ q[1:, -1])
     theta = np.concatenate([theta, [static], tops])
     beta = np.concatenate([beta, [0.0], np.full(len(tops), np.inf)])
     inside = np.isfinite(theta) & (theta > low) & (theta < high)
     theta, beta = theta[inside], beta[inside]
-    order = np.argsort(theta)
+    order = np.argsort(theta, kind="stable")
     theta, beta = theta[order], beta[order]
     apart = np.append(True, np.diff(theta) > 1e-12 * theta[1:]) if len(theta) else np.empty(0, dtype=bool)
     return theta[apart], beta[apart]

@@ -13,6 +13,7 @@ from matplotlib.path import Path
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.numerics.noise import autocorrelation, lag_one
+from steadyslip.figures.experiments import fits
 from steadyslip.figures.experiments.corners import region
 
 
@@ -31,17 +32,40 @@ def test_a_record_with_its_commanded_loading(record):
     np.testing.assert_array_equal(panels[0].lines[0].get_ydata(), record.friction)
     assert [p.get_ylabel() for p in panels] == ["friction τ/σ (1)", "load-point\nrate (µm/s)", "normal\nstress (MPa)"]
     assert len(panels[0].lines) == 1 + len(record.steps)
-    np.testing.assert_allclose(panels[1].lines[1].get_ydata(), 1e6 * record.loading.load.at(record.time))
-    np.testing.assert_allclose(panels[2].lines[1].get_ydata(), 1e-6 * record.loading.stress.at(record.time))
+    for panel, unit, course in ((panels[1], 1e-6, record.loading.load), (panels[2], 1e6, record.loading.stress)):
+        seen = np.interp(panel.lines[0].get_xdata(), *panel.lines[1].get_data())
+        np.testing.assert_allclose(seen, course.at(record.time) / unit)
     assert panels[2].get_xlabel() == ("time after step (s)" if len(record.steps) == 1 else "time after first step (s)")
     with pytest.raises(ss.ParameterError, match="sequence of 3"):
         ss.figures.record(record, Figure().subplots(2, 1))
 
 
+def test_a_long_name_and_few_samples_leave_a_readable_picture(record):
+    """The name keeps both its ends, the commanded rate its corner between samples, and dots can be seen."""
+    few = replace(record.decimated(50), source="sample_" + 80 * "x" + "_run_7.csv")
+    panels = few.plot()
+    title = panels[0].get_title()
+    assert len(title) <= 60
+    assert title.startswith("sample_")
+    assert title.endswith("_run_7.csv")
+    dots, commanded = panels[1].lines[:2]
+    assert dots.get_markersize() > 3
+    x, y = commanded.get_data()
+    corner = int(np.argmax(np.diff(y)))
+    assert x[corner : corner + 2] == pytest.approx(0.0, abs=1e-6)
+    assert sorted(y[corner : corner + 2]) == pytest.approx([np.min(y), np.max(y)])
+
+
+def test_steps_that_are_not_drawn_are_counted(fit, monkeypatch):
+    monkeypatch.setattr(fits, "MOST_STEPS", 1)
+    assert fit.plot("steps")[0, 0].get_xlabel().endswith("1 further step is not drawn")
+
+
 def test_a_fit_with_its_residuals_and_their_memory(fit):
     _, stress, *panels = ss.figures.fit(fit, Figure().subplots(5, 1))
     loading = fit.plan.records[0].loading
-    np.testing.assert_allclose(stress.lines[1].get_ydata(), 1e-6 * loading.stress.at(fit.plan.records[0].time))
+    seen = np.interp(stress.lines[0].get_xdata(), *stress.lines[1].get_data())
+    np.testing.assert_allclose(seen, 1e-6 * loading.stress.at(fit.plan.records[0].time))
     assert len(ss.figures.fit(lab.stepped(), Figure().subplots(4, 1))) == 4  # nothing presses there
     np.testing.assert_array_equal(panels[0].lines[1].get_ydata(), fit.model)
     np.testing.assert_allclose(panels[1].lines[0].get_ydata(), 1e3 * fit.residuals)

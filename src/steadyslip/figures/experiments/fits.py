@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.numerics.noise import autocorrelation
-from steadyslip.figures.experiments.panels import clock, file_name, grid, stacked, time_label
+from steadyslip.figures.experiments.panels import LEGEND, clock, dots, file_name, grid, stacked, time_label
 from steadyslip.figures.experiments.records import rates, stresses
 from steadyslip.figures.style import BLACK, BLUE, GREY, SKY, VERMILION, display_unit, labelled
 
@@ -52,7 +52,7 @@ def fit(result: Fit, ax: Sequence[Axes] | None = None, record: int = 0) -> np.nd
         stresses(data, given[1], time)
     _beside(panels[1], time, data.friction, result.part(result.model, record))
     residuals = result.part(result.residuals, record)
-    panels[2].plot(time, 1e3 * residuals, ".", color=SKY, markersize=2, rasterized=True)
+    panels[2].plot(time, 1e3 * residuals, ".", color=SKY, markersize=dots(len(time)), rasterized=True)
     panels[2].plot(time, 1e3 * _running(residuals), color=VERMILION, linewidth=1, label="running mean")
     panels[2].axhline(0, color=BLACK, linewidth=0.8)
     panels[2].set_ylabel("residual (10⁻³)")
@@ -76,11 +76,11 @@ def _is_pressed(data: Record) -> bool:
 
 
 def _beside(ax: Axes, time: np.ndarray, data: np.ndarray, model: np.ndarray, named: bool = True) -> None:
-    ax.plot(time, data, ".", color=SKY, markersize=2, label="record", rasterized=True)
+    ax.plot(time, data, ".", color=SKY, markersize=dots(len(time)), label="record", rasterized=True)
     ax.plot(time, model, color=BLACK, linewidth=1, label="model")
     if named:
         ax.set_ylabel("friction τ/σ (1)")
-        ax.legend(loc="best", fontsize="small", markerscale=3)
+        ax.legend(loc="best", fontsize="small", markerscale=LEGEND / dots(len(time)))
 
 
 def _memory(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
@@ -98,7 +98,7 @@ def _memory(ax: Axes, result: Fit, residuals: np.ndarray, record: int) -> None:
 
 
 def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
-    """Record and model around every step, three in a row.
+    """Record and model around every step, three in a row; of the first twelve, where there are more.
 
     Parameters
     ----------
@@ -137,6 +137,10 @@ def steps(result: Fit, ax: Any = None, record: int = 0) -> np.ndarray:
         panel.grid(color=GREY, linewidth=0.3)
         panel.ticklabel_format(axis="y", useOffset=False)
         panel.locator_params(axis="x", nbins=5)
+    if len(data.steps) > len(shown):
+        last = panels.flat[len(shown) - 1]
+        left = len(data.steps) - len(shown)
+        last.set_xlabel(f"{last.get_xlabel()}\n{left} further {'step is' if left == 1 else 'steps are'} not drawn")
     return panels
 
 

@@ -11,6 +11,10 @@ from steadyslip.figures.style import display_unit, labelled
 
 if TYPE_CHECKING:
     from steadyslip.experiments import Record
+    from steadyslip.experiments.loading.loading import Course
+
+LONGEST_NAME = 60  # characters of a file's name in a title
+LEGEND = 6.0  # size of dots in a legend
 
 
 def stacked(ax: Any, heights: tuple[float, ...], shared: int | None = None) -> np.ndarray:
@@ -63,8 +67,22 @@ def time_label(data: Record, unit: str) -> str:
 
 
 def file_name(data: Record) -> str:
-    """The last part of where a record comes from."""
-    return data.source.replace("\\", "/").rpartition("/")[2]
+    """The last part of where a record comes from, without its middle where it is too long for a title."""
+    name = data.source.replace("\\", "/").rpartition("/")[2]
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME // 2]}…{name[-LONGEST_NAME // 2 + 1 :]}"
+
+
+def dots(count: int) -> float:
+    """Size of the dots of so many samples: smaller the more there are."""
+    return float(np.clip(2.0 * np.sqrt(1000 / max(count, 1)), 2.0, 6.0))
+
+
+def followed(course: Course, data: Record, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What was commanded, and the places on an axis of times, its corners between samples included."""
+    ends = [t for c in course.changes for t in (c.time, c.time + max(c.duration, 1e-9 * float(np.ptp(data.time))))]
+    inside = [t for t in ends if data.time[0] < t < data.time[-1]]
+    moments = np.sort(np.concatenate([data.time, inside]))
+    return np.interp(moments, data.time, time), course.at(moments)
 
 
 def brief(name: str) -> str:

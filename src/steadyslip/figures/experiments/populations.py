@@ -57,6 +57,8 @@ def population(result: Population, ax: Any = None) -> np.ndarray:
         panel.set_yticks(place, list(result.fits) if panel is panels[0] else [""] * rows)
         panel.set_ylim(-0.6, rows - 0.4)
         panel.locator_params(axis="x", nbins=4)
+        panel.ticklabel_format(axis="x", useOffset=False)
+        panel.tick_params(axis="x", rotation=45)
     figure = panels[0].get_figure(root=True)
     if ax is None and figure is not None:
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize="small")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.figures.experiments.panels import clock, file_name, stacked, time_label
+from steadyslip.figures.experiments.panels import LEGEND, clock, dots, file_name, followed, stacked, time_label
 from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, display_unit, labelled
 
 if TYPE_CHECKING:
@@ -53,7 +53,8 @@ def stresses(data: Record, ax: Axes, time: np.ndarray) -> None:
     size, name = display_unit("Pa", float(np.max(np.abs(data.normal))))
     ax.plot(time, data.normal / size, color=SKY, linewidth=0.8)
     if data.loading.stress is not None:
-        ax.plot(time, data.loading.stress.at(data.time) / size, color=BLACK, linewidth=1)
+        along, commanded = followed(data.loading.stress, data, time)
+        ax.plot(along, commanded / size, color=BLACK, linewidth=1)
     ax.set_ylabel(labelled("normal\nstress", name))
     ax.ticklabel_format(axis="y", useOffset=False)
 
@@ -65,7 +66,7 @@ def rates(data: Record, ax: Axes, time: np.ndarray) -> None:
         ax.text(0.5, 0.5, "load point not measured", ha="center", transform=ax.transAxes)
         ax.set_ylabel("load-point\nrate")
         return
-    commanded = course.at(data.time)
+    along, commanded = followed(course, data, time)
     high = float(np.max(np.abs(commanded))) or float(np.max(np.abs(rate)))
     low = float(np.min(np.abs(commanded)))
     size, name = display_unit("m/s", high)
@@ -76,7 +77,8 @@ def rates(data: Record, ax: Axes, time: np.ndarray) -> None:
         rate = np.where(rate > 0, rate, np.nan)
     else:
         ax.set_ylim(-0.5 * high / size, 2.0 * high / size)
-    ax.plot(time, rate / size, ".", color=SKY, markersize=1.5, rasterized=True, label="slopes of the record")
-    ax.plot(time, commanded / size, color=BLACK, linewidth=1, label="commanded, as found")
+    mark = 0.75 * dots(len(time))
+    ax.plot(time, rate / size, ".", color=SKY, markersize=mark, rasterized=True, label="slopes of the record")
+    ax.plot(along, commanded / size, color=BLACK, linewidth=1, label="commanded, as found")
     ax.set_ylabel(labelled("load-point\nrate", name))
-    ax.legend(loc="best", fontsize="x-small", markerscale=4)
+    ax.legend(loc="best", fontsize="x-small", markerscale=LEGEND / mark)

@@ -1,5 +1,7 @@
 """Basins of machines: those of sliders by another route, planes of bodies with and without mass, what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,10 @@ def test_without_mass_the_memory_of_its_contact_is_beside_the_place_of_a_body():
     found = ss.basin(machine, [0.0, 0.1], [0.0, 0.1])
     assert (found.names, found.units) == (("table.x", "guide.Theta"), ("m", "1"))
     assert found.plot().get_ylabel() == "memory Theta of guide (1)"
+    said = any("every starting point" in text.get_text() for text in found.plot().texts)
+    assert (said, np.unique(found.outcome).tolist()) == (True, ["returns"])
+    fails = replace(found, outcome=np.where(found.x > 0, "oscillation", found.outcome))
+    assert not any("every starting point" in text.get_text() for text in fails.plot().texts)
 
 
 def test_planes_that_cannot_be_are_refused():

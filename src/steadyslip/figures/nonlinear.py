@@ -152,7 +152,7 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
     """What comes of every starting point: slip ahead of the load point against velocity.
 
     White returns to steady sliding; the dot is steady sliding, dashed lines are unstable cycles. Yellow is undecided;
-    the legend says why.
+    the legend says why. Where every point returns, the picture says so.
 
     Parameters
     ----------
@@ -187,6 +187,9 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
         ax.set_yscale("log")
     ax.set_xlim(found.x.min() / length, found.x.max() / length)
     ax.set_ylim(found.v.min() / speed, found.v.max() / speed)
+    if np.all(found.outcome == "returns"):
+        words = "every starting point in this picture returns to steady sliding"
+        ax.text(0.5, 0.04, fill(words, WRAPPED), transform=ax.transAxes, ha="center", va="bottom")
     place, height = "slip ahead of the load point", "velocity"
     if isinstance(found.rig, Machine):
         body, (kind, name) = found.names[0].rpartition(".")[0], found.names[1].rsplit(".", 1)

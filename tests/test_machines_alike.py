@@ -174,3 +174,28 @@ def test_a_belt_moves_a_block_as_the_ground_does():
     belt = ss.simulate(block(True), until=20.0, initial={"b.v": -0.3}, times=times)
     assert belt["c.slip_rate"] == pytest.approx(pulled["c.slip_rate"], rel=1e-6)
     assert belt["b.x"] == pytest.approx(-pulled["b.x"], abs=1e-6)
+
+
+def test_a_body_and_a_contact_may_have_the_same_name():
+    """Also where the contact slides at another rate than the body moves; and a-b and a_b are two bodies."""
+
+    def machine(first, second, rubs):
+        bodies = {first: ss.SlidingBody(mass=2.0), second: ss.SlidingBody(mass=0.5), "post": ss.SlidingBody(mass=0.1)}
+        links = {
+            "pull": ss.Spring(between=("drive", first), stiffness=3.0, damping=0.2),
+            "tie": ss.Spring(between=(first, second), stiffness=2.0),
+            "held": ss.Spring(between=("ground", "post"), stiffness=5.0, damping=0.1),
+        }
+        contacts = {rubs: surface(second, rate_state(0.5, -0.3, 1.0), against="post"),
+                    "other": surface(first, rate_state(0.4, 0.1, 2.0))}  # fmt: skip
+        return ss.Machine(bodies=bodies, links=links, contacts=contacts, drive=ss.Pull(velocity=1.0))
+
+    plain = machine("one", "two", "rub")
+    for names in (("one", "two", "post"), ("one", "two", "two"), ("one", "two", "one"), ("a-b", "a_b", "a-b")):
+        other = machine(*names)
+        assert ss.eigenvalues(other) == pytest.approx(ss.eigenvalues(plain), rel=1e-9)
+        for key in ("friction.b", "contact.preload"):
+            (edge, *_), (same, *_) = (
+                ss.boundary(rig, f"contacts.{name}.{key}") for rig, name in ((plain, "rub"), (other, names[2]))
+            )
+            assert edge.value == pytest.approx(same.value, rel=1e-9)

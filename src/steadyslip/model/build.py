@@ -110,11 +110,16 @@ def _own_letter(address: Address, letters: Mapping[str, int], taken: set[str]) -
 
 
 def _unused_letter(name: str, taken: set[str]) -> str:
-    """The last part of a dotted name, with as many earlier parts behind it as make it unique."""
+    """The last part of a dotted name, with as many earlier parts behind it as make it unique, or else a number.
+
+    A body and a contact may have the same name, and ``a-b`` and ``a_b`` are two.
+    """
     *before, letter = name.replace("-", "_").split(".")
     if before[-1].isdigit():
         letter = f"{letter}_{before.pop()}"
     while letter in taken and before:
         letter = f"{letter}_{before.pop()}"
+    free = (letter, *(f"{letter}_{number}" for number in range(2, len(taken) + 3)))
+    letter = next(one for one in free if one not in taken)
     taken.add(letter)
     return letter

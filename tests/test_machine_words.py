@@ -91,3 +91,15 @@ def test_kicks_of_the_command_line_end_with_words(tmp_path):
     done = run("analyze", path, "--kick", "force at table")
     assert "no force step at table is survived: steady sliding is unstable" in " ".join(done.stdout.split())
     assert json.loads(run("analyze", path, "--kick", "force at table", "--json").stdout)["kicks"][0]["at"] == "table"
+
+
+def test_edges_that_are_of_little_use_stand_apart():
+    """More than a hundredfold off, as on pages; through zero as well."""
+    lines = str(ss.analyze(ss.read_rig("examples/machines/brake-pad.toml"))).splitlines()
+    apart = next(i for i, line in enumerate(lines) if line.strip() == "further off than a factor of 100:")
+    near, far = "\n".join(lines[:apart]), "\n".join(lines[apart:])
+    assert "contacts.disc.contact.normal_stiffness  8 MN/m" in near
+    assert "-4.246" in far
+    assert "x -212.3" in far
+    assert "-4.246" not in near
+    assert "bodies.pad.press" in near

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings, Verdict
 
 NEXT_TO_IT = 1e-6  # change of a parameter that only its weak effect sets apart from the edge that the rig is on
+REMOTE = 100  # times a value, beyond which an edge is of little use
 MOST_WINDOWS = 4  # of stable stiffnesses that are told in words
 
 _ONSETS = {
@@ -275,14 +276,25 @@ def margin_table(analysis: Verdict) -> list[str]:
     lines = ["", "Nearest edge in each parameter, the others unchanged, and what happens beyond it"]
     rows = [(name, value, f"-> {edge}", change, words) for name, value, edge, change, words in rows]
     widths = [max(len(row[i]) for row in rows) for i in range(4)] if rows else []
-    lines += [
-        "  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows
-    ]
+    told = ["  " + "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows]
+    remote = [_is_remote(one) for one in analysis.margins if one.edge is not None]
+    lines += [line for line, far in zip(told, remote, strict=True) if not far]
+    if any(remote):
+        lines += [f"  further off than a factor of {REMOTE}:"]
+        lines += [line for line, far in zip(told, remote, strict=True) if far]
     if without:
         lines += textwrap.wrap(
             f"no edge within range: {', '.join(without)}", 98, initial_indent="  ", subsequent_indent="    "
         )
     return lines
+
+
+def _is_remote(margin: Margin) -> bool:
+    """Whether an edge is so many times the value, or the other way, that it is of little use."""
+    edge = margin.edge
+    if edge is None or margin.unit == "rad" or not margin.value or not edge.value:
+        return False
+    return not 1 / REMOTE < abs(edge.value / margin.value) < REMOTE
 
 
 def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, str]:
@@ -293,7 +305,7 @@ def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, 
         change = f"{math.degrees(margin.absolute):+.4g} deg"
     elif not margin.value:
         change = "from zero"
-    elif 0 < (ratio := edge.value / margin.value) < 0.1 or ratio > 10:
+    elif 0 < (ratio := edge.value / margin.value) < 0.1 or abs(ratio) > 10:
         change = f"x {ratio:.4g}"
     else:
         change = f"{100 * margin.relative:+.4g} %"

@@ -185,7 +185,9 @@ export class Course {
     if (added) return `the rig of the file has no ${added}; write it there, and make the page anew`;
     const model = Array.from(rig.set(rig.values).R);
     this.model = motion.parameters.map((name) => model[facts.parameters.indexOf(name)]);
-    return this.mover.own.set(this.model, answer.sigmas).refusal(this.disturbance.value);
+    const moved = this.mover.own.set(this.model, answer.sigmas);
+    for (const one of this.disturbance.options) one.disabled = !one.selected && moved.infinite(one.value);
+    return moved.refusal(this.disturbance.value);
   }
 
   // -- drawing

@@ -85,8 +85,8 @@ function read(field, text, si) {
 /** The same run for a command line: the table that a rig file needs, or, for a blow, what it starts from. */
 function asFile(page, { kind, on, size, si, at, until }) {
   const { answer, rig: { data, values } } = page, drive = data.parameters.findIndex((one) => one.name === data.speed), one = data.parameters[drive];
-  const table = `[protocol]\nuntil = "${until} s"\n`;
-  if (kind === "blow") return `${table}\n# steadyslip simulate ${data.title}.toml --initial ${on ? `${on}.` : ""}v=${size * (on ? answer.observed[`${on}.v`] : values[drive])}\n`;
-  const much = kind === "velocity" ? ["to", `"${size * values[drive]} ${one.unit}"`] : [kind === "hold" ? "duration" : "by", `"${size} ${si}"`];
+  const table = `[protocol]\nuntil = "${until} s"\n`, plain = (product) => Number(product.toPrecision(15)); // no tail of rounding
+  if (kind === "blow") return `${table}\n# steadyslip simulate ${data.title}.toml --initial ${on ? `${on}.` : ""}v=${plain(size * (on ? answer.observed[`${on}.v`] : values[drive]))}\n`;
+  const much = kind === "velocity" ? ["to", `"${plain(size * values[drive])} ${one.unit}"`] : [kind === "hold" ? "duration" : "by", `"${size} ${si}"`];
   return `${table}\n[[protocol.pieces]]\nkind = "${DISTURBANCES[kind].kind}"\nat = "${at} s"\n${much.join(" = ")}\n${on ? `on = "${on}"\n` : ""}`;
 }

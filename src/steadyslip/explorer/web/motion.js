@@ -51,9 +51,14 @@ export class Motion {
     }
   }
 
+  /** Whether it would be an infinite force at these values: nobody can do that. @param {string} disturbance */
+  infinite(disturbance) {
+    return disturbance === "push" && this.ask("dashpot", 1)[0] !== 0;
+  }
+
   /** Why the rig cannot be moved so at these values; empty if it can. @param {string} disturbance */
   refusal(disturbance) {
-    if (disturbance === "push" && this.ask("dashpot", 1)[0] !== 0) return "a sudden push through a dashpot is an infinite force";
+    if (this.infinite(disturbance)) return "a sudden push through a dashpot is an infinite force";
     if (disturbance === "blow" && !Object.keys(this.facts.shares.blow).length) return "a blow needs a mass: without it the block takes any velocity at once";
     if (!this.scales.posed) return "the equations of this page do not hold at these values, as where a mass is set to zero; steadyslip simulate writes them anew";
     if (this.scales.share < this.facts.least) return "the state that the kernel leaves out has no weight here";

@@ -157,6 +157,10 @@ def test_laws_and_experiments_as_bars():
 def test_a_prediction_is_in_the_unit_of_its_axis(fit):
     drawn = ss.figures.prediction(ss.predict(lab.rig(alpha=0.35), fit), Figure().subplots())
     assert drawn.get_xlabel() == "stiffness (GPa/m)"
+    told = [text.get_text() for text in drawn.get_legend().get_texts()]
+    (far,) = (words for words in told if words.startswith("this rig"))
+    assert far == "this rig: 20 GPa/m, beyond this axis"  # seven times what all draws give to within a hundredth
+    assert drawn.get_xlim()[1] < 10
 
 
 def test_shares_of_kicks_sum_to_all_draws(fit):

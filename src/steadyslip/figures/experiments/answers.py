@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from steadyslip.experiments import LawComparison, Prediction, Profile
     from steadyslip.experiments.answers.precision import Ranking
 
+FAR = 10.0  # widths of what nearly all draws give by which a rig's own value is off the axis of their distribution
+
 
 def profile(result: Profile, ax: Axes | None = None) -> Axes:
     """How fast the misfit rises away from the best value, and the intervals of 68 and 95 % that this gives.
@@ -154,8 +156,13 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
     if not len(critical):
         raise NotAvailable("no draw has a critical stiffness; the verdict does not depend on the stiffness")
     factor, unit = display_unit("Pa/m", max(float(np.median(critical)), own), result.rig.area)
-    ax.hist(critical / factor, bins=60, color=SKY, label="critical stiffness")
-    ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
+    ax.hist(critical / factor, bins=_bins(len(critical)), color=SKY, label="critical stiffness")
+    low, high = np.quantile(critical, [0.025, 0.975])
+    if low - FAR * (high - low) <= own <= high + FAR * (high - low):
+        ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
+    else:  # a scale that reaches it would leave nothing to see of the distribution
+        side = "beyond" if own > high else "below"
+        ax.plot([], [], color=VERMILION, label=f"this rig: {shown(own, 'Pa/m', 3, result.rig.area)}, {side} this axis")
     middle = result.quantiles(result.critical_stiffness)[2]
     ax.axvline(middle / factor, color=BLACK, linewidth=1, linestyle="--", label="median")
     if missing := np.mean(~np.isfinite(result.critical_stiffness)):
@@ -167,6 +174,11 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
                  color=GREEN if result.probability_stable > 0.5 else VERMILION)  # fmt: skip
     ax.legend(loc="best", fontsize="small")
     return ax
+
+
+def _bins(count: int) -> int:
+    """Of a histogram of so many draws."""
+    return int(np.clip(round(2 * count ** (1 / 3)), 5, 60))
 
 
 def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
@@ -192,7 +204,7 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
     for panel, (kick, sizes) in zip(panels, result.thresholds.items(), strict=True):
         fails = np.isfinite(sizes) & (sizes > 0)
         if np.any(fails):
-            panel.hist(sizes[fails], bins=round(np.clip(2 * np.sum(fails) ** (1 / 3), 5, 40)), color=SKY, label="draws")
+            panel.hist(sizes[fails], bins=_bins(int(np.sum(fails))), color=SKY, label="draws")
             panel.axvline(
                 float(np.median(sizes[fails])), color=BLACK, linewidth=1, linestyle="--", label="median of these"
             )

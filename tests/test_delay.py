@@ -310,6 +310,14 @@ def test_a_delay_of_absurd_length_is_refused_in_words():
         ss.analyze(late_axis("1e100 s"))
 
 
+def test_roots_that_are_too_many_to_be_counted_are_refused_in_words():
+    """With several delays: beyond some hundred thousand places along the axis the count would be a guess."""
+    c = np.array([[4.0, 1.2, 1.0], [1.0, 0.1, 0.0], [0.5, 0.2, 0.0]])
+    assert quasi.count_right(c, np.array([0.0, 1e4, 0.77e4])) == 0
+    with pytest.raises(ss.NotAvailable, match="so long beside the oscillations"):
+        quasi.count_right(c, np.array([0.0, 1e7, 0.77e7]))
+
+
 def test_all_that_a_controller_does_is_late():
     """A cascade: place of the table, speed of the motor and integral, all one delay ago."""
     drive = ss.Cascade(velocity=1.0, body="motor", measured="table", kv=0.8, kp=3.0, tn=2.5, delay=0.05)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.polynomials import (
     Array,
     ComplexArray,
@@ -156,6 +157,11 @@ def _along(c: Array, h: Array, most: float) -> tuple[Array, ComplexArray]:
 
     Its length between two places is at most their distance times the largest slope; where that is less than the sum of
     the sizes at both, the chord and the function go around zero on the same side.
+
+    Raises
+    ------
+    NotAvailable
+        If there are too many.
     """
     sizes, powers = np.abs(c), np.arange(c.shape[-1])
     slopes = np.sum(sizes[:, 1:] * powers[1:], axis=0), np.sum(sizes * h[:, None], axis=0)
@@ -171,6 +177,12 @@ def _along(c: Array, h: Array, most: float) -> tuple[Array, ComplexArray]:
         middle = 0.5 * (low[at] + high[at])
         omega = np.insert(omega, at + 1, middle)
         found = np.insert(found, at + 1, value(c, h, 1j * middle))
+    else:
+        turns = most * float(np.max(h)) / (2 * np.pi)
+        raise NotAvailable(
+            f"the delays are so long beside the oscillations of this rig, up to {turns:.2g} turns, that its growing "
+            "roots cannot be counted; shorten them"
+        )
     return omega, found
 
 

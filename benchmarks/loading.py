@@ -7,7 +7,7 @@ the loading. Every cell is one design, noise of the displacement (nm), glitches 
 level, noise of the normal stress. Reported, over all replicates: mean deviation in quoted errors (bias), and how often
 68 and 95 % intervals contain the truth, for a, b, d_c, stiffness and (where normal stress changes) alpha; and how often
 the loading was found with the right number of changes. Every replicate has noise of its own; the file is added to, so
-that a campaign can be ended and gone on with, all cells side by side.
+that a campaign can be ended and gone on with, all cells side by side. `loading.txt` is what it printed last.
 """
 
 from __future__ import annotations

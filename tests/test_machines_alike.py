@@ -159,6 +159,27 @@ def test_what_moves_and_what_stands_is_a_matter_of_view():
     assert b.links["arm"] == pytest.approx(-a.links["arm"], rel=1e-12)
 
 
+def test_a_belt_that_a_tilted_spring_presses_on_is_the_ground_in_the_mirror():
+    """The contact law sees what holds the block against what it slides on, be that the drive or the ground."""
+    for law in (ss.InclinedSpring(steady_normal_stress=1.4, angle=-0.5), ss.Linear(steady_normal_stress=1.4, b2=0.3)):
+
+        def machine(belt, law=law):
+            held, base = ("ground", "drive") if belt else ("drive", "ground")
+            rubs = {"body": "drive", "against": "b"} if belt else {"body": "b"}
+            return ss.Machine(
+                bodies={"b": ss.SlidingBody(mass=0.5), "c": ss.SlidingBody(mass=2.0)},
+                links={
+                    "k": ss.Spring(between=(held, "b"), stiffness=3.0, damping=0.1),
+                    "tie": ss.Spring(between=("b", "c"), stiffness=1.0, damping=0.1),
+                    "drag": ss.Spring(between=(base, "b"), damping=0.4),
+                },
+                contacts={"s": ss.Surface(**rubs, friction=rate_state(0.5, -0.3, 1.0), contact=law)},
+                drive=ss.Pull(velocity=1.0),
+            )
+
+        assert ss.eigenvalues(machine(True)) == pytest.approx(ss.eigenvalues(machine(False)), rel=1e-10)
+
+
 def test_a_belt_moves_a_block_as_the_ground_does():
     def block(belt):
         ends, rubs = ("ground", {"body": "drive", "against": "b"}) if belt else ("drive", {"body": "b"})

@@ -269,7 +269,9 @@ class _Assembly:
     def _seen(self, place: _Place) -> Motion:
         """What a contact law sees; defines T, the pull at the body as a stress of the contact."""
         touch, body = place.touch, next(name for name in place.touch.slip if name != LOAD_POINT)
-        pulling = [one for one in self.mechanism.elements if not one.grounded]
+        belt = LOAD_POINT in touch.slip  # the drive is what it slides on, and links to the ground hold it against that
+        elements = self.mechanism.elements
+        pulling = [one for one in elements if not (LOAD_POINT in one.senses if belt else one.grounded)]
         if touch.loaded_by:
             pulling = [one for one in self.mechanism.elements if one.name == touch.loaded_by]
             body = next(name for name in touch.slip if name in pulling[0].acts)
@@ -277,7 +279,11 @@ class _Assembly:
         steady = self._single_pull() if self.single else self._steady_pull(body, pulling) / lever
         moving = sp.Add(*(-one.acts.get(body, 0) * self._tension(one, {}, self.speeds) for one in pulling)) / lever
         self.definitions[place.spring] = steady + self._pull(body, pulling) / lever
-        behind = pulling if touch.loaded_by else [one for one in pulling if LOAD_POINT in one.senses]
+        behind = (
+            pulling
+            if touch.loaded_by
+            else [one for one in pulling if (one.grounded if belt else LOAD_POINT in one.senses)]
+        )
         stiffness = sp.Add(*(sp.sympify(e.acts.get(body, 0) * e.stiffness * e.senses.get(body, 0)) for e in behind))
         distance = self._known(row_of(touch.separation, self.statics.displacement)) if touch.separation else 0
         apart = distance + row_of(touch.separation, self.x)

@@ -19,11 +19,11 @@ CASES = {
     "crank": (rig(contact=ss.SliderCrank(**CRANK)), "contact.crank_radius", 0.2, 0.31, "more than crank_radius 0.31"),
     "prescribed": (
         rig(contact=ss.Prescribed(preload=SIGMA, amplitude=1e6, period=1.0)),
-        "contact.amplitude", 2e6, 6e6, "less than the mean 5000000.0",
+        "contact.amplitude", 2e6, 6e6, "less than the mean 5000000 Pa",
     ),
     "preload": (
         rig(contact=ss.Prescribed(preload=SIGMA, amplitude=1e6, period=1.0)),
-        "contact.preload", 2e6, 9e5, "less than the mean 900000.0",
+        "contact.preload", 2e6, 9e5, "less than the mean 900000 Pa",
     ),
     "no period": (rig(contact=ss.Prescribed(preload=SIGMA)), "contact.amplitude", 0.0, 1e5, "needs a period"),
     "nagata": (rig(friction=rate_state(evolution=ss.Nagata(c_nagata=0.7))), "friction.b", 0.1, 0.0, "divides by b"),

@@ -287,7 +287,7 @@ def test_parameters_of_a_protocol_have_dotted_names():
         (lambda: SlideHoldSlide(at=0, hold=1, slide=1, repeats=1.5), "repeats: got 1.5; allowed: a whole number"),
         (lambda: SlideHoldSlide(at=0, hold=1, slide=1, repeats=0), "repeats: got 0; allowed: a whole number"),
         (lambda: SlideHoldSlide(at=0, hold=1, slide=1, factor=9, repeats=9999), "grow out of the range"),
-        (lambda: VelocityHarmonic(amplitude=1, period=1, at=5, until=5), "until: got 5.0; allowed: a time after"),
+        (lambda: VelocityHarmonic(amplitude=1, period=1, at=5, until=5), "until: got 5; allowed: a time after"),
         (lambda: VelocityHarmonic(amplitude=1, period=1e-309), "too short"),
         (lambda: NormalStressTable(time=[0], change=[0]), "time: got 1 samples; allowed: two or more"),
         (lambda: NormalStressTable(time=[0, 1], change=[0]), "change: got 1 samples, but time has 2"),

@@ -170,6 +170,8 @@ def test_the_phase_plane_is_that_of_the_contact_that_moves_most_or_of_the_one_th
         assert (dot.get_xdata()[0], dot.get_ydata()[0]) == pytest.approx((after.slip_rate, force))
         at = np.interp(after.slip_rate, line.get_xdata(), line.get_ydata())
         assert at == pytest.approx(force, rel=1e-4)
+    still = ss.simulate(machine, until=1.0).plot("phase", ax=Figure().subplots())
+    assert not still.texts  # no arrow where nothing moves
     with pytest.raises(ss.ParameterError, match="unknown contact 'drie'; did you mean 'dry'"):
         run.plot("phase", contact="drie")
     with pytest.raises(ss.ParameterError, match="contact: got 'dry'; a history shows all"):

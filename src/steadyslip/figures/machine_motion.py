@@ -96,9 +96,10 @@ def phase_plane(
         return ax
     if logarithmic:
         ax.set_xscale("log")
-    elif abs(high - low) < _STEADY * max(abs(high), abs(low)):
-        ax.set_xlim(*_around(low, high))
-    arrows(ax, shown_rate, force / factor, color)
+    if abs(high - low) < _STEADY * max(abs(high), abs(low)):
+        ax.set_xlim(*sorted((0.9 * low, 1.1 * high)))  # change that is only rounding is drawn as none
+    else:
+        arrows(ax, shown_rate, force / factor, color)
     beside = shown_rate * scale / steady["slip_rate"][0]
     fastest = max(float(np.nanmax(beside)), 1.0)
     slowest = min(max(float(np.nanmin(beside)), _SLOWEST * fastest), 1.0)
@@ -127,12 +128,6 @@ def _moving_most(run: History, rig: Machine) -> str:
         return round(float(np.nan_to_num(change)), 6)
 
     return str(max(rig.contacts, key=passed))
-
-
-def _around(low: float, high: float) -> tuple[float, float]:
-    """Limits of an axis on which a change that is only rounding is drawn as none."""
-    middle, half = 0.5 * (low + high), 0.5 * _STEADY * (max(abs(high), abs(low)) or 1.0)
-    return middle - half, middle + half
 
 
 def _plain(panel: Axes, size: float) -> None:

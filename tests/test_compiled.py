@@ -154,7 +154,9 @@ ORDERS = {
 }
 
 
-@pytest.mark.parametrize("case", ORDERS, ids=str)
+@pytest.mark.parametrize(
+    "case", [pytest.param(one, marks=[pytest.mark.campaign] * (not ORDERS[one][2])) for one in ORDERS], ids=str
+)
 def test_measured_order(case):
     """The error, summed over several kicks, falls with the step to the power of the order; also if inputs vary."""
     method, order, varying, changes, until, counts = ORDERS[case]

@@ -112,8 +112,9 @@ def uncompiled(made):
 
 @pytest.mark.parametrize(
     ("law", "mass"),
-    [("slip", 0.0), ("nagata regularised", 0.0), ("two states", 0.0), ("aging+ld", 1e8), ("prakash-clifton", 1e8)],
-)
+    [("slip", 0.0), ("nagata regularised", 0.0), ("two states", 0.0), ("aging+ld", 1e8),
+     pytest.param("prakash-clifton", 1e8, marks=pytest.mark.campaign)],
+)  # fmt: skip
 @pytest.mark.slow
 def test_sensitivities_are_derivatives_of_the_flow(law, mass, monkeypatch):
     """Of end states in starting states and in the parameter, against central differences of other runs.

@@ -120,7 +120,14 @@ def test_distance_falls_everywhere_in_the_neighbourhood(stable):
 QUICK = ("massless", "mass of 1e-8", "ringing", "prz", "lugre, massless", "lugre, light", "lugre, heavy")
 
 
-@pytest.mark.parametrize("stable", [STABLE[name] for name in QUICK], ids=QUICK)
+FEW = ("massless", "ringing", "lugre, massless", "lugre, heavy")
+
+
+@pytest.mark.parametrize(
+    "stable",
+    [pytest.param(STABLE[name], marks=[pytest.mark.campaign] * (name not in FEW)) for name in QUICK],
+    ids=QUICK,
+)
 def test_motion_from_the_edge_of_the_neighbourhood_only_goes_inwards(stable):
     """By SciPy on the uncompiled rates, from directions that were not among those tested."""
     rest = rest_at(stable())

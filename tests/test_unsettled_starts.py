@@ -80,7 +80,7 @@ def test_steady_sliding_is_found_to_be_steady():
 
 @pytest.mark.parametrize(
     "guess",
-    [ss.lab_rig(states=2), ss.lab_rig(normal_memory="linker-dieterich")],
+    [pytest.param(ss.lab_rig(states=2), marks=pytest.mark.campaign), ss.lab_rig(normal_memory="linker-dieterich")],
     ids=["two states", "linker-dieterich"],
 )
 def test_derivatives_in_where_it_begins_are_slopes(guess):

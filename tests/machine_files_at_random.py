@@ -297,7 +297,8 @@ def answer(text: str) -> str:
         except ss.NotAvailable as error:
             return f"not available: {error}"
     said = str(found)
-    if UNCLEAR.search(said) or (found.stable is None and not found.reason):
+    odd = [one for one in UNCLEAR.findall(said) if one.lower() not in text.lower()]
+    if odd or (found.stable is None and not found.reason):
         raise Wrong(f"unclear verdict: {said}")
     return said.splitlines()[0] + (f" ({found.reason})" if found.stable is None else "")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from machines import leading, rate_state, surface, three_bodies, two_mass
+from machines import at_random, leading, rate_state, surface, three_bodies, two_mass
 
 
 def test_names_and_their_order_do_not_matter():
@@ -220,3 +220,41 @@ def test_a_body_and_a_contact_may_have_the_same_name():
                 ss.boundary(rig, f"contacts.{name}.{key}") for rig, name in ((plain, "rub"), (other, names[2]))
             )
             assert edge.value == pytest.approx(same.value, rel=1e-9)
+
+
+NAMES = [
+    "Theta", "v", "x", "slip", "links", "E", "I", "N", "friction", "pi", "S", "Q", "lambda", "t", "k", "exp", "normal",
+    "push", "integral", "pull", "bodies", "load", "sigma", "tau", "mass", "None", "nan", "kg", "beta", "a-b", "a_b",
+]  # fmt: skip
+"""What quantities, units, constants and words of Python are called; the same may name a body, a link and a contact."""
+
+
+@pytest.mark.slow
+@pytest.mark.campaign
+def test_random_machines_are_the_same_under_any_names():
+    random = np.random.default_rng(7)
+    for seed in range(12):
+        machine = at_random(seed)[0]
+        kinds = machine.bodies, machine.links, machine.contacts
+        new = [dict(zip(kind, random.choice(NAMES, len(kind), replace=False).tolist(), strict=True)) for kind in kinds]
+        end = {"ground": "ground", "drive": "drive", **new[0]}
+        bodies, links, contacts = (random.permutation(list(kind)).tolist() for kind in kinds)
+        drive = machine.drive
+        if drive.driven():
+            drive = replace(drive, body=end[drive.body], measured=end[drive.measured])
+        other = ss.Machine(
+            bodies={new[0][n]: machine.bodies[n] for n in bodies},
+            links={
+                new[1][n]: replace(one := machine.links[n], between=tuple(end[e] for e in one.between)) for n in links
+            },
+            contacts={
+                new[2][n]: replace(one := machine.contacts[n], body=end[one.body], against=end[one.against])
+                for n in contacts
+            },
+            drive=drive,
+        )
+        own, same = ss.eigenvalues(machine), ss.eigenvalues(other)
+        assert [np.min(np.abs(same - s)) for s in own] == pytest.approx(np.zeros(len(own)), abs=1e-9 * abs(own).max())
+        assert ss.growth_rate(ss.rig_from_text(ss.rig_to_text(other))) == pytest.approx(
+            ss.growth_rate(machine), rel=1e-7
+        )

@@ -76,7 +76,8 @@ class Basin(ReadOnly):
     contact: Array = field(default_factory=lambda: np.array(""), repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "contact", np.broadcast_to(self.contact, self.outcome.shape))
+        object.__setattr__(self, "contact", np.broadcast_to(self.contact, np.shape(self.outcome)))
+        super().__post_init__()
 
     @property
     def share(self) -> float:

@@ -12,6 +12,7 @@ import steadyslip as ss
 from command import run as cli
 from machines import same_block
 from moving_machines import TIMES, two_tables
+from steadyslip.motion import commands
 
 ROOT = Path(__file__).parents[1]
 
@@ -178,13 +179,23 @@ def test_the_phase_plane_is_that_of_the_contact_that_moves_most_or_of_the_one_th
         run.plot(contact="dry")
 
 
-def test_a_command_draws_the_phase_plane_of_a_contact_in_the_units_of_the_file(tmp_path):
+def test_a_command_draws_the_phase_plane_of_a_contact_in_the_units_of_the_file(tmp_path, monkeypatch):
     path = ROOT / "examples" / "machines" / "two-guides.toml"
     step = ["--protocol", "velocity-step at=1s to='26 um/s'", "--until", "3 s"]
     done = cli("simulate", str(path), *step, "--phase", "--contact", "seal", "-o", str(tmp_path / "plane.svg"))
     assert done.returncode == 0
+    monkeypatch.setattr(commands, "simulate", pytest.fail)  # what is wrong is said before the run
     wrong = cli("simulate", str(path), *step, "--contact", "seel", "-o", str(tmp_path / "plane.svg"))
     assert (wrong.returncode, "unknown contact 'seel'; did you mean 'seal'" in wrong.stderr) == (2, True)
+    one = cli("simulate", str(ROOT / "examples" / "stick-slip.toml"), "--contact", "seal")
+    assert (one.returncode, "a slider has one contact, leave it out" in one.stderr) == (2, True)
+
+
+def test_what_helps_a_run_that_ends_is_said_of_a_machine_or_a_slider():
+    rig = same_block(0)[0]
+    for one, words in ((rig, "give the slider mass"), (two_tables(), "give the body that slips there a mass")):
+        ended = dataclasses.replace(ss.simulate(one, until=1e-3), status="blow-up")
+        assert words in ended.message
 
 
 def test_a_machine_has_one_steady_sliding():

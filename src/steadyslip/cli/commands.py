@@ -299,7 +299,7 @@ def simulate(
     from steadyslip.motion.commands import ENDINGS, run_file, write_history
 
     check_output(output or (), ENDINGS)
-    history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol)
+    history = run_file(rig, changes or (), pieces or (), start or (), until, samples, method, rtol, contact)
     give(
         history,
         output or (),

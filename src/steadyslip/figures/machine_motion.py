@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.quantities import shown
 from steadyslip.figures.style import (
     BLACK,
@@ -79,8 +78,6 @@ def phase_plane(
 
     Slip rates are drawn by their logarithm where they span more than a factor of three and never turn round.
     """
-    if contact is not None and contact not in rig.contacts:
-        raise ParameterError([Problem("contact", unknown_name("contact", contact, rig.contacts))])
     name = contact or _moving_most(run, rig)
     ax, rate, force = axes_or_new(ax), run[f"{name}.slip_rate"], run[f"{name}.friction_force"]
     steady = steady_contact_at(rig, name, np.array([rig.drive.velocity]))

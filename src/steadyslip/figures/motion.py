@@ -29,6 +29,7 @@ from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import SteadySliding, steady_state
+from steadyslip.motion.result import check_contact
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
@@ -189,10 +190,9 @@ def phase_plane(
     ParameterError
         If there is no such contact.
     """
+    check_contact(run.rig, contact)
     if isinstance(run.rig, Machine):
         return machine_motion.phase_plane(run, run.rig, ax, label, color, contact)
-    if contact is not None:
-        raise ParameterError([Problem("contact", f"got {contact!r}; a slider has one contact, leave it out")])
     ax, area = axes_or_new(ax), run.rig.area
     drive = run.rig.drive.velocity
     moving = run["v"] > 0

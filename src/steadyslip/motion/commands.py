@@ -17,7 +17,7 @@ from steadyslip.files.specifications import piece_from_text, read_protocol, read
 from steadyslip.files.standalone import write_page
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.motion.result import History
+from steadyslip.motion.result import History, check_contact
 from steadyslip.motion.single import simulate
 from steadyslip.protocol import Protocol
 
@@ -33,6 +33,7 @@ def run_file(
     samples: int | None = None,
     method: str = "auto",
     rtol: float = 1e-7,
+    contact: str | None = None,
 ) -> History:
     """Simulate the rig of a file under its ``[protocol]`` and further pieces.
 
@@ -51,6 +52,8 @@ def run_file(
         Number of evenly spaced times to report at; the solver's own steps unless given.
     method, rtol
         As in `simulate`.
+    contact : str, optional
+        Of a machine: the contact whose phase plane is to be drawn of the run.
 
     Raises
     ------
@@ -60,6 +63,7 @@ def run_file(
     changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
     rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
+    check_contact(rig, contact)
     machine = rig if isinstance(rig, Machine) else None
     area = rig.area if isinstance(rig, Slider) else None
     added = [piece_from_text(text, area, machine) for text in pieces]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, stress_name, totals
@@ -37,7 +37,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         """The status in a sentence, with what to do where the run ended early."""
         where = f" ({self.contact})" if self.contact else ""
         head = f"{self.status}{where} at {shown(self.end, 's')}"
-        advice = remedy(self.status)
+        advice = remedy(self.status, isinstance(self.rig, Machine))
         return f"{head}: {advice}" if advice else head
 
     @property
@@ -179,6 +179,22 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         if contact is not None and kind == "history":
             raise ParameterError([Problem("contact", f"got {contact!r}; a history shows all, a phase plane one")])
         return draw(self, kind, ax=ax, **({} if contact is None else {"contact": contact}))
+
+
+def check_contact(rig: Slider | Machine, contact: str | None) -> None:
+    """Refuse a contact whose phase plane cannot be drawn, because the rig has none of that name.
+
+    Raises
+    ------
+    ParameterError
+        With the contacts that there are.
+    """
+    if contact is None:
+        return
+    if isinstance(rig, Slider):
+        raise ParameterError([Problem("contact", f"got {contact!r}; a slider has one contact, leave it out")])
+    if contact not in rig.contacts:
+        raise ParameterError([Problem("contact", unknown_name("contact", contact, rig.contacts))])
 
 
 @checked()

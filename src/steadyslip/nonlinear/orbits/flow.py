@@ -140,7 +140,8 @@ class Runs:
 
     def __init__(self, jobs: Jobs, which: int = 0, rtol: float | None = None, contact: int = 0) -> None:
         if not jobs.posed[which if len(jobs.posed) > 1 else 0]:
-            raise NotAvailable(f"the motion of this rig is ill-posed: {remedy('ill-posed')}")
+            what_to_do = remedy("ill-posed", machine=not jobs.point.model.is_slider)
+            raise NotAvailable(f"the motion of this rig is ill-posed: {what_to_do}")
         if jobs.point.model.imposed:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
         self.reduction, self.size, self.contact = jobs.reduction, len(jobs.reduction.state), contact

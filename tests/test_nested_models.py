@@ -13,7 +13,7 @@ import steadyslip as ss
 from steadyslip.experiments.fitting import search
 from steadyslip.experiments.fitting.nested import simpler
 from steadyslip.experiments.fitting.planning import make_plan
-from steadyslip.experiments.fitting.search import in_order, ordered
+from steadyslip.experiments.fitting.search import in_order, ordered, standing
 from steadyslip.experiments.fitting.starts import features_of, starting_points
 from steadyslip.experiments.numerics.least_squares import Minima
 
@@ -156,3 +156,21 @@ def test_states_are_put_in_order_only_where_that_changes_nothing():
     best, ssq = in_order(compared(0.5), found)
     np.testing.assert_array_equal(best, rising)
     assert ssq == 2.0
+
+
+class Fragile:
+    """A comparison in which the motion at some places ends when it is run alone, or its derivatives do."""
+
+    def residuals(self, z):
+        ends = np.where(z[:, :1] < 1.0, np.nan, z[:, :1])
+        return ends, np.where(z[:, :1, None] < 2.0, np.nan, ends[:, None])
+
+
+def test_a_minimum_stands_only_if_its_motion_comes_through_alone():
+    """With its derivatives; the best that does is the first, and without any there is none."""
+    found = replace(Minima.at(np.arange(4.0)[:, None]), ssq=np.array([0.1, 0.2, 0.3, 0.4]))
+    kept = standing(Fragile(), found)
+    assert kept.coordinates[0, 0] == 2.0
+    assert kept.ssq.tolist() == [0.3, 0.4, np.inf, np.inf]
+    none = replace(Minima.at(np.zeros((2, 1))), ssq=np.array([0.1, 0.2]))
+    assert np.all(np.isinf(standing(Fragile(), none).ssq))

@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan, with_width
 from steadyslip.experiments.fitting.result import Fit
-from steadyslip.experiments.fitting.search import MOST, Found, Told, in_order, searched
+from steadyslip.experiments.fitting.search import MOST, Found, Told, in_order, searched, standing
 from steadyslip.experiments.fitting.settings import STARTS
 from steadyslip.experiments.loading.loading import shifted
 from steadyslip.experiments.measured.record import Record
@@ -170,9 +170,8 @@ def started_from(result: Fit, others: Sequence[Fit]) -> Fit:
     budget = Budget.of_fit(result.samples, len(space))
     comparison = plan.comparison(Effort(budget=budget))
     z = space.coordinates(np.clip(begin, [u.low for u in space.unknowns], [u.high for u in space.unknowns]))
-    ends = minimise(
-        lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST, enough=budget.part(np.inf)
-    ).sorted()
+    ends = minimise(lambda x, _: comparison.residuals(x), z, *result.bounds, most=MOST, enough=budget.part(np.inf))
+    ends = standing(comparison, ends.sorted())
     if not ends.ssq[0] < result.ssq * (1 - BETTER):
         return result
     found, _ = in_order(comparison, ends)

@@ -114,7 +114,11 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
         raise NotAvailable(
             "the model cannot follow these records from any start; are law and drive those of the experiment?"
         )
+    found = standing(search.whole, found)
+    best = found.coordinates[0]
     found = search.nested(found, {} if known is None else known)
+    if not np.array_equal(found.coordinates[0], best):
+        found = standing(search.whole, found)
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     best, ssq = in_order(search.whole, found)
@@ -330,6 +334,19 @@ def _leaves_structure(whole: Comparison, coordinates: Array) -> bool:
     """Whether residuals are correlated: by the machine, or because this is not the best minimum."""
     r = whole.residuals(coordinates[None])[0][0]
     return any(abs(lag_one(r[where])) > DETECTED / np.sqrt(len(r[where])) for where in whole.slices)
+
+
+def standing(comparison: Comparison, found: Minima) -> Minima:
+    """The same, the first a minimum that its motion comes through alone, with its derivatives, if there is such a one.
+
+    A motion that quickens without end for a moment may come through it or not by a rounding of the row it is in.
+    """
+    while np.isfinite(found.ssq[0]):
+        residuals, slopes = comparison.residuals(found.coordinates[:1])
+        if np.all(np.isfinite(residuals)) and np.all(np.isfinite(slopes)):
+            break
+        found = Minima(found.coordinates, np.append(np.inf, found.ssq[1:]), found.converged, found.iterations).sorted()
+    return found
 
 
 def in_order(comparison: Comparison, found: Minima) -> tuple[Array, float]:

@@ -15,7 +15,7 @@ from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
 from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, Status, call
 
-INSTANT = 1e-14  # share of the time so far: shorter steps lead nowhere
+INSTANT = 1e-14  # share of the row: a motion that needs shorter steps runs away, and ends
 
 
 def lanes_of_job(layout: Layout, count: int, lane: int) -> int:

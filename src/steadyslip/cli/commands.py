@@ -290,7 +290,7 @@ def simulate(
         str | None,
         typer.Option(help="of a machine: draw its phase plane; that which moves most unless given"),
     ] = None,
-    method: Annotated[str, typer.Option(help="auto, explicit or rosenbrock")] = "auto",
+    method: Annotated[str, typer.Option(help="auto, explicit, rosenbrock, dop853 or rodas5p")] = "auto",
     rtol: Annotated[float, typer.Option(help="error allowed per step")] = 1e-7,
     as_json: AsJson = False,
 ) -> None:

@@ -14,6 +14,8 @@ from steadyslip.core.errors import NotAvailable
 
 Num = Any
 """A number, an array of numbers or a SymPy expression: formulas are written once for all three."""
+Choose = Callable[[Any, Any, Any], Any]
+"""``choose(condition, value, other)``, of arrays or of nodes of a program."""
 
 
 class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like the SymPy functions it stands beside

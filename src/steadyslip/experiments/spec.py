@@ -176,11 +176,6 @@ def _spec(found: Specification, filled: _Filled) -> Spec:
     )  # fmt: skip
 
 
-def default_spec(evolution: str = "slip") -> Spec:
-    """One-state rate-and-state friction at the measured normal stress, everything free."""
-    return spec_from_text(f"[friction]\nevolution = {evolution!r}\n", "default")
-
-
 @checked()
 def lab_rig(
     evolution: str = "slip",

@@ -6,10 +6,12 @@ program. Arrays of rigs (`polynomials`) and pages (`steadyslip.explorer`) are ju
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
+from steadyslip.core.expressions import Choose
 
 ROUNDING = 8 * float(np.finfo(float).eps)  # share of two terms below which what is left of them is none
 APART = 1e6  # factor between the values of a parameter at which `linear_split` is told a polynomial
@@ -51,7 +53,7 @@ def product(a: Polynomial, b: Polynomial) -> list[Any]:
     return out
 
 
-def axis_polynomial(p: Polynomial, q: Polynomial, choose: Callable[..., Any] = np.where) -> list[Any]:
+def axis_polynomial(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> list[Any]:
     """Im[p(iβ) conj q(iβ)]/β as a polynomial in β²: at its positive roots some real k puts a root of p + k q at iβ.
 
     Parameters
@@ -76,14 +78,14 @@ def stiffness_on_axis(p: Polynomial, q: Polynomial, square: Any) -> Any:
     return -(e1 * e2 + square * o1 * o2) / (e2 * e2 + square * o2 * o2)
 
 
-def real_edges(p: Polynomial, q: Polynomial, choose: Callable[..., Any] = np.where) -> tuple[Any, Any]:
+def real_edges(p: Polynomial, q: Polynomial, choose: Choose = np.where) -> tuple[Any, Any]:
     """The k at which a root is zero, and that at which the highest coefficient vanishes, where one is infinite."""
     none = (abs(p[-1]) <= 0) & (abs(q[-1]) <= 0)
     return -p[0] / q[0], choose(none, -p[-2] / q[-2], -p[-1] / q[-1])
 
 
 def linear_split(
-    low: Polynomial, own: Polynomial, high: Polynomial, choose: Callable[..., Any] = np.where
+    low: Polynomial, own: Polynomial, high: Polynomial, choose: Choose = np.where
 ) -> tuple[list[Any], list[Any], Any]:
     """p and q of a polynomial p + f q, from it at f = 1/`APART`, 1 and `APART`; and whether it is one."""
     p: list[Any] = []
@@ -104,7 +106,7 @@ def linear_split(
     return p, q, straight
 
 
-def is_hurwitz(c: Polynomial, choose: Callable[..., Any]) -> Any:
+def is_hurwitz(c: Polynomial, choose: Choose) -> Any:
     """Whether the highest coefficient is positive and all roots are on the left; of full degree, or of one less.
 
     For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
@@ -124,7 +126,7 @@ def _all_positive(values: Polynomial) -> Any:
     return good
 
 
-def share_left(terms: Sequence[Any], choose: Callable[..., Any] = np.where) -> Any:
+def share_left(terms: Sequence[Any], choose: Choose = np.where) -> Any:
     """What is left of a sum, as a share of its terms; zero where there are none."""
     total, sizes = 0.0, 0.0
     for term in terms:

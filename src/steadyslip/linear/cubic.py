@@ -10,14 +10,9 @@ Plain arithmetic: every function takes numbers, arrays, SymPy expressions or nod
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
-from steadyslip.core.expressions import Num
-
-Choose = Callable[[Any, Any, Any], Any]
+from steadyslip.core.expressions import Choose, Num
 
 
 def coefficients(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.expressions import FEW, ArrayFunction, derivative
+from steadyslip.core.expressions import FEW, ArrayFunction, Choose, derivative
 from steadyslip.core.questions import question
 from steadyslip.core.results import ReadOnly
 from steadyslip.model.equations import Model
@@ -18,7 +18,6 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reducing import can_eliminate
 from steadyslip.model.reduction import Reduction
 
-Choose = Callable[[Any, Any, Any], Any]
 LEAST_WEIGHT = 1e-5  # in that of ln v, below which a memory variable is not eliminated: its inverse amplifies rounding
 MOST_NOISE = 1e-2  # in ln v, from which on rounding decides how a block moves
 

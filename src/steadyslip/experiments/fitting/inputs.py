@@ -243,6 +243,11 @@ class ProtocolInputs:
         Names of free times, ``protocol.pieces.1.at``.
     pressed : ndarray (n,), optional
         Measured change of normal stress at the samples, Pa.
+
+    Attributes
+    ----------
+    plain : dict of str to float
+        Parameters of the protocol as it has them, by their dotted names.
     """
 
     def __init__(
@@ -250,7 +255,7 @@ class ProtocolInputs:
     ) -> None:
         self.protocol, self.velocity, self.time, self.pressed = protocol, velocity, np.array(time), pressed
         self.free = tuple(free)
-        self._plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
+        self.plain = {name: a.value for name, a in parameters(protocol, "protocol.").items()}
 
     def table(self, times: Array, first: int = 0, directions: int = 0) -> InputTable:
         """Tables for the free times (jobs, free); see `MeasuredInputs.table`."""
@@ -269,7 +274,7 @@ class ProtocolInputs:
 
     def _packed(self, times: Array) -> Segments:
         values = {name: times[:, i] for i, name in enumerate(self.free)}
-        return pack(twin(self.protocol, self._plain | values, "protocol."), self.velocity, float(self.time[-1]))
+        return pack(twin(self.protocol, self.plain | values, "protocol."), self.velocity, float(self.time[-1]))
 
     def _table(
         self, segments: Segments, moved: Sequence[tuple[int, Segments, Segments]], directions: int, jobs: int

@@ -18,7 +18,6 @@ from steadyslip.machine.slider import Slider
 
 Array = np.ndarray
 SPREAD = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of its other scales from which a member that was idle starts
-ZERO = ("trend", "offset")  # what does nothing at zero, and is of no law
 
 
 @dataclass(frozen=True)

@@ -273,4 +273,4 @@ def _time_of(name: str, part: RecordPart) -> float:
     """A free time of the protocol: as the protocol has it."""
     if not isinstance(part.inputs, ProtocolInputs):
         raise InternalError("isinstance(part.inputs, ProtocolInputs)")
-    return float(part.inputs._plain[name] or 0.0)
+    return float(part.inputs.plain[name] or 0.0)

@@ -17,8 +17,8 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.stable_values import edge_along, intervals_along, is_own_stiffness, name_along, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan.measures import ONSET, Measure, Output, Vary, block_of
-from steadyslip.model.point import operating_point
+from steadyslip.maps.plan.measures import ONSET, Measure, Output, block_of
+from steadyslip.model.point import Vary, operating_point
 from steadyslip.nonlinear.onset.hopf import onset_map, parameter_along
 from steadyslip.protocol import Protocol
 

@@ -26,7 +26,7 @@ from steadyslip.linear.status import WORDS as STATUS, status
 from steadyslip.linear.stiffness import in_chunks
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.motion import simulate_many
 from steadyslip.motion.many import event_names, event_unit
 from steadyslip.motion.status import WORDS
@@ -35,7 +35,6 @@ from steadyslip.nonlinear.kicks.kicks import KICKS, OF_MACHINES, kicks_of
 from steadyslip.nonlinear.kicks.places import place_problems
 from steadyslip.protocol import Protocol
 
-Vary = Mapping[str, Any]
 SECONDS_A_STEP = 4e-8  # of a lane's step on one core; decides no more than the size of chunks
 SECONDS_OF_DELAY = 1e-2  # to count infinitely many roots
 PROBES = 64

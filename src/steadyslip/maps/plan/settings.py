@@ -11,7 +11,7 @@ from steadyslip.core.roles import Names, Quantity, Text, Whole
 from steadyslip.maps.plan.axes import METHODS, MOST_POINTS, SPACINGS, Grid, Samples
 from steadyslip.maps.plan.measures import Measure
 
-LARGEST_CHUNK = 2**24
+MOST_GIVEN = 2**24  # points of a chunk, where somebody says how many
 FIT_POINTS = 1000
 LARGEST_SEED = 2**63 - 1
 
@@ -75,7 +75,7 @@ class MapSettings(Settings):
               "machine"), default=None,
     )  # fmt: skip
     chunk: int | None = setting(
-        Whole("points computed in one go; by what a point costs unless given", 1, LARGEST_CHUNK), default=None
+        Whole("points computed in one go; by what a point costs unless given", 1, MOST_GIVEN), default=None
     )
     over: Mapping[str, Any] | None = named(
         GridSettings, listed=True,

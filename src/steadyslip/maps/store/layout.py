@@ -25,9 +25,9 @@ from steadyslip.files.tables import fits_form
 from steadyslip.maps.plan.axes import COMPLETE, MOST_POINTS, SAMPLE, Generated
 from steadyslip.maps.plan.map import MOST_AXIS, MOST_CHUNKS, Map, roles
 from steadyslip.maps.plan.measures import NOT_DONE
+from steadyslip.maps.store.folder import METADATA
 
 FORMAT = 2
-METADATA = 2**26  # bytes
 MOST_CHUNK = 2**30  # bytes of a chunk of one array
 MOST_EXTRA = 1000  # values of a result at one point
 _VERSIONS = ("numpy", "scipy", "llvmlite", "zarr")

@@ -11,11 +11,12 @@ from hypothesis import given, strategies as st
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.kernels import build, driver_text, linking, primitives
+from steadyslip.kernels import build, driver_text, linking, primitives, record
 from steadyslip.kernels.driver.jobs import start_job
+from steadyslip.kernels.events import Watched
 from steadyslip.kernels.layout import TALLIED, Cursor, Out, Routines, Row, make_layout
 from steadyslip.kernels.methods import METHODS, dop853, explicit, order_defect, rodas4, rooted_trees
-from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, primitive, select
+from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program as Straight, as_node, primitive, select
 from steadyslip.kernels.printers import python as plain
 from steadyslip.kernels.printers.llvm import assembly
 from steadyslip.kernels.runner import Runner, runner
@@ -240,6 +241,14 @@ def test_a_program_has_no_branches():
     program = Straight("step")
     with pytest.raises(TypeError, match="select"):
         max(program.load(0), 1.0)
+
+
+def test_an_event_that_is_a_condition_is_refused(monkeypatch):
+    """It has no sign that could change."""
+    monkeypatch.setattr(record, "EVENTS", (Watched("fast", lambda at: at > 1.0, rises="fast"),))
+    for at in (as_node(2.0), 2.0):
+        with pytest.raises(TypeError, match=r"'fast'.* condition.* number that changes sign"):
+            record.Evaluator.marks(None, [at])
 
 
 def test_a_plain_program_is_readable():

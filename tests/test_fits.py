@@ -429,6 +429,13 @@ def test_the_best_experiment_comes_first():
     assert str(found).splitlines()[1].split()[0] in found.best
 
 
+def test_which_parameter_an_experiment_is_for():
+    """That which friction's law calls its share of a change of stress; where there is none, it has to be said."""
+    rig = lab.rig()
+    with pytest.raises(ss.ParameterError, match=r"parameter: missing; allowed: .*friction\.a.*\(free parameters\)"):
+        ss.best_protocol(rig, {"one": lab.STEP}, until=80.0, samples=100)
+
+
 # -- files and words
 
 

@@ -197,6 +197,19 @@ def test_cache_that_cannot_be_written(tmp_path, monkeypatch):
     assert ask(9) == 9
 
 
+def test_a_cache_in_the_own_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    monkeypatch.setenv("STEADYSLIP_CACHE", "~/kernels")
+    assert build.cache_folder() == tmp_path / "kernels"
+
+
+@pytest.mark.parametrize("word", ["", "0", "no", "Off", "FALSE ", "1", "yes"])
+def test_what_is_run_by_python_is_asked_for(word, monkeypatch):
+    monkeypatch.setenv("STEADYSLIP_INTERPRET", word)
+    assert build.interpreting() == (word in ("1", "yes"))
+
+
 @pytest.mark.slow
 @pytest.mark.campaign
 def test_concurrent_writers(folder):

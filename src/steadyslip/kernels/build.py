@@ -55,6 +55,7 @@ ENTRIES: dict[str, tuple[ModuleType, tuple[str, ...]]] = {
 }  # fmt: skip
 """What is called from outside: where it is, and the types of its arguments behind layout and routines."""
 KERNEL = FileKind("kernel", 4, 2**26, "it is compiled again")
+_OFF = ("", "0", "no", "off", "false")  # what a variable of the environment says no with
 _MARK = "THIS"  # stands for the key in the routines' text
 _lock = threading.RLock()
 _drivers: dict[str, Callable[..., int]] = {}
@@ -108,7 +109,7 @@ class Code:
 
 def interpreting() -> bool:
     """Whether everything is to be run by Python, to be stepped through."""
-    return os.environ.get("STEADYSLIP_INTERPRET", "") not in ("", "0")
+    return os.environ.get("STEADYSLIP_INTERPRET", "").strip().lower() not in _OFF
 
 
 def interpreted(programs: Sequence[Program], layout: Layout) -> Code:
@@ -135,7 +136,7 @@ def cache_folder() -> Path | None:
     """Where machine code is kept; None if it is not."""
     chosen = os.environ.get("STEADYSLIP_CACHE")
     if chosen is not None:
-        return Path(chosen) if chosen else None
+        return Path(chosen).expanduser() if chosen else None
     from platformdirs import user_cache_path
 
     return user_cache_path("steadyslip") / "kernels"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import cycle, pairwise
 from typing import Any
 
 from steadyslip.kernels.driver.places import earlier_at, guess_at, scale_at
@@ -241,5 +241,18 @@ class Evaluator:
         return stored
 
     def marks(self, moments: Sequence[Moment]) -> list[Value]:
-        """Functions of all events."""
-        return [event.function(moment) for moment in moments for event in EVENTS]
+        """Functions of all events.
+
+        Raises
+        ------
+        TypeError
+            If one is a condition.
+        """
+        found = [event.function(moment) for moment in moments for event in EVENTS]
+        for event, value in zip(cycle(EVENTS), found, strict=False):
+            if isinstance(value, bool) or (isinstance(value, Node) and value.kind == "bool"):
+                raise TypeError(
+                    f"event {event.name!r}: its function is a condition; it has to be a number that changes sign, "
+                    "such as the difference of what is compared"
+                )
+        return found

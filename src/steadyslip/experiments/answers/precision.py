@@ -185,7 +185,7 @@ class Ranking:
 
 @checked()
 def best_protocol(
-    rig: Slider, candidates: Mapping[str, Any] | None = None, parameter: str = "alpha", **options: Any
+    rig: Slider, candidates: Mapping[str, Any] | None = None, parameter: str | None = None, **options: Any
 ) -> Ranking:
     """Which experiment determines a parameter best?
 
@@ -194,18 +194,24 @@ def best_protocol(
     rig : Slider
     candidates : mapping of str to Protocol, optional
         By label; changes of the normal stress of several shapes, and the same with a step of the rate, unless given.
-    parameter : str
+    parameter : str, optional
+        What friction's answer to normal stress is told by unless given: the parameter that its law calls a share of it.
     **options
         As for `precision`.
 
     Raises
     ------
     ParameterError
-        If the parameter is not free.
+        If the parameter is not free, or none is given and the law has not exactly one that is such a share.
     """
     chosen = normal_stress_protocols(rig) if candidates is None else candidates
     found = {label: precision(rig, protocol, **options) for label, protocol in chosen.items()}
     known = dict.fromkeys(next(iter(found.values())).errors)
+    if parameter is None:
+        shares = [name for name in rig.of_kind("stress share") if name in known]
+        if len(shares) != 1:
+            raise ParameterError([Problem("parameter", f"missing; allowed: {', '.join(known)} (free parameters)")])
+        parameter = shares[0]
     try:
         name = resolve(parameter, known)
     except UnknownNameError as error:

@@ -19,11 +19,11 @@ from fuzz_rigs import DRIVES, FRICTION
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
 from steadyslip.explorer.sketch import sketch
+from steadyslip.figures.inline import drawn
 from steadyslip.files.standalone import write_page
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.commands import Thresholds
 from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
-from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import math, table, typed
 from steadyslip.reports.results import LISTED, _told_apart, done_to
 from steadyslip.reports.rig import inputs

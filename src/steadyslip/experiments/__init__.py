@@ -1,4 +1,7 @@
-"""Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig."""
+"""Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig.
+
+Knows no verdicts, maps or figures: fits come back as numbers and records.
+"""
 
 from steadyslip.experiments.answers.laws import LawComparison, compare, compare_laws
 from steadyslip.experiments.answers.population import Population, population

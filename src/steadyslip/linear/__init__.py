@@ -1,4 +1,7 @@
-"""Small perturbations of steady sliding: two routes to stability, edges, formulas, transfer functions."""
+"""Small perturbations of steady sliding: two routes to stability, edges, formulas, transfer functions.
+
+Knows nothing of motion, which knows nothing of it: the two meet in tests, and in the layers above.
+"""
 
 from __future__ import annotations
 

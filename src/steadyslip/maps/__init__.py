@@ -1,7 +1,7 @@
 """Maps: any analysis over millions of rigs, on this machine or on a cluster, kept on disk chunk by chunk.
 
 Map (plan, axes, measures) -> Store (Zarr) <- do_chunk (work) <- workers (local, cluster) <- run_map
-Store -> MapResult -> files (export), figures, refine
+Store -> MapResult -> files (export), figures, refine. Knows neither figures nor documents.
 """
 
 from __future__ import annotations

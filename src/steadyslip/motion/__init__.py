@@ -1,6 +1,7 @@
 """Motion in time: single runs with their events, and ensembles.
 
-rig + protocol -> jobs (arrays) -> kernels in lanes -> history or ensemble
+rig + protocol -> jobs (arrays) -> kernels in lanes -> history or ensemble. Knows nothing of stability: what is linear
+of a motion it does not ask.
 """
 
 from steadyslip.motion.events import ContactEvent, ContactSlip, Event, SlipEvent

@@ -1,4 +1,7 @@
-"""Beyond small perturbations: kind of onset, stick-slip cycles, and the kick that steady sliding survives."""
+"""Beyond small perturbations: kind of onset, stick-slip cycles, and the kick that steady sliding survives.
+
+Knows stability and motion; no records of experiments, no maps, no words of the verdict.
+"""
 
 from __future__ import annotations
 

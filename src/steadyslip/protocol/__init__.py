@@ -1,6 +1,7 @@
 """Protocols: what the load point, the normal stress and a disturbance do in the course of an experiment.
 
-pieces -> Protocol -> segments (one lane or many) -> kernels
+pieces -> Protocol -> segments (one lane or many) -> kernels. Knows neither laws nor rigs: what is done is told in
+channels, whatever it is done to.
 """
 
 from steadyslip.protocol.inputs import evaluate

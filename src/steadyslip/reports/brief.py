@@ -19,11 +19,11 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.quantities import shown, shown_range, stress_name
 from steadyslip.core.records import FrozenRecord, parameters
 from steadyslip.explorer.sketch import sketch
+from steadyslip.figures.inline import drawn
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import STYLE, Markup, figure, heading, letter, math as formula, paragraph, table, typed
 
 _BY_UNIT = {

@@ -8,10 +8,10 @@ from steadyslip import figures
 from steadyslip.core.quantities import percent, shown
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction
 from steadyslip.experiments.fitting.words import warnings
+from steadyslip.figures.inline import drawn
 from steadyslip.reports import rig as of_rig
 from steadyslip.reports.brief import inside
 from steadyslip.reports.document import Parts
-from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, lines, paragraph, table
 from steadyslip.reports.results import parts_of
 from steadyslip.verdict import analyze

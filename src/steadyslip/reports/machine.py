@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from steadyslip import figures
 from steadyslip.core.quantities import shown
+from steadyslip.figures.inline import drawn
 from steadyslip.figures.machine_verdict import left_out
 from steadyslip.reports import rig as of_rig
 from steadyslip.reports.brief import inside
 from steadyslip.reports.document import Parts
-from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import MachineAnalysis, Tolerated
 from steadyslip.verdict.machine import machine_facts

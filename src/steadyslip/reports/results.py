@@ -17,6 +17,7 @@ from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
+from steadyslip.figures.inline import drawn
 from steadyslip.files.specifications.layout import own_fields
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -29,7 +30,6 @@ from steadyslip.protocol import Protocol
 from steadyslip.reports import machine as of_machine, rig as of_rig
 from steadyslip.reports.brief import inside, rows_of
 from steadyslip.reports.document import Parts
-from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
 

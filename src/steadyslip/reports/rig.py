@@ -9,6 +9,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.quantities import shown, stress_name
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
+from steadyslip.figures.inline import drawn
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.linear.formula import formula_in_parts
 from steadyslip.linear.stiffness import STIFFNESS
@@ -18,7 +19,6 @@ from steadyslip.model.build import build_model
 from steadyslip.protocol import Protocol
 from steadyslip.reports.brief import rows_of
 from steadyslip.reports.document import Parts
-from steadyslip.reports.drawings import drawn
 from steadyslip.reports.elements import Markup, figure, heading, letter, math, paragraph, table
 from steadyslip.verdict import Analysis, Tolerated
 from steadyslip.verdict.findings import Verdict

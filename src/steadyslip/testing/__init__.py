@@ -7,7 +7,7 @@
 
 Each promise is one function, listed in `FRICTION_CHECKS` and `CONTACT_CHECKS`, so that a test can be
 parametrised over them. A broken promise raises `ContractViolation`, an AssertionError that says what came,
-what must be, and what to do.
+what must be, and what to do. Knows no documents and no commands; nothing below needs it.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import percent, shown
@@ -220,7 +221,7 @@ def _stiffness_of(touch: Touch) -> Any:
 
 
 @question
-def _matrix_function(model: Model) -> tuple[list[tuple[int, ...]], Callable[..., list[Any]]]:
+def _matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
     """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
     entries = [entry for row in characteristic_rows(model).values() for entry in row]
     powers = sorted({own for entry in entries for own in entry})
@@ -228,5 +229,5 @@ def _matrix_function(model: Model) -> tuple[list[tuple[int, ...]], Callable[...,
 
 
 @question
-def _speed_function(model: Model) -> Callable[..., list[Any]]:
+def _speed_function(model: Model) -> ArrayFunction:
     return model.function(one.speed for one in model.coordinates)

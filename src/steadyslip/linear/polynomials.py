@@ -310,7 +310,7 @@ def _candidates(p: Array, q: Array) -> tuple[Array, Array]:
     return k, beta
 
 
-def columns(c: Array) -> list[Any]:
+def columns(c: Array) -> list[Array]:
     """Coefficients of polynomials one by one, as `crossing` takes them."""
     return [c[..., i] for i in range(c.shape[-1])]
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.polynomials import (
@@ -79,7 +79,7 @@ def in_own_time(c: Array, h: Array) -> tuple[Array, Array, Array]:
 
 
 @quietly
-def count_right(c: Array, h: Array, shift: Any = 0.0) -> NDArray[np.int64]:
+def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
     """How many roots have a real part above `shift`, (...); −1 where coefficients are no numbers."""
     lead = np.broadcast_shapes(c.shape[:-2], np.shape(shift))
     c, h, rate = in_own_time(c, h)

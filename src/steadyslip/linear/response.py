@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import Num, derivative
+from steadyslip.core.expressions import ArrayFunction, Num, derivative
 from steadyslip.core.options import checked, slider
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
@@ -215,6 +215,6 @@ _UNITS |= {"B2": "1", "B3": "Pa/m", "m": "kg/m^2", "k": "Pa/m"}
 
 
 @question
-def _response_function(model: Model) -> tuple[list[str], Any]:
+def _response_function(model: Model) -> tuple[list[str], ArrayFunction]:
     known = response(model).as_dict()
     return list(known), model.function(known.values())

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.linear import crossing, quasi as sums
 from steadyslip.linear.polynomials import Array, ComplexArray, damping_measures, is_hurwitz, roots
@@ -65,14 +63,14 @@ def nearness(point: OperatingPoint) -> Array:
     return sums.nearness(*quasi(point))
 
 
-def is_near_edge(point: OperatingPoint, share: float) -> Any:
+def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:
     """Whether an oscillation is undamped to within a share, of the leading roots."""
     if not point.model.delays:
-        return np.abs(0.5 * nearness(point)[0]) <= share
-    return (np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING)
+        return np.asarray(np.abs(0.5 * nearness(point)[0]) <= share)
+    return np.asarray((np.abs(nearness(point)[0]) <= share) & (unstable_roots(point) <= _ONE_CROSSING))
 
 
-def outgrown(point: OperatingPoint, neutral: Any, share: float) -> NDArray[np.bool_]:
+def outgrown(point: OperatingPoint, neutral: ArrayLike, share: float) -> NDArray[np.bool_]:
     """Whether a disturbance grows by more than a share, whatever a root on the axis does; or at once.
 
     Parameters

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, TypeGuard
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
@@ -164,7 +165,7 @@ def stable_intervals(point: OperatingPoint, name: str) -> Array:
     return np.asarray(in_chunks(point, lambda part: sets_of(part, name)))
 
 
-def nearest_value(intervals: Array, own: Any) -> Array:
+def nearest_value(intervals: Array, own: ArrayLike) -> Array:
     """The end of a stable interval nearest to a rig's own value, (...); NaN where there is none above zero."""
     ends = intervals.reshape(*intervals.shape[:-2], -1)
     ends = np.where((ends > 0) & np.isfinite(ends), ends, np.nan)

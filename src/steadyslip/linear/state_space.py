@@ -7,7 +7,7 @@ places follow from each other: one of them is no state then, and what the balanc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import NotAvailable, UnknownNameError
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear.polynomials import Array
@@ -224,7 +225,7 @@ class _Descriptor:
 
 
 @question
-def _parts_function(model: Model, outputs: tuple[str, ...]) -> tuple[Callable[..., list[Array]], list[tuple[int, int]]]:
+def _parts_function(model: Model, outputs: tuple[str, ...]) -> tuple[ArrayFunction, list[tuple[int, int]]]:
     """Entries of the nine blocks of a `_Descriptor`, and their shapes."""
     linear = linearise(model)
     variables = [item.symbol for item in model.variables]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
 from steadyslip.linear.crossing import share_left
@@ -92,7 +92,7 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
 
 
 @question
-def _static_terms(model: Model) -> Callable[..., list[Any]]:
+def _static_terms(model: Model) -> ArrayFunction:
     """What adds up to the static stiffness of a machine, a0."""
     parts = (sp.Add.make_args(term.coefficients[0]) for term in characteristic_terms(model))
     return model.function(part for own in parts for part in own)

@@ -178,7 +178,7 @@ def _size(point: OperatingPoint) -> Array:
 
 
 @question
-def _split_function(model: Model) -> Callable[..., list[Array]]:
+def _split_function(model: Model) -> ArrayFunction:
     p, q = stiffness_split(model)
     return model.function([*p, *q])
 
@@ -198,10 +198,10 @@ def closed_form_interval(point: OperatingPoint) -> tuple[Array, Array]:
     return low, high
 
 
-def _lost(product: Array) -> Any:
+def _lost(product: Array) -> NDArray[np.bool_]:
     """Whether a product of numbers may have left the range of floating point, or lost digits at its lower end."""
     size = np.abs(product)
-    return ~((size > _LEAST) & (size < 1 / _LEAST))
+    return np.asarray(~((size > _LEAST) & (size < 1 / _LEAST)))
 
 
 @question

@@ -116,7 +116,7 @@ class OperatingPoint(Keeper):
         """`arguments` and `sigma` as NumPy's numbers and arrays."""
         return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, *self.sigmas))
 
-    def evaluate(self, function: Callable[..., list[Any]], *further: Any) -> list[Any]:
+    def evaluate(self, function: ArrayFunction, *further: Any) -> list[Any]:
         """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
         return function(*self._numbers, *further)
 
@@ -211,7 +211,7 @@ def _placed(model: Model, rig: Rig, together: Together, branch: int, scan: bool)
 
 
 @question
-def _gain(model: Model) -> Callable[..., list[Any]]:
+def _gain(model: Model) -> ArrayFunction:
     return ArrayFunction([*model.parameters.values()], [model.gain])
 
 

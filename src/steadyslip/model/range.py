@@ -7,14 +7,14 @@ polynomial: a slope that is none makes a coefficient that is none, and so does a
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
-from steadyslip.core.expressions import occurrences
+from steadyslip.core.expressions import ArrayFunction, occurrences
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.linearisation import characteristic_coefficients, characteristic_terms
@@ -62,7 +62,7 @@ def delays_of(point: OperatingPoint) -> Array:
 
 
 @question
-def _term_functions(model: Model) -> tuple[int, Callable[..., list[Array]], Callable[..., list[Array]]]:
+def _term_functions(model: Model) -> tuple[int, ArrayFunction, ArrayFunction]:
     terms = characteristic_terms(model)
     flat = [c for term in terms for c in term.coefficients]
     return len(terms[0].coefficients), model.function(flat), model.function([term.delay for term in terms])
@@ -79,12 +79,12 @@ def stacked(parts: list[Any], point: OperatingPoint) -> Array:
 
 
 @question
-def _coefficient_function(model: Model) -> Callable[..., list[Array]]:
+def _coefficient_function(model: Model) -> ArrayFunction:
     return model.function(characteristic_coefficients(model))
 
 
 @question
-def _steady_function(model: Model) -> Callable[..., list[Array]]:
+def _steady_function(model: Model) -> ArrayFunction:
     """Stresses and memory in steady sliding."""
     frictions = [model.steady[contact.friction] for contact in model.contacts]
     return model.function([*frictions, *(model.steady[item.symbol] for item in (*model.memory, *model.states))])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,7 +84,7 @@ def _held(model: Model, index: int) -> list[sp.Expr]:
 
 
 @question
-def _weights_function(model: Model, index: int) -> Callable[..., list[Any]]:
+def _weights_function(model: Model, index: int) -> ArrayFunction:
     return model.function(weighed(model, index))
 
 
@@ -107,7 +107,7 @@ def slip_rates(point: OperatingPoint) -> tuple[Any, ...]:
 
 
 @question
-def _slip_rates(model: Model) -> Callable[..., list[Any]]:
+def _slip_rates(model: Model) -> ArrayFunction:
     return model.function(model.steady[contact.velocity] for contact in model.contacts)
 
 
@@ -157,13 +157,13 @@ def rising(model: Model) -> list[list[sp.Expr]]:
 
 
 @question
-def _rising(model: Model) -> tuple[Callable[..., list[Any]], int]:
+def _rising(model: Model) -> tuple[ArrayFunction, int]:
     rows = rising(model)
     return model.function(e for row in rows for e in row), len(rows)
 
 
 @question
-def _force_function(model: Model, index: int) -> Callable[..., list[Any]]:
+def _force_function(model: Model, index: int) -> ArrayFunction:
     """Forces that keep each other in balance in steady sliding, at a contact.
 
     The force of a dashpot per change of ln v; what pull and friction do to the normal stress; then what adds up to
@@ -295,7 +295,7 @@ def moving_parts(model: Model) -> list[sp.Expr]:
 
 
 @question
-def _moving_function(model: Model) -> Callable[..., list[Any]]:
+def _moving_function(model: Model) -> ArrayFunction:
     return model.function(moving_parts(model))
 
 

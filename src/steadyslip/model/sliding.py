@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NoSteadySliding
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.quantities import shown, stress_name
@@ -232,7 +232,7 @@ def observed_in_steady_sliding(model: Model) -> tuple[list[str], list[sp.Expr]]:
 
 
 @question
-def _observable_function(model: Model) -> tuple[list[str], Callable[..., Any]]:
+def _observable_function(model: Model) -> tuple[list[str], ArrayFunction]:
     names, expressions = observed_in_steady_sliding(model)
     return names, model.function(expressions)
 
@@ -318,14 +318,13 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
 
 
 @question
-def _friction_function(model: Model, place: int) -> Callable[..., Any]:
+def _friction_function(model: Model, place: int) -> ArrayFunction:
     contact = model.contacts[place]
-    others = [one.sigma_ss for one in model.contacts if one is not contact]
-    function = model.function([model.steady[contact.friction] / contact.sigma_ss])
-    return lambda arguments, stress: function(*arguments, *(stress for _ in (contact, *others)))
+    return model.function([model.steady[contact.friction] / contact.sigma_ss])
 
 
 def _friction_coefficient(point: OperatingPoint, place: int) -> float:
     """Friction coefficient in steady sliding at a normal stress of 1 MPa (exact where τ is proportional to σ)."""
-    value = float(_friction_function(point.model, place)(point.arguments, 1e6)[0])
+    stresses = (1e6 for _ in point.model.contacts)
+    value = float(_friction_function(point.model, place)(*point.arguments, *stresses)[0])
     return value if math.isfinite(value) else float("nan")

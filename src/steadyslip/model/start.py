@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import sympy as sp
 
 from steadyslip.core.arrays import brief
 from steadyslip.core.errors import InternalError, ParameterError, Problem, unknown_name
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
@@ -19,7 +19,7 @@ from steadyslip.model.scales import slip_rates
 
 
 @question
-def _steady_memory(model: Model) -> Callable[..., list[Any]]:
+def _steady_memory(model: Model) -> ArrayFunction:
     return model.function(model.steady[item.symbol] for item in model.memory)
 
 
@@ -43,7 +43,7 @@ def _number(value: Any) -> Any:
 
 
 @question
-def _velocity_variable(reduction: Reduction, index: int) -> Callable[..., list[Any]]:
+def _velocity_variable(reduction: Reduction, index: int) -> ArrayFunction:
     """The velocity variable of a contact from its velocity and the memory of all."""
     model, variable = reduction.model, reduction.slidings[index].variable
     if variable is None:
@@ -53,7 +53,7 @@ def _velocity_variable(reduction: Reduction, index: int) -> Callable[..., list[A
 
 
 @question
-def _slip_rates(model: Model) -> Callable[..., list[Any]]:
+def _slip_rates(model: Model) -> ArrayFunction:
     """Velocities of the contacts from those of the coordinates, with the load point at that of steady sliding."""
     steady = {model.inputs["load_velocity"]: model.steady[model.inputs["load_velocity"]]}
     slips = (model.definitions.get(contact.velocity, contact.velocity) for contact in model.contacts)
@@ -61,18 +61,18 @@ def _slip_rates(model: Model) -> Callable[..., list[Any]]:
 
 
 @question
-def _steady_states(model: Model) -> Callable[..., list[Any]]:
+def _steady_states(model: Model) -> ArrayFunction:
     """The states of contact laws."""
     return model.function(model.steady[item.symbol] for item in model.states)
 
 
 @question
-def _steady_speeds(model: Model) -> Callable[..., list[Any]]:
+def _steady_speeds(model: Model) -> ArrayFunction:
     return model.function(one.speed for one in model.coordinates)
 
 
 @question
-def _balance(reduction: Reduction, index: int) -> tuple[Callable[..., list[Any]], bool]:
+def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
     """The balance of a massless model before the protocol begins, its slope in one memory variable; whether that
     is the same wherever that variable is.
     """
@@ -208,12 +208,12 @@ def guesses(reduction: Reduction, point: OperatingPoint, initial: np.ndarray, ve
 
 
 @question
-def _steady_unknowns(reduction: Reduction) -> Callable[..., list[Any]]:
+def _steady_unknowns(reduction: Reduction) -> ArrayFunction:
     """What is searched for, in steady sliding; zero for velocity variables, which follow from velocities."""
     return reduction.model.function(reduction.model.steady.get(s, sp.Integer(0)) for s in reduction.searched)
 
 
 @question
-def restored_of(reduction: Reduction) -> Callable[..., list[Any]]:
+def restored_of(reduction: Reduction) -> ArrayFunction:
     """What a jump leaves unchanged, from the state: for starting a kernel anywhere."""
     return reduction.model.function(reduction.restored, *reduction.state, V_LP, Q, P, TIME)

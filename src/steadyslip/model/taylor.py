@@ -7,17 +7,15 @@ equation then stays short and so do its derivatives; nothing has to be solved fo
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations_with_replacement
-from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
@@ -45,7 +43,7 @@ class System:
     unknowns: tuple[sp.Symbol, ...]
     dynamic: int
     entries: tuple[tuple[Index, ...], ...]
-    function: Callable[..., list[Any]]
+    function: ArrayFunction
 
     def place(self, symbol: sp.Symbol) -> int:
         """Index of one of the unknowns."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.kernels.runner import Runner
 from steadyslip.machine.mechanism import LOAD_POINT
@@ -65,7 +63,7 @@ def out_of_range(found: dict[str, Array]) -> Array:
 
 
 @question
-def _function(model: Model) -> tuple[list[str], list[str], Callable[..., list[Any]]]:
+def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
     """Observables that follow from others: their names, and the names and the function of what they follow from."""
     given: dict[sp.Symbol, str] = {}
     for one in model.coordinates:
@@ -145,7 +143,7 @@ def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
 
 
 @question
-def _shares(model: Model) -> Callable[..., list[Any]]:
+def _shares(model: Model) -> ArrayFunction:
     """Slip rate of the contacts and speed of the coordinates in steady sliding, over the velocity of the drive."""
     drive = model.steady[model.inputs["load_velocity"]]
     speeds = [model.steady[contact.velocity] for contact in model.contacts]
@@ -153,7 +151,7 @@ def _shares(model: Model) -> Callable[..., list[Any]]:
 
 
 @question
-def _slips(model: Model) -> Callable[..., list[Any]]:
+def _slips(model: Model) -> ArrayFunction:
     return model.function([c.slip for c in model.contacts], *(one.displacement for one in model.coordinates))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Final, Recorded, Sampled
@@ -197,7 +198,7 @@ def _surfaces(point: OperatingPoint) -> tuple[float, ...]:
 
 
 @question
-def areas(model: Model) -> Callable[..., list[Any]]:
+def areas(model: Model) -> ArrayFunction:
     """Areas of the contacts, of which forces are stresses times."""
     return model.function(contact.area for contact in model.contacts)
 

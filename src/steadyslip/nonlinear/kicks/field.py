@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model import OperatingPoint
 from steadyslip.model.reduction import SLOPES, TIME, V_LP, P, Q, Reduction
@@ -21,7 +19,7 @@ BALANCED = 12  # rounds of Newton's method for the balance of forces
 
 
 @question
-def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
+def field_of(reduction: Reduction) -> ArrayFunction:
     """Rates and slip rates, then residuals of the balances and their slopes, row by row, where unknowns are left.
 
     A function of the parameters, σss, v_lp, q, p, the state and the unknowns.
@@ -32,11 +30,11 @@ def field_of(reduction: Reduction) -> Callable[..., list[Any]]:
 
 
 @question
-def _jacobian_of(reduction: Reduction) -> Callable[..., list[Any]]:
+def _jacobian_of(reduction: Reduction) -> ArrayFunction:
     return _at_constant_inputs(reduction, [entry for row in reduction.jacobian() for entry in row])
 
 
-def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> Callable[..., list[Any]]:
+def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> ArrayFunction:
     still = {TIME: sp.Integer(0)}
     still |= {s: sp.Integer(0) for s in sp.symbols("v_lp_dot q_dot p_dot", real=True)}
     at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
@@ -130,7 +128,7 @@ def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
 
 
 @question
-def _normal_of(reduction: Reduction) -> Callable[..., list[Any]]:
+def _normal_of(reduction: Reduction) -> ArrayFunction:
     """Normal stresses."""
     still = {TIME: sp.Integer(0)} | dict.fromkeys(SLOPES[:3], sp.Integer(0))
     wanted = (one.outputs["sigma"].xreplace(still) for one in reduction.slidings)

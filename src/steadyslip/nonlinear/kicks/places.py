@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable, Problem, unknown_name
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
@@ -110,22 +109,22 @@ def _place(model: Model, at: str) -> int:
 
 
 @question
-def _speeds(model: Model) -> Callable[..., list[Any]]:
+def _speeds(model: Model) -> ArrayFunction:
     return model.function(one.speed for one in model.coordinates)
 
 
 @question
-def _inertias(model: Model) -> Callable[..., list[Any]]:
+def _inertias(model: Model) -> ArrayFunction:
     return model.function(one.inertia for one in model.coordinates)
 
 
 @question
-def _areas(model: Model) -> Callable[..., list[Any]]:
+def _areas(model: Model) -> ArrayFunction:
     return model.function(contact.area for contact in model.contacts)
 
 
 @question
-def _levers(model: Model, at: str) -> Callable[..., list[Any]]:
+def _levers(model: Model, at: str) -> ArrayFunction:
     """Slip rate of each contact over the velocity of a body: as it moves alone, or else as all move in sliding."""
     body = model.coordinates[_place(model, at)]
     found = []

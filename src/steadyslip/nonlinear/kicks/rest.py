@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model import OperatingPoint
 from steadyslip.model.reduction import Reduction
@@ -154,17 +154,17 @@ def picked(array: Any, which: Array) -> Any:
 
 
 @question
-def _shifts(reduction: Reduction) -> Callable[..., list[Any]]:
+def _shifts(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(reduction.shifts)
 
 
 @question
-def _ratios(reduction: Reduction) -> Callable[..., list[Any]]:
+def _ratios(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(one.ratio for one in reduction.slidings)
 
 
 @question
-def _slip_gradients(reduction: Reduction) -> Callable[..., list[Any]]:
+def _slip_gradients(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(sp.diff(one.slip, s) for one in reduction.slidings for s in reduction.state)
 
 

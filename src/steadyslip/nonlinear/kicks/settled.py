@@ -7,13 +7,13 @@ found by Newton's method on the rates. All is in the variables that the kernels 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model import OperatingPoint
 from steadyslip.model.reduction import V_LP, P, Reduction, W
@@ -36,8 +36,8 @@ class _Balance:
     """Steady sliding at other inputs; functions of parameters, own σss, v_lp, p and the stress s."""
 
     affine: bool
-    stress: Callable[..., list[Any]]
-    state: Callable[..., list[Any]]
+    stress: ArrayFunction
+    state: ArrayFunction
 
 
 @question
@@ -170,7 +170,7 @@ FASTER = sp.Symbol("faster", positive=True)
 
 
 @question
-def _steady_state_of(reduction: Reduction) -> Callable[..., list[Any]]:
+def _steady_state_of(reduction: Reduction) -> ArrayFunction:
     """That of a rig's parameters and normal stresses, and of how many times as fast it slides."""
     model = reduction.model
     drive = model.parameters["drive.velocity"]

@@ -6,15 +6,14 @@ are; `Flow` leaves one parameter of a rig free, which is driven at its own veloc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import derivative
+from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Final, Recorded, Sampled, Setting
@@ -64,14 +63,14 @@ def _with_sensitivities(reduction: Reduction, method: str) -> Runner:
 
 
 @question
-def _slip_shares(reduction: Reduction, contact: int) -> Callable[..., list[Any]]:
+def _slip_shares(reduction: Reduction, contact: int) -> ArrayFunction:
     """How slip at a contact follows from the state, and its rate in steady sliding over that of the load point."""
     sliding = reduction.slidings[contact]
     return reduction.model.function([*(derivative(sliding.slip, s) for s in reduction.state), sliding.ratio])
 
 
 @question
-def _shifts(reduction: Reduction) -> Callable[..., list[Any]]:
+def _shifts(reduction: Reduction) -> ArrayFunction:
     return reduction.model.function(reduction.shifts)
 
 

@@ -11,7 +11,7 @@ import steadyslip as ss
 from command import run
 from delays import some, spectral, winding
 from machines import at_random, coulomb, rate_state, surface, two_mass
-from steadyslip.linear import quasi
+from steadyslip.linear import quasi, windows
 from steadyslip.linear.spectrum import unstable_roots
 from steadyslip.linear.waves import Waves
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
@@ -351,3 +351,26 @@ def test_what_is_not_offered_with_delay_says_so(tmp_path):
         reduce_model(build_model(late_axis("0.1 s")))
     with pytest.raises(ss.ParameterError, match="delay"):
         ss.PositionPD(velocity=1.0, body="motor", kp=1.0, delay=-0.1)
+
+
+@np.errstate(all="ignore")  # as where it is used
+def test_roots_followed_through_their_crossings_are_those_that_are_counted(monkeypatch):
+    """With several delays: what stands right between two values of a gain follows from which way each root goes."""
+    chance, counts, cells, asked = np.random.default_rng(3), windows.count_right, 0, []
+    while cells < 50:
+        p, q = chance.normal(size=(2, 3, 4)) * 10.0 ** chance.uniform(-1, 1, size=(2, 3, 4))
+        p[0, -1] = abs(p[0, -1])
+        p[1:, -1] = q[:, -1] = 0.0
+        h = np.append(0.0, 10.0 ** chance.uniform(-1, 1, size=2))
+        fast = float(np.max(windows._fastest(p, q, np.geomspace(0.2, 5.0, 9))))
+        found = windows._candidates(p, q, h, 0.2, 5.0, fast) if fast < 50 else None
+        if found is None or len(found[0]) < 3:
+            continue
+        ends = np.concatenate([[0.2], found[0], [5.0]])
+        each = p, q, h, *found, np.sqrt(ends[:-1] * ends[1:])
+        own = windows._right(*each)
+        monkeypatch.setattr(windows, "count_right", lambda c, h: (asked.append(len(c)), counts(c, h))[1])
+        assert np.array_equal(windows._right_by_crossings(*each), own)
+        monkeypatch.undo()
+        cells += len(own)
+    assert sum(asked) < 0.5 * cells  # the few ends of rows of crossings; wrong directions would have all counted

@@ -43,7 +43,7 @@ def value(c: Array, h: Array, s: Any) -> Any:
     return sum(evaluate(p, s) * np.exp(-s * delay) for p, delay in zip(c, h, strict=True))
 
 
-def _slope(c: Array, h: Array, s: Any) -> Any:
+def slope(c: Array, h: Array, s: Any) -> Any:
     """Its derivative."""
     powers = np.arange(1, c.shape[-1])
     inner = ((evaluate(p[1:] * powers, s) - d * evaluate(p, s)) * np.exp(-s * d) for p, d in zip(c, h, strict=True))
@@ -245,7 +245,7 @@ def _root_on(c: Array, h: Array, real: float) -> complex:
     starts = real + 1j * np.array([0.0, *_near_axis(moved, h)])
     s = starts.astype(complex)
     for _ in range(30):
-        step = value(c, h, s) / _slope(c, h, s)
+        step = value(c, h, s) / slope(c, h, s)
         s = np.where(np.isfinite(step), s - step, s)
     s = np.where(np.abs(s.imag) < 1e-12 * np.abs(s), s.real + 0j, s)
     far = np.abs(s.real - real) + np.abs(value(c, h, s)) / _size(c, h, s)

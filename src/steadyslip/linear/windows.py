@@ -23,11 +23,13 @@ from steadyslip.linear.quasi import (
     in_own_time,
     outweighed,
     repeated,
+    slope,
     value,
 )
 from steadyslip.linear.waves import where_alike, where_real
 
 _TURNS = 100  # of an oscillation during the delay, beyond which windows are not looked for any more,
+_PLAIN = 1e-6  # share of a root's speed that leads it across the axis, below which it may as well run along it
 _MANY = 20_000  # where the rig itself has none so fast
 
 
@@ -112,11 +114,37 @@ def _windows(p: Array, q: Array, h: Array, low: float, high: float, fast: float)
     theta, beta = candidates
     ends = np.concatenate([[low], theta, [high]])
     probes = np.sqrt(ends[:-1]) * np.sqrt(ends[1:])  # between two neighbours nothing crosses the axis
-    return _of_cells(theta, beta, (_right(p, q, h, probes) == 0) & _posed(p, q, probes))
+    count = _right if len(h) <= 2 else _right_by_crossings  # with one delay a count takes no time
+    return _of_cells(theta, beta, (count(p, q, h, theta, beta, probes) == 0) & _posed(p, q, probes))
 
 
-def _right(p: Array, q: Array, h: Array, theta: Array) -> NDArray[np.int64]:
-    return count_right(p + theta[:, None, None] * q, h)
+def _right(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
+    """Roots to the right, counted at every probe."""
+    return count_right(p + probes[:, None, None] * q, h)
+
+
+def _right_by_crossings(p: Array, q: Array, h: Array, theta: Array, beta: Array, probes: Array) -> NDArray[np.int64]:
+    """The same from few counts: what crosses the axis between two probes does so as ds/dθ = −Q/(P' + θ Q') says.
+
+    Where that is no plain crossing, roots are counted anew, and so they are at the last probe before: a row of
+    crossings that does not lead from one count to the next is counted throughout.
+    """
+    s = 1j * np.where(np.isinf(beta), np.nan, beta)
+    speed = -value(q, h, s) / (slope(p, h, s) + theta * slope(q, h, s))
+    plain = np.isfinite(speed) & (np.abs(speed.real) > _PLAIN * np.abs(speed))
+    steps = np.where(plain, np.sign(speed.real) * np.where(beta == 0, 1, 2), 0).astype(np.int64)
+    first = np.concatenate([[0], np.flatnonzero(~plain) + 1])
+    last = np.append(first[1:] - 1, len(theta))
+    ends = np.unique(np.concatenate([first, last]))
+    counted = np.full(len(probes), -1, dtype=np.int64)
+    counted[ends] = _right(p, q, h, theta, beta, probes[ends])
+    for a, b in zip(first, last, strict=True):
+        found = counted[a] + np.concatenate([[0], np.cumsum(steps[a:b])])
+        if found[-1] == counted[b] and np.all(found >= 0):
+            counted[a : b + 1] = found
+        else:
+            counted[a : b + 1] = _right(p, q, h, theta, beta, probes[a : b + 1])
+    return counted
 
 
 def _posed(p: Array, q: Array, theta: Array) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from steadyslip.figures.style import axes_or_new
 from steadyslip.maps.view.cut import View, axes_of, take
 from steadyslip.maps.view.result import MapResult
 
-FACETS = 6
+FACETS = 6  # panels at most
 
 
 def map_figure(

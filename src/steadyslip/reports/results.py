@@ -18,6 +18,7 @@ from steadyslip.core.roles import Parameter
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn
+from steadyslip.figures.maps import FACETS
 from steadyslip.files.specifications.layout import own_fields
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -34,7 +35,6 @@ from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated, analyze, tolerate
 
 LISTED = 24
-FACETS = 6
 PLANE = "Spring stress over velocity; black: steady sliding at every velocity, the dot at that of the load point."
 PLANE_OF_CONTACT = "Friction force over slip rate; black: steady sliding at any velocity, the dot at that of the drive."
 

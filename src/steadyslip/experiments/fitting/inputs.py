@@ -11,6 +11,7 @@ import numpy as np
 
 from steadyslip.core.errors import InternalError
 from steadyslip.core.records import parameters, twin
+from steadyslip.experiments.fitting.commanded import STRAIGHT
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
 from steadyslip.experiments.measured.record import Record
@@ -21,7 +22,6 @@ Array = np.ndarray
 LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
 PER_PERIOD = 300  # rows per period of a sine wave, on which it becomes straight: 6e-5 of its amplitude
 MOST_JUMPS = 20
-STRAIGHT = 5e-4  # of the range of the normal stress: what straight lines may miss of a smooth curve
 _SHIFT = 1e-3  # s; free times are moved by it to see what moves with them, which is linear
 
 

@@ -60,7 +60,7 @@ def stable_ranges(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
         known = max(margin.searched[0] / margin.value, 1 / _SPAN), min(margin.searched[1] / margin.value, _SPAN)
         ax.barh(row, known[1] - known[0], left=known[0], height=0.62, color="white", edgecolor=GREY, hatch="////",
                 linewidth=0.6, label="_unstable")  # fmt: skip
-        for low, high in _stable(margin, bool(found.stable)):
+        for low, high in _stable(margin):
             a, b = max(low / margin.value, known[0]), min(high / margin.value, known[1])
             if a < b:
                 ax.barh(row, b - a, left=a, height=0.62, color=SKY, edgecolor=BLACK, linewidth=0.6, label="_stable")
@@ -99,11 +99,11 @@ def _label(name: str) -> str:
     return ".".join(parts[1:]) if parts[0] in ("bodies", "links", "contacts") else name
 
 
-def _stable(margin: Margin, now: bool) -> list[tuple[float, float]]:
-    """Stable intervals between the edges of a parameter."""
+def _stable(margin: Margin) -> list[tuple[float, float]]:
+    """Stable intervals between the edges of a parameter, of which there is one at least."""
     edges = sorted(margin.edges, key=lambda edge: edge.value)
     ends = [0.0, *(edge.value for edge in edges), math.inf]
-    stable = [any(edges) and edges[0].stable == "below"]
+    stable = [edges[0].stable == "below"]
     stable += [edge.stable == "above" for edge in edges]
     return [(low, high) for low, high, good in zip(ends[:-1], ends[1:], stable, strict=True) if good]
 

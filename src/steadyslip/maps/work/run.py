@@ -83,7 +83,7 @@ def _gone_on(plan: Map, store: Store, workers: int | None, cluster: str | None, 
             store.forget(number)
         missing = store.pending()
         if missing:
-            _check_space(store, missing)
+            _check_space(store)
             _compute(plan, store, missing, workers, cluster, progress)
         if store.marked() == store.count:
             store.tidy()
@@ -107,7 +107,7 @@ def _remark(store: Store, plan: Map) -> None:
         _note(f"the map has chunks of {size} points already; they stay as they are")
 
 
-def _check_space(store: Store, missing: list[int]) -> None:
+def _check_space(store: Store) -> None:
     """Refuse to begin where not even one chunk would fit; how well a whole map packs is not known before."""
     free = shutil.disk_usage(store.path).free
     if free < 2**16:

@@ -34,6 +34,7 @@ INFINITE = 2**62
 _HALVINGS = 60  # of a bracket of a real part
 _MOST = 400_000  # places along the axis at which a function is evaluated
 _TURNS = 5000  # of the fastest crossing, after which delays are not looked at any more
+_LOST = 1e10  # turns of the fastest crossing during one delay, of which rounding leaves no angle to rely on
 _NEAR = 1e-13  # relative length of a step along the axis that is not cut any more: a root is on it
 
 
@@ -179,11 +180,15 @@ def _along(c: Array, h: Array, most: float) -> tuple[Array, ComplexArray]:
         found = np.insert(found, at + 1, value(c, h, 1j * middle))
     else:
         turns = most * float(np.max(h)) / (2 * np.pi)
-        raise NotAvailable(
-            f"the delays are so long beside the oscillations of this rig, up to {turns:.2g} turns, that its growing "
-            "roots cannot be counted; shorten them"
-        )
+        raise _too_long(turns)
     return omega, found
+
+
+def _too_long(turns: float) -> NotAvailable:
+    return NotAvailable(
+        f"the delays are so long beside the oscillations of this rig, up to {turns:.2g} turns, that its growing roots "
+        "cannot be counted; shorten them"
+    )
 
 
 def _count_by_argument(c: Array, h: Array) -> int:
@@ -215,6 +220,10 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
     if not np.any(c[1:]):  # no delayed term is left: a polynomial
         exact = roots(np.sum(c, axis=0))
         return np.append(exact, np.full(count, np.nan + 0j))[:count]
+    if len(c) == 2:
+        turns = float(np.nanmax(crossings(c[:1], c[1:])[0], initial=0.0)) * float(np.max(h)) / (2 * np.pi)
+        if turns > _LOST:
+            raise _too_long(turns)
     numbers = np.arange(1, count + 1)
     high = np.full(count, 1.01 * bound_on_axis(c))
     low = -np.ones(count) / (1.0 + float(np.max(h)))  # far to the left delayed terms leave the range of floating point

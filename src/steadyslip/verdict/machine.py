@@ -19,6 +19,7 @@ from steadyslip.linear.modes import Mode, mode_of
 from steadyslip.linear.status import decided_by_rounding, on_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.model.point import operating_point
+from steadyslip.model.range import require_range
 from steadyslip.model.sliding import SteadyMachine, steady_machine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
 from steadyslip.verdict.export import common_numbers, onset_dict
@@ -89,14 +90,15 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
     from steadyslip import __version__
 
     with np.errstate(all="ignore"):
-        distances = margins(machine)
+        point = operating_point(machine)
+        require_range(point)
         try:
             steady = steady_machine(machine)
         except NoSteadySliding as error:
             why = str(error).removeprefix("no steady sliding: ")
-            return MachineAnalysis(rig=machine, stable=None, reason=why, margins=distances, version=__version__)
-        point = operating_point(machine)
-        numbers = linear_numbers(point)
+            return MachineAnalysis(rig=machine, stable=None, reason=why, margins=margins(machine), version=__version__)
+        numbers = linear_numbers(point)  # refuses what cannot be counted, before the edges are looked for
+        distances = margins(machine)
         posed = numbers["growth_rate"] != math.inf
         leading = numbers["eigenvalues"][0] if posed else 0.0
         found = MachineAnalysis(

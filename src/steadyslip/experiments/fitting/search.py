@@ -115,10 +115,7 @@ def searched(plan: Plan, starts: int, effort: Effort, progress: Told | None, kno
             "the model cannot follow these records from any start; are law and drive those of the experiment?"
         )
     found = standing(search.whole, found)
-    best = found.coordinates[0]
-    found = search.nested(found, {} if known is None else known)
-    if not np.array_equal(found.coordinates[0], best):
-        found = standing(search.whole, found)
+    found = standing(search.whole, search.nested(found, {} if known is None else known))
     if not np.isfinite(found.ssq[0]):
         raise NotAvailable("the model cannot follow these records; is the rig's law and drive that of the experiment?")
     best, ssq = in_order(search.whole, found)

@@ -142,3 +142,15 @@ def test_a_formula_is_refused_in_words():
     assert done.returncode == 0
     assert "No formula: " in done.stdout
     assert '"formula": null' in run("analyze", str(EXAMPLES[1]), "--formula", "--json").stdout
+
+
+def test_along_the_drive_steady_sliding_is_as_fast_as_each_value_says():
+    """Where no cycle was found, too: the onset is on the line of steady sliding, not at the velocity of the rig."""
+    rig = ss.read_rig(Path(__file__).parents[1] / "examples" / "stick-slip.toml")
+    branch = ss.cycles(rig, "drive.velocity", doublings=0)
+    for one in (branch, replace(branch, cycles=(), special=(), gaps=())):
+        line, onset = (next(x for x in one.plot().lines if word in x.get_label()) for word in ("steady", "onset"))
+        unit = onset.get_ydata()[0] / branch.onset.value
+        factor = onset.get_xdata()[0] / branch.onset.value
+        assert line.get_ydata() / unit == pytest.approx(line.get_xdata() / factor)
+        assert onset.get_xdata()[0] in line.get_xdata()

@@ -26,7 +26,6 @@ from steadyslip.figures.style import (
     labelled,
 )
 from steadyslip.machine.machine import Machine
-from steadyslip.machine.slider import Slider
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
@@ -57,13 +56,20 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     factor, unit = display_unit(branch.unit, branch.onset.value, branch.rig.area_of(branch.along))
     drive = branch.cycles[0].speed if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
-    onset_speed = drive
-    if branch.along == "drive.velocity" and isinstance(branch.rig, Slider):
-        onset_speed = branch.onset.value
+    onset_speed, driven = drive, branch.along == "drive.velocity"
+    if driven:  # at every point its own
+        at = branch.cycles[0].value if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
+        onset_speed = drive * branch.onset.value / at
+        speed, speed_unit = display_unit("m/s", onset_speed)
     _velocities(branch, ax, factor, speed, 1.8, True)
     if branch.doubled is not None:
         _velocities(branch.doubled, ax, factor, speed, 0.9, False)
-    ax.axhline(drive / speed, color=BLACK, linewidth=0.8, linestyle=":", label="steady sliding")
+    line: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "linestyle": ":", "label": "steady sliding"}
+    if driven:
+        values = np.unique([branch.onset.value, *(one.value for one in branch.cycles)])
+        ax.plot(values / factor, onset_speed * values / branch.onset.value / speed, **line)
+    else:
+        ax.axhline(drive / speed, **line)
     kind = branch.onset.kind
     mark: dict[str, Any] = {"color": _COLOURS[kind], "marker": "o", "linestyle": "none"}
     ax.plot([branch.onset.value / factor], [onset_speed / speed], label=f"{kind} onset", **mark)

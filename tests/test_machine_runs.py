@@ -201,3 +201,32 @@ def test_what_helps_a_run_that_ends_is_said_of_a_machine_or_a_slider():
 def test_a_machine_has_one_steady_sliding():
     with pytest.raises(ss.ParameterError, match="branch: got 1"):
         ss.simulate(two_tables(), until=1.0, branch=1)
+
+
+def test_a_run_that_ends_where_nothing_can_be_computed_has_numbers_up_to_there(tmp_path):
+    """Two bodies without mass, joined by a dashpot, run away together until no velocity is a number any more."""
+    contact = """
+[contacts.{0}]
+body = "{0}"
+area = "10 cm^2"
+friction = {{law = "rate-state", a = 0.01, b = {1}, d_c = "10 um", mu_ref = 0.6, v_ref = "1 um/s", regularised = true}}
+contact = {{law = "constant", preload = "50 bar"}}
+"""
+    text = """
+[bodies.one]
+[bodies.two]
+[links.near]
+between = ["drive", "one"]
+stiffness = "5 N/um"
+[links.far]
+between = ["one", "two"]
+stiffness = "5 N/um"
+damping = "1 N s/mm"
+[drive]
+velocity = "2 um/s"
+"""
+    (tmp_path / "rig.toml").write_text(text + contact.format("one", 0.05) + contact.format("two", 0.008))
+    run = ss.simulate(ss.read_rig(tmp_path / "rig.toml"), ss.VelocityStep(at=1.0, to=3e-6), until=100.0)
+    assert run.status != "done"
+    assert all(np.all(np.isfinite(run[name])) for name in run.units)
+    assert "nan" not in str(run)

@@ -169,7 +169,7 @@ def _history(
     events = events_of(outcome.log, contacts, surfaces)
     if status in (BLOWN_UP, LOST) and not any(event.kind == status for event in events):
         events += (_last_event(status, jobs, machine, outcome, surfaces),)
-    if status in ("done", "blow-up") and np.any(bad := out_of_range(found)):
+    if np.any(bad := out_of_range(found)):
         first = int(np.argmax(bad))
         if status == "done":
             status, end = "out of range", float(time[first])

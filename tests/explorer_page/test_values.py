@@ -165,6 +165,17 @@ def test_hostile_links_change_nothing(browser, file):
                 assert time.time() < end, (link, found)
 
 
+def test_a_link_is_followed_while_the_page_is_about_to_write_its_own(browser, file):
+    """The address shows the page's own values soon after they change: a link that comes just before is not lost."""
+    with Visit(browser, file, "#friction.a=0.02") as visit:
+        visit.page.evaluate("""() => new Promise((done) => {
+            addEventListener("hashchange", () => setTimeout(done), { once: true });
+            location.hash = "#friction.a=0.03";
+            history.replaceState(null, "", "#friction.a=0.02");
+        })""")
+        assert visit.field("friction.a").input_value() == "0.03"
+
+
 def test_what_a_link_cannot_bring_is_said(browser, file):
     """A link of another rig, and numbers that are not allowed: what is left out is named, until another link comes."""
     with Visit(browser, file, "#friction.a=0.02&friction.states.1.b=0.01&friction.d_c=-1") as visit:

@@ -93,10 +93,11 @@ export class Page {
       this.chart.show();
       this.course.draw();
     }).observe(root);
-    window.addEventListener("hashchange", () => {
-      if (this.told || location.hash === this.hash()) return;
-      const values = this.fromAddress();
-      choose(this, chosenIn(location.hash));
+    window.addEventListener("hashchange", (event) => {
+      const link = new URL(event.newURL).hash; // the address may have been written over since
+      if (this.told || link === this.hash()) return;
+      const values = this.fromAddress(link);
+      choose(this, chosenIn(link));
       this.put(values);
       this.redraw();
     });
@@ -120,9 +121,9 @@ export class Page {
     this.unsaid = setTimeout(() => (this.said.textContent = ""), SAID);
   }
 
-  /** Values of the address; what of it this rig cannot take is said. */
-  fromAddress() {
-    const { values, left } = this.rig.fromHash(location.hash), { notice } = this.banner, many = left.length - NAMED;
+  /** Values of the address, or of a link; what of it this rig cannot take is said. */
+  fromAddress(link = location.hash) {
+    const { values, left } = this.rig.fromHash(link), { notice } = this.banner, many = left.length - NAMED;
     if (this.differs.length) return values; // what is said of that is to stay
     notice.textContent = left.length ? `The link has what this rig cannot take; it is left out: ${left.slice(0, NAMED).join(", ")}${many > 0 ? `, and ${many} more` : ""}.` : "";
     return values;

@@ -33,18 +33,18 @@ OLDEST = Home(".venv-oldest", "pins-oldest.txt")
 
 # One route through each package that we stand on: numbers, formulas, kernels, figures, files, maps, fits, options.
 OLDEST_TESTS = (
-    "tests/test_closed_forms.py",
-    "tests/test_rig_files.py",
-    "tests/test_figures.py",
-    "tests/test_command_line.py::test_verdict_on_the_example",
-    "tests/test_command_line.py::test_require_stable",
-    "tests/test_command_line.py::test_bad_input_is_one_message_and_status_2",
-    "tests/test_command_line.py::test_simulate_runs_the_protocol_of_the_file",
-    "tests/test_fits.py::test_scipy_finds_the_same_minimum",
-    "tests/test_records.py::test_hdf5_matlab_and_parquet",
-    "tests/test_maps.py::test_a_map_holds_what_the_functions_give",
-    "tests/test_maps.py::test_samples_in_a_map",
-    "tests/test_maps.py::test_exports_hold_the_same",
+    "tests/linear/test_closed_forms.py",
+    "tests/files/test_rig_files.py",
+    "tests/figures/test_figures.py",
+    "tests/cli/test_command_line.py::test_verdict_on_the_example",
+    "tests/cli/test_command_line.py::test_require_stable",
+    "tests/cli/test_command_line.py::test_bad_input_is_one_message_and_status_2",
+    "tests/cli/test_command_line.py::test_simulate_runs_the_protocol_of_the_file",
+    "tests/experiments/test_fits.py::test_scipy_finds_the_same_minimum",
+    "tests/experiments/measured/test_records.py::test_hdf5_matlab_and_parquet",
+    "tests/maps/test_maps.py::test_a_map_holds_what_the_functions_give",
+    "tests/maps/test_maps.py::test_samples_in_a_map",
+    "tests/maps/test_maps.py::test_exports_hold_the_same",
 )
 # Old packages warn of what newer ones around them deprecate; only with pins.txt a warning is an error.
 OLDEST_OPTIONS = ("-o", "filterwarnings=default", "-p", "no:cacheprovider")

@@ -23,7 +23,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 MEMORY = 6 * 2**30  # of addresses: numba and LLVM map some gigabytes that they never touch
 RIG = ("analyze", "simulate", "cycles", "threshold")
 

@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 import steadyslip as ss
@@ -40,7 +40,7 @@ import users_laws
 from explored import Explored, ExploredMachine, MovedOnAPage, compared, differences, same_motion
 from fuzz_rigs import DRIVES, FRICTION
 from machines import at_random
-from moved import compiled_run, moved, slip_events
+from moved import compiled_run, motion_text, moved, slip_events
 from rigs_of_theory import CONTACTS
 from steadyslip.model.point import operating_point
 from steadyslip.model.scales import posed
@@ -272,7 +272,6 @@ def _twenty_cycles() -> float:
     from steadyslip.explorer.motion import driver, motion_part
     from steadyslip.kernels.printers import javascript
     from steadyslip.linear.boundary import present_zeros
-    from test_explorer import motion_text
 
     rig = ss.read_rig(EXAMPLES / "stick-slip.toml")
     text, facts = motion_part(rig, 0)

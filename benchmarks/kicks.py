@@ -25,7 +25,7 @@ import numpy as np
 
 import steadyslip as ss
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 from kicks_at_random import KINDS, Drawn, drawn, outcome_of
 from kicks_by_scipy import Reference, judged, simulated
 

@@ -16,10 +16,11 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / folder) for folder in ("helpers", "motion", "kernels")]
 
+from rigs_of_theory import quarter
 from test_motion import test_small_kicks_grow_as_the_eigenvalues_say as kicked
-from test_motion_oracle import quarter, test_kernels_follow_the_model as integrated
+from test_motion_oracle import test_kernels_follow_the_model as integrated
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.steady import steady_equation
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 SIZES = [10.0**d for e in (200, 150, 100, 50) for d in (e, -e)]
 MODULES: list[Any] = [{"asinh_exp": lambda x, y: mp.asinh(x * mp.exp(y))}, "mpmath"]
 _functions: dict[Any, Any] = {}

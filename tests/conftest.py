@@ -1,5 +1,9 @@
 """Random examples, which tests are slow, and how long each takes.
 
+Tests of a folder of src/steadyslip are in the folder of the same name here; those that go through several of them are
+in whole, those of documents, packaging and the code itself in house. What tests share is in helpers, with the oracles
+and the scripts that try random things without end; numbers found elsewhere are in reference.
+
 Fresh random examples on a developer's machine, fewer and the same ones every time in continuous integration. What
 ``-m "not slow"`` leaves out is listed in slow.txt: each test, and how many of its parameters come before.
 ``pytest --measure -n 0`` writes that list anew from CPU seconds, those of processes that were waited for included.

@@ -1,7 +1,7 @@
 """Elementary functions for kernels: free of branches and calls, so that lanes vectorise.
 
 Written for nodes of a program and for plain numbers alike. All but `rough_log` are within 5 units in the last place
-(exp 2.5, log 2), as tests/test_compiled.py measures.
+(exp 2.5, log 2), as tests/kernels/test_compiled.py measures.
 """
 
 from __future__ import annotations

@@ -1,0 +1,90 @@
+"""Pages of machines in a browser: the sentence, the bar of any parameter, motion of named contacts and bodies."""
+
+from pathlib import Path
+
+import pytest
+
+import steadyslip as ss
+from explored_pages import Visit
+
+MACHINES = Path(__file__).parents[3] / "examples" / "machines"
+
+
+@pytest.fixture(scope="module")
+def page_of_servo(tmp_path_factory):
+    path = tmp_path_factory.mktemp("machines") / "servo.html"
+    machine = ss.read_rig(MACHINES / "geared-servo.toml")
+    ss.explore(machine, title="servo").save(path)
+    return machine, path
+
+
+def test_a_page_of_a_machine_says_what_analyze_says(browser, page_of_servo):
+    machine, path = page_of_servo
+    analysis = ss.analyze(machine)
+    with Visit(browser, path) as visit:
+        assert visit.sentence() == "Unstable: steady sliding at 20 µm/s"
+        reason = visit.page.locator(".verdict p").first.inner_text()
+        assert reason.lower() == f"{analysis.reason}.".lower()
+        assert analysis.mode.words() in visit.page.locator(".mode").inner_text()
+        first = analysis.margins[0].parameter
+        assert first in visit.page.locator(".bar").get_attribute("aria-label"), "the bar begins with the nearest edge"
+        visit.page.get_by_label("parameter of the bar").select_option("drive.kp")
+        bar = visit.page.locator(".bar").get_attribute("aria-label")
+        assert "drive.kp" in bar
+        assert "above 436.2 kN/m" in bar
+        visit.page.get_by_label("parameter of the bar").select_option("contacts.mesh.friction.a")
+        assert "above 0.02108" in visit.page.locator(".bar").get_attribute("aria-label")
+        visit.type("drive.kp", "1 N/um")
+        assert visit.sentence().startswith("Stable")
+        visit.page.get_by_role("button", name="undo").click()
+        assert visit.sentence().startswith("Unstable")
+        assert visit.page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+
+
+def test_a_machine_is_disturbed_where_one_says_and_shown_by_name(browser, page_of_servo):
+    _, path = page_of_servo
+    with Visit(browser, path) as visit:
+        visit.told("slip events .*of mesh.*of guide")
+        visit.page.get_by_label("disturbance", exact=True).select_option("pull")
+        visit.page.get_by_label("where it acts").select_option("load")
+        visit.page.locator(".motion .hint", has_text="pull on load").wait_for()
+        visit.page.get_by_label("contact or body").select_option(label="body load")
+        assert "ahead" in visit.page.locator("svg.strips").get_attribute("aria-label")
+        bodies = visit.page.locator(".sketch .part")
+        before = [bodies.nth(i).get_attribute("transform") for i in range(bodies.count())]
+        visit.page.get_by_label("time", exact=True).fill("700")
+        after = [bodies.nth(i).get_attribute("transform") for i in range(bodies.count())]
+        assert len(before) == 2
+        assert before != after
+
+
+@pytest.mark.parametrize("changes", [
+    {"contacts.mesh.friction.mu_ref": "3", "contacts.mesh.contact.angle": "-80 deg"},
+    {"bodies.load.force": "400 N"},
+])  # fmt: skip
+def test_a_page_says_why_there_is_no_steady_sliding_as_analyze_does(browser, page_of_servo, changes):
+    machine, path = page_of_servo
+    found = ss.analyze(machine.with_values(changes))
+    assert found.stable is None
+    with Visit(browser, path) as visit:
+        for name, value in changes.items():
+            visit.type(name, value)
+        assert visit.sentence() == "No steady sliding at 20 µm/s"
+        said = visit.page.locator(".verdict p").first.inner_text().replace("−", "-").lower()
+        assert said == f"{found.reason}.".lower()
+
+
+def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
+    """The edge of what presses is 0 on the page as in Python, and its other side is a lift-off, not a lock-up."""
+    machine = ss.read_rig(MACHINES / "brake-pad.toml")
+    assert next(one for one in ss.analyze(machine).margins if one.parameter == "bodies.pad.press").edge.value == 0
+    ss.explore(machine).save(tmp_path / "pad.html")
+    with Visit(browser, tmp_path / "pad.html") as visit:
+        assert "bodies.pad.press → 0 N" in visit.page.locator(".edges button").all_text_contents()
+        edges = visit.page.locator(".edges li")
+        assert "bodies.pad.press → 0 N disc lifts off" in edges.all_text_contents()
+        push = visit.page.get_by_label("disturbance", exact=True).locator("option[value=push][disabled]")
+        push.wait_for(state="attached")  # through the dashpot of the arm it would be an infinite force
+        visit.type("bodies.pad.press", "-1 N")
+        edges.filter(has_text="bodies.pad.press").filter(has_text="slides steadily, but unstable").wait_for()
+        assert visit.page.locator(".verdict p").first.inner_text().startswith("Lift-off at contact disc.")

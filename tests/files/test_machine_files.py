@@ -1,0 +1,256 @@
+"""Machines in files: what is wrong with them, all at once; back and forth; units; what is not offered yet."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import steadyslip as ss
+from command import run
+from file_schema import file_schema
+from machines import brake, rate_state, surface, three_bodies, two_blocks, two_mass
+from steadyslip.core.quantities import shown
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
+AXIS = EXAMPLES[0].with_name("feed-axis.toml")
+TEXT = AXIS.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+def test_verdict_is_that_of_the_comment(path):
+    """One comment of each example reads '# Verdict: stable; stable for drive.kp above 1 N/m.' or the like."""
+    pattern = r"^# Verdict: (\w+); stable for (\S+) (above|below) (.+)\.$"
+    verdict, name, side, value = re.search(pattern, path.read_text("utf-8"), re.M).groups()
+    machine = ss.read_rig(path)
+    analysis = ss.analyze(machine)
+    assert verdict == {True: "stable", False: "unstable"}[analysis.stable]
+    assert analysis.warnings == ()
+    (edge,) = ss.boundary(machine, name)
+    assert edge.stable == side
+    assert shown(edge.value, edge.unit, area=machine.area_of(name)) == value
+    if "compliant" not in path.read_text("utf-8"):  # there the normal force depends on every stiffness
+        ((low, high),) = ss.stable_values(machine, name)
+        assert edge.value == (low if side == "above" else high)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+def test_examples_keep_to_the_schema_and_come_back_from_their_own_text(path):
+    file_schema().validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    machine = ss.read_rig(path)
+    text = ss.rig_to_text(machine)
+    assert ss.rig_from_text(text) == machine
+    file_schema().validate(tomllib.loads(text))
+
+
+@pytest.mark.parametrize(
+    "machine", [two_mass(), two_blocks(1.0, -0.1, 0.2), three_bodies(), brake(rate_state(1, 0, 1))]
+)
+def test_machines_made_in_python_come_back(machine):
+    assert ss.rig_from_text(ss.rig_to_text(machine)) == machine
+
+
+def test_forces_and_stresses_of_a_contact():
+    """Without an area a contact is in forces and a stress is refused; with one, text may be either."""
+    force = ss.read_rig(AXIS)
+    spread = ss.rig_from_text(TEXT.replace('body = "table"  ', 'area = "50 cm^2"\nbody = "table"  '))
+    text = TEXT.replace('body = "table"  ', 'area = "50 cm^2"\nbody = "table"  ').replace('"3 kN"', '"600 kPa"')
+    for other in (spread, ss.rig_from_text(text)):
+        assert other.value("preload") == pytest.approx(6e5)
+        assert ss.eigenvalues(other) == pytest.approx(ss.eigenvalues(force), rel=1e-9)
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(text.replace('"50 cm^2"', "0"))
+    assert [problem.name for problem in caught.value.problems] == ["contacts.guide.area"]
+    with pytest.raises(ss.RigFileError, match="wrong dimension; expected a quantity in N,"):
+        ss.rig_from_text(TEXT.replace('"3 kN"', '"600 kPa"'))
+    with pytest.raises(ss.RigFileError, match=r"expected a quantity in kg, for example '2 kg'$"):
+        ss.rig_from_text(TEXT.replace('"300 kg"', '"300 N"'))
+
+
+WRONG = """
+[bodies.motor]
+mass = "2 kg"
+[bodies.table]
+mass = "-5 kg"
+[bodies.stray]
+[links.screw]
+between = ["motor", "tabel"]
+stiffness = "100 N/m"
+[links.loop]
+between = ["motor", "motor"]
+stiffness = "1 N/m"
+[contacts.guide]
+body = "tble"
+[contacts.guide.friction]
+law = "rate-state"
+a = 0.01
+b = 0.02
+d_c = "1 um"
+mu_ref = 0.1
+v_ref = "1 um/s"
+[contacts.guide.contact]
+law = "constant"
+[drive]
+control = "pd"
+velocity = "1 um/s"
+body = "moter"
+kp = "1 N/m"
+"""
+
+
+def test_everything_that_is_wrong_with_a_file_comes_at_once():
+    with pytest.raises(ss.RigFileError) as caught:
+        ss.rig_from_text(WRONG)
+    found = {(p.name, p.line) for p in caught.value.problems}
+    assert found == {
+        ("bodies.table.mass", 5), ("links.screw.between", 8), ("links.loop.between", 11), ("contacts.guide.body", 14),
+        ("contacts.guide.contact.preload", 22), ("drive.body", 27), ("bodies.stray", 6),
+    }  # fmt: skip
+    text = str(caught.value)
+    for piece in (
+        "did you mean 'table'?",
+        "to itself",
+        "give preload or steady_normal_stress",
+        "did you mean 'motor'?",
+    ):
+        assert piece in text
+
+
+ROCK, BOTH = rate_state(1, 0, 1), ("motor", "table")
+STRUCTURE = {
+    "floats": (two_mass(), {"links": {"screw": ss.Spring(between=("motor", "table"), damping=1.0)}}, "bodies.table"),
+    "float": (two_mass(), {"bodies": {**two_mass().bodies, "stray": ss.SlidingBody()}}, "bodies.stray"),
+    "unknown body": (two_mass(), {"contacts": {"guide": surface("shelf", rate_state(1, 0, 1))}}, "contacts.guide.body"),
+    "cannot slide on itself": (
+        two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="table")}}, "contacts.g.against"),
+    "do not slide": (
+        two_mass(), {"contacts": {"g": surface("table", rate_state(1, 0, 1), against="motor")}}, "contacts.g"),
+    "write 'rotary-pd'": (
+        two_mass(), {"bodies": {"motor": ss.RotatingBody(), "table": ss.SlidingBody()}}, "drive.control"),
+    "does not; see the kinds of link": (
+        two_mass(), {"links": {"screw": ss.Screw(between=BOTH, lead=1.0, stiffness=1.0)}}, "links.screw.between"),
+    "does not move away from the surface": (
+        two_mass(), {"links": {"screw": ss.Spring(between=BOTH, stiffness=1.0, angle=0.1)}}, "links.screw"),
+    "unknown link 'belt'": (
+        two_mass(), {"contacts": {"g": surface("table", ROCK, loaded_by="belt")}}, "contacts.g.loaded_by"),
+    "needs a body that moves away": (
+        two_mass(), {"contacts": {"g": ss.Surface(body="table", friction=rate_state(1, 0, 1),
+                                                  contact=ss.Compliant(normal_stiffness=1.0))}}, "contacts.g.contact"),
+    "nothing carries it": (
+        brake(ROCK), {"contacts": {"disc": surface("pad", ROCK)},
+                      "links": {"arm": ss.Spring(between=("drive", "pad"), stiffness=1.0)}}, "bodies.pad"),
+    "slip is a radius": (
+        three_bodies(), {"contacts": {"g": surface("motor", rate_state(1, 0, 1))}}, "contacts.g.radius"),
+    "there are none": (two_mass(), {"contacts": {}}, "contacts"),
+    "stands still": (
+        two_mass(), {"bodies": {**two_mass().bodies, "post": ss.SlidingBody()},
+                     "links": {**two_mass().links, "bolt": ss.Spring(between=("ground", "post"), stiffness=1.0)},
+                     "drive": ss.PositionPD(velocity=1.0, body="motor", measured="post", kp=1.0)}, "drive.measured"),
+    "contradict each other": (
+        three_bodies(), {"links": {**three_bodies().links,
+                                   "second": ss.Screw(between=("motor", "head"), lead=0.4, stiffness=1.0)}}, "links"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", STRUCTURE)
+def test_a_machine_that_does_not_hang_together_says_where(words):
+    machine, changes, name = STRUCTURE[words]
+    fields = {key: getattr(machine, key) for key in ("bodies", "links", "contacts", "drive")} | changes
+    with pytest.raises(ss.ParameterError, match=re.escape(words)) as caught:
+        ss.Machine(**fields)
+    assert name in {problem.name for problem in caught.value.problems}
+
+
+def test_names_must_fit_into_dotted_names():
+    for name in ("a.b", "1st", "", "x" * 50):
+        with pytest.raises(ss.ParameterError, match="is no name"):
+            ss.Machine(bodies={name: ss.SlidingBody()}, contacts={}, drive=ss.Pull(velocity=1.0))
+    with pytest.raises(ss.ParameterError, match=r"bodies\.ground"):
+        ss.Machine(bodies={"ground": ss.SlidingBody()}, contacts={}, drive=ss.Pull(velocity=1.0))
+
+
+def test_a_sliders_contact_cannot_be_compliant():
+    with pytest.raises(ss.ParameterError, match="describe it as a machine"):
+        ss.Slider(
+            friction=rate_state(1, 0, 1),
+            contact=ss.Compliant(normal_stiffness=1.0),
+            stiffness=1.0,
+            drive=ss.Steady(1.0),
+        )
+
+
+def test_loops_that_contradict_each_other_are_refused_for_arrays_too():
+    machine = three_bodies()
+    closed = ss.Machine(
+        bodies=machine.bodies, contacts=machine.contacts, drive=machine.drive,
+        links={**machine.links, "second": ss.Screw(between=("motor", "head"), lead=0.5, stiffness=1.0)},
+    )  # fmt: skip
+    with pytest.raises(ss.ParameterError, match="contradict each other"):
+        ss.eigenvalues(closed, {"links.second.lead": [0.5, 0.6]})
+
+
+# --- the command line -------------------------------------------------------------------------------
+
+
+def test_analyze_from_the_command_line():
+    done = run("analyze", str(AXIS), "--set", "links.screw.stiffness='5 N/um'")
+    assert done.returncode == 0
+    assert "UNSTABLE" in done.stdout
+    assert "the mode" in done.stdout
+    data = json.loads(run("analyze", str(AXIS), "--json").stdout)
+    assert data["stable"] is True
+    assert data["steady"]["contacts"]["guide"]["normal_force"] == pytest.approx(3000.0)
+    assert data["mode"]["words"]
+    assert {row["unit"] for row in data["boundaries"] if row["parameter"] == "drive.kp"} == {"N m s/rad"}
+    assert run("analyze", str(AXIS), "--require-stable").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("links.belt.stiffness=1", "unknown parameter 'links.belt.stiffness'"),
+        ("bodies.table.mass='5 m'", "bodies.table.mass"),
+        ("stiffness=-1", "links.screw.stiffness"),
+    ],
+)
+def test_changes_that_are_wrong(change, said):
+    done = run("analyze", str(AXIS), "--set", change)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+COMMANDS = [("analyze", "--branch", "1")]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_what_machines_do_not_have_yet_is_refused_in_one_line(command, tmp_path):
+    done = run(command[0], str(AXIS), *command[1:], folder=tmp_path)
+    assert not list(tmp_path.iterdir())
+    assert done.returncode == 2
+    assert "machine" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr
+
+
+CALLS = [
+    lambda m: ss.critical_stiffness(m),
+    lambda m: ss.stable_stiffness(m), lambda m: ss.small_signal(m),
+    lambda m: ss.safety_factor(m),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("call", range(len(CALLS)))
+def test_functions_that_machines_do_not_have_yet(call):
+    with pytest.raises(ss.SteadyslipError, match=r"[Mm]achine"):
+        CALLS[call](two_mass())
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_results_of_machines_can_be_shown_in_notebooks_and_documents():
+    machine = two_mass()
+    for result in (machine, ss.analyze(machine), ss.steady_state(machine), ss.modes(machine)[0]):
+        assert "table" in result._repr_html_()
+        assert "table" in ss.report(result).html
+    assert "1 N<" in machine._repr_html_()  # a preload, not 1 Pa

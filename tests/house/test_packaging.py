@@ -1,0 +1,46 @@
+"""What is shipped: the source distribution holds every file that its own README names."""
+
+import re
+import subprocess
+import tarfile
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory):
+    from hatchling.builders.sdist import SdistBuilder
+
+    (path,) = SdistBuilder(str(ROOT)).build(directory=str(tmp_path_factory.mktemp("dist")), versions=["standard"])
+    with tarfile.open(path) as archive:
+        return {name.partition("/")[2] for name in archive.getnames()}
+
+
+def test_every_file_of_the_readme_is_shipped(shipped):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    named = {word.rstrip(".,;:)") for word in re.findall(r"[\w./-]+/[\w.-]+|\b[\w-]+\.(?:py|txt|toml|md)\b", text)}
+    files = {name for name in named if (ROOT / name).is_file()}
+    assert {"run.py", "examples/inclined-spring.toml"} <= files
+    assert files <= shipped
+
+
+def test_what_git_has_is_shipped(shipped):
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode:
+        pytest.skip("not a checkout")
+    assert {name for name in listed.stdout.splitlines() if not name.startswith(".")} <= shipped
+
+
+def test_oldest_pins_are_the_declared_floors():
+    about = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    floors = dict(word.split(">=") for word in about["dependencies"])
+    pins = dict(line.split("==") for line in (ROOT / "pins-oldest.txt").read_text().splitlines() if "==" in line)
+
+    def plain(version):
+        return re.sub(r"(\.0)+$", "", version)
+
+    assert {name: plain(pins.get(name, "missing")) for name in floors} == {n: plain(v) for n, v in floors.items()}

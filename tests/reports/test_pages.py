@@ -1,0 +1,475 @@
+"""Results as HTML: in notebooks all of them, as documents those that answer a question."""
+
+import dataclasses
+import hashlib
+import html
+import inspect
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import lab_records as lab
+import steadyslip as ss
+from command import run
+from fuzz_rigs import DRIVES, FRICTION
+from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
+from steadyslip.core.records import FrozenRecord
+from steadyslip.explorer.sketch import sketch
+from steadyslip.figures.inline import drawn
+from steadyslip.files.standalone import write_page
+from steadyslip.motion.commands import write_history
+from steadyslip.nonlinear.commands import Thresholds
+from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
+from steadyslip.reports.elements import math, table, typed
+from steadyslip.reports.results import LISTED, _told_apart, done_to
+from steadyslip.reports.rig import inputs
+
+MACHINES = Path(__file__).parents[2] / "examples" / "machines"
+VOID = {"br", "img", "meta", "hr", "input", "link"}
+OWN_RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
+
+
+class _Balanced(HTMLParser):
+    """Complains of elements that do not nest."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.words, self.quiet = [], [], 0
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if not {"script", "style", "pre", "svg"} & set(self.open):
+            self.words.append(data)
+
+
+def words(text):
+    """What a reader sees, elements checked on the way."""
+    return re.sub(r"\s+", " ", " ".join(_Balanced(text.replace("<wbr>", "")).words))
+
+
+# -- set as in print
+
+
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [("5 um", "5 µm"), ("3 um/s", "3 µm/s"), ("9 kg/m^2", "9 kg/m²"), ("sum of 2", "sum of 2"), ("-45 deg", "−45 deg"),
+     ("1e-05", "1 × 10⁻⁵"), ("-1.001e+05 1/s", "−1.001 × 10⁵ 1/s"), ("v=1e-05", "v=1e-05"),
+     ("run-1e-05.csv", "run-1e-05.csv"), ("6.928 us", "6.928 µs"), ("5 uN", "5 µN"), ("menus", "menus"),
+     ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
+)  # fmt: skip
+def test_words_are_set_as_in_print(text, printed):
+    assert typed(text) == printed
+
+
+def test_lines_of_names_and_words_become_tables():
+    found = rows_of("Head\n  velocity      1 um/s to 2 um/s\n                going on\nlast  a  b\nThe end")
+    assert words(found).strip() == "Head velocity 1 µm/s to 2 µm/s going on last a b The end"
+    assert found.count("<tr>") == 2
+    assert found.count("<p>") == 2
+
+
+def test_a_sentence_over_two_lines_is_one_paragraph():
+    text = (
+        "A head\nthe stiffness is so many times the critical stiffness, above which sliding is\nstable, it seems.\nmore"
+    )
+    assert rows_of(text).count("<p>") == 3
+    assert "above which sliding is stable, it seems." in rows_of(text)
+
+
+def test_formulas_need_no_script_and_no_entity():
+    text = math(ss.formula(OWN_RIG))
+    _Balanced(text)
+    assert not re.search("&[a-zA-Z]", text)
+    assert text.startswith('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"')
+
+
+def test_long_names_may_go_on_in_the_next_line():
+    text = table([("friction.normal_memory.alpha", "a"), ("0.0145", "b")])
+    assert "friction.<wbr>normal_<wbr>memory.<wbr>alpha" in text
+    assert "0.0145" in text
+
+
+def test_cells_are_words_unless_they_say_otherwise():
+    assert "&lt;i&gt;" in table([("<i>", "b")])
+
+
+# -- notebooks
+
+PUBLIC = [one for one in (getattr(ss, name) for name in dir(ss)) if inspect.isclass(one)]
+RESULTS = [
+    one for one in PUBLIC
+    if dataclasses.is_dataclass(one) and not issubclass(one, (Exception, FrozenRecord)) and one is not ss.Motion
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", RESULTS, ids=lambda kind: kind.__name__)
+def test_every_public_result_has_html_and_every_number_of_it_a_unit(kind):
+    assert hasattr(kind, "_repr_html_")
+    for one in dataclasses.fields(kind):
+        if re.search("float|ndarray|complex|Array", str(one.type)) and not one.name.startswith("_"):
+            known = UNITS.keys() | OWN | PLAIN | _NOT_SHOWN
+            assert one.name in known, f"{kind.__name__}.{one.name}: say in reports/brief.py which unit it has"
+
+
+@pytest.fixture(scope="module")
+def results():
+    analysis = ss.analyze(OWN_RIG)
+    run = ss.simulate(OWN_RIG, ss.VelocityStep(at=1.0, to=2 * V0), until=60.0)
+    return {
+        "rig": OWN_RIG, "law": OWN_RIG.friction, "protocol": run.protocol, "model": ss.build_model(OWN_RIG),
+        "analysis": analysis, "steady": analysis.steady, "margin": analysis.margins[0], "onset": analysis.onset,
+        "boundary": ss.boundary(OWN_RIG, "stiffness")[0], "response": ss.small_signal(OWN_RIG),
+        "history": run, "event": run.events[0], "slip": run.slip_events[0],
+        "ensemble": ss.simulate_many(OWN_RIG, {"stiffness": np.array([6e9, 5e10])}, until=2.0),
+    }  # fmt: skip
+
+
+SAID = {
+    "rig": "slider.stiffness 6 GPa/m", "law": "d_c", "protocol": "pieces.1.to 2 µm/s", "model": "quasistatic",
+    "analysis": "Unstable", "steady": "5 MPa", "margin": "absolute", "onset": "critical", "boundary": "GPa/m",
+    "response": "Pa s/m", "history": "slip events", "event": "velocity", "slip": "peak velocity", "ensemble": "v",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_results_show_themselves_in_notebooks(results, name):
+    shown = results[name]._repr_html_()
+    text = words(shown)
+    assert SAID[name].lower() in text.lower()
+    assert " um" not in text
+    assert "<script" not in shown
+    assert not re.search(r"""(?:src|href)=["'](?!data:|#)""", shown)
+    assert len(shown) < 150_000
+
+
+def test_pictures_and_formulas_are_there(results):
+    assert "<svg" in results["rig"]._repr_html_()
+    assert results["history"]._repr_html_().count('role="img"') == 1
+    assert results["model"]._repr_html_().count("<math") > 5
+
+
+def test_units_are_those_of_the_result(results):
+    assert unit_of(results["margin"], "absolute") == results["margin"].unit
+    assert unit_of(results["slip"], "stress_drop") == "Pa"
+    assert unit_of(results["boundary"], "value") == "Pa/m"
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_rigs_with_an_area_are_told_in_newtons():
+    text = words(brief(ss.analyze(rig(area=0.01, stiffness=6e9))))
+    assert "MN/m" in text
+    assert " GPa/m" not in text
+
+
+# -- documents
+
+
+@pytest.mark.parametrize("made", [inputs, brief])
+def test_inputs_are_in_the_units_of_the_rigs_file(made):
+    """With an area forces, masses and stiffnesses of all of it, in reports and in notebooks."""
+    words = re.sub("<[^>]+>", " ", made(ss.read_rig("examples/slow-axis.toml")))
+    assert all(f" {value} " in words for value in ("600 N", "8 kg", "50 N s/m", "600 kN/m", "2 kN s/m", "0.004 m²"))
+    assert not re.search(r"Pa\b|kg/m|normal stress", words)
+
+
+@pytest.mark.parametrize(("drive", "name"), [(ss.PD(V0, kp=9e9, kd=0.0), "PD"), (ss.PID(V0, kp=9e9, ki=1e8), "PID")])
+def test_sketches_name_the_controller_that_drives(drive, name):
+    assert f">{name}</text>" in sketch(rig(stiffness=None, drive=drive))
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_formulas_call_functions_what_people_know():
+    """What is computed so that it cannot overflow is read as asinh(x exp(y))."""
+    document = ss.report(ss.read_rig("examples/slow-axis.toml"), explorer=False).html
+    assert "asinh_exp" not in document
+    assert "arcsinh" in document
+    formula = document.partition("The critical stiffness of every rig")[2].partition("</math>")[0]
+    assert len(re.sub("<[^>]+>", "", formula)) < 200  # characters, those of the sentence with them
+
+
+def test_a_report_says_everything_about_a_rig():
+    analysis, found = ss.analyze(OWN_RIG), ss.report(OWN_RIG, title="A rig")
+    text = words(found.html)
+    for part in ("Unstable: steady sliding at 1 µm/s", "Will this rig slide steadily", "The rig", "slider.stiffness",
+                 "6 GPa/m", "How far is the edge?", "friction.b", "doubles in", "What to keep in mind", ss.__version__,
+                 hashlib.sha256(ss.rig_to_text(OWN_RIG).encode()).hexdigest()):  # fmt: skip
+        assert part in text, part
+    assert f"{analysis.critical_stiffness / 1e9:.4g} GPa/m" in text
+    assert " um" not in text
+    assert found.html.count("<figure>") == 4
+    assert found.html.count("<math") > 10
+    assert found.html.count('class="steadyslip-root"') == 1
+    assert len(found.html.encode()) <= 500_000
+
+
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize("path", ["examples/inclined-spring.toml", "examples/machines/brake-pad.toml"])
+def test_one_parameter_has_one_name_in_a_report(path):
+    """That of the file: inputs and edges call it the same."""
+    found = ss.read_rig(path)
+    said = set(re.findall(r"(?<![\w.])(?:[a-z]+\.)+[a-z_]+", words(ss.report(found, explorer=False).html)))
+    heads = {name.partition(".")[0] for name in found.parameters()}
+    names = {name for name in said if name.partition(".")[0] in heads and not name.endswith(".toml")}
+    assert len(names) > 5
+    assert [name for name in names if not any(f"{one}.".startswith(f"{name}.") for one in found.parameters())] == []
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_machine_has_a_report():
+    machine = ss.read_rig(MACHINES / "two-surfaces.toml")
+    analysis = ss.analyze(machine)
+    text = words(ss.report(machine).html)
+    for part in ("Will this machine slide steadily", "normal force", "The verdict", "How far is the edge?",
+                 ss.__version__,
+                 hashlib.sha256(ss.rig_to_text(machine).encode()).hexdigest(), *machine.contacts):  # fmt: skip
+        assert part in text, part
+    assert text.count(" 1/s ") == sum(s.imag >= 0 for s in analysis.eigenvalues)
+    assert "Explorer" not in text
+    assert words(ss.report(analysis).html).replace(" ", "").startswith(text.replace(" ", "")[:400])
+    within = words(ss.report(machine, tolerances={"drive.velocity": "5 %"}, explorer=False).html)
+    assert "growth rate" in within
+    assert "growth rate" not in text
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_the_command_reports_on_machines_and_explores_them(tmp_path):
+    answered = run("report", MACHINES / "brake-pad.toml", "-o", tmp_path / "report.html")
+    assert answered.returncode == 0, answered.stderr
+    own = (MACHINES / "brake-pad.toml").read_text(encoding="utf-8")
+    told = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert html.escape(own) in told  # its comments and units, and nothing rewritten
+    explored = run("explore", MACHINES / "brake-pad.toml", "-o", tmp_path / "page.html")
+    assert explored.returncode == 0, explored.stderr
+    assert "contacts.disc.contact.normal_stiffness" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_documents_are_called_by_their_kind_and_file(results, tmp_path):
+    for name, title in (("run", "Run"), ("press 4", "Run: press 4")):
+        write_page(results["history"], tmp_path / f"{name}.html", "Run", explorer=False)
+        assert f"<title>{title} – steadyslip</title>" in (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_documents_of_runs_and_maps_give_the_hash_of_their_file(results, tmp_path):
+    file = tmp_path / "press.toml"
+    file.write_bytes(b"# the file\n")
+    write_history(results["history"], tmp_path / "run.html", source=file)
+    assert hashlib.sha256(b"# the file\n").hexdigest() in (tmp_path / "run.html").read_text(encoding="utf-8")
+    assert "SHA-256 of press.toml" in (tmp_path / "run.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_documents_of_maps_begin_with_what_was_found(tmp_path):
+    settings = {"slider.stiffness": ss.Grid("5 GPa/m", "50 GPa/m", 5)}
+    found = ss.run_map(
+        ss.Map(rig(), settings, ["status", "safety_factor"]), tmp_path / "m.zarr", workers=1, progress=False
+    )
+    text = ss.report(found).html
+    stable = int(np.sum(np.linspace(5e9, 50e9, 5) > ss.critical_stiffness(rig())))
+    assert 0 < stable < 5
+    assert f"table at {20 * stable} %" in text.partition("<h1>")[2].partition("</h1>")[0]
+
+
+def test_what_was_done_to_a_rig_is_told_in_units_that_people_read():
+    plan = ss.Protocol.of([ss.VelocityStep(at=10.0, to=2e-6), ss.Hold(at=20.0, duration=7200.0)])
+    text = "".join(done_to(rig(), plan))
+    assert "at 10 s, to 2 µm/s" in text
+    assert "duration 2 h" in text
+    turning = ss.read_rig(MACHINES / "telescope.toml")
+    assert "to 0.05 rad/s" in "".join(done_to(turning, ss.Protocol.of([ss.VelocityStep(at=1.0, to=0.05)])))
+
+
+def test_lists_of_cycles_leave_out_what_reads_the_same():
+    rows = [("25 GPa/m", "17 s", "1 um/s", f"{i} Pa", "") for i in range(9)] + [
+        (f"{i} GPa/m", "", "", "", "") for i in range(60)
+    ]
+    found = _told_apart(rows)
+    assert len(found) <= LISTED
+    assert found[-1] == rows[-1]
+    assert sum(row[0] == "25 GPa/m" and row[1] == "17 s" for row in found) <= 1
+    assert _told_apart(rows[:1]) == rows[:1]
+
+
+def test_the_same_figure_is_the_same_text():
+    first, second = (drawn(lambda: Figure().add_subplot(), "an empty one") for _ in range(2))
+    assert first.startswith("<svg")
+    assert first == second
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_runs_have_documents(results):
+    found = ss.report(results["history"], explorer=False)
+    assert 'class="steadyslip-root"' not in found.html
+    text = words(found.html)
+    count = len(results["history"].slip_events)
+    assert f"{count} slip event{'' if count == 1 else 's'} in 1 min" in text or f"{count} slip event" in text
+    assert "velocity-step" in found.html
+    assert found.html.count("<figure>") == 3
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_run_without_disturbance_says_that_it_tells_nothing_of_stability():
+    run = ss.simulate(rig(), until=10.0)
+    assert run.undisturbed
+    assert "<h1>Undisturbed" in ss.report(run, explorer=False).html
+    pushed = ss.simulate(rig(), ss.VelocityStep(at=1.0, to=2e-6), until=10.0)
+    assert not pushed.undisturbed
+    assert "<h1>Undisturbed" not in ss.report(pushed, explorer=False).html
+
+
+def test_what_is_no_result_has_no_document():
+    with pytest.raises(ss.ParameterError, match="got int; allowed: a rig or a result"):
+        ss.report(3)
+    with pytest.raises(ss.ParameterError, match="got Onset, fit; allowed"):
+        ss.report(ss.hopf(OWN_RIG), fit=3)
+
+
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize("name", ["steady", "margin", "onset", "response", "event", "ensemble"])
+def test_results_without_a_document_of_their_own_show_what_notebooks_show(results, name):
+    document = ss.report(results[name], explorer=False).html
+    assert inside(results[name]) in document
+    assert words(document)
+    assert " um" not in words(document)
+
+
+@pytest.fixture(scope="module")
+def kicked():
+    own = OWN_RIG.with_values({"stiffness": 1.2e10, "radiation_damping": 0.0})
+    found = [ss.threshold(own, kick, precision=1e-3) for kick in ("velocity", "displacement")]
+    return own, found
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_thresholds_have_documents(kicked):
+    own, found = kicked
+    text = words(ss.report(Thresholds(own, tuple(found)), explorer=False).html)
+    for one in found:
+        assert re.sub("um", "µm", str(one).partition(": ")[2].partition(" (size")[0]) in text
+    single = words(ss.report(found[0], explorer=False).html)
+    assert "a velocity kick up to" in single
+    assert "displacement kick" not in single
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_threshold_says_in_its_headline_that_all_or_nothing_is_survived(kicked):
+    own, found = kicked
+    none = ss.threshold(own.with_values({"stiffness": 1e9}), "velocity")
+    assert "No kick is survived" in words(ss.report(none, explorer=False).html)
+    every = dataclasses.replace(found[0], size=np.inf, bracket=(25.0, np.inf), amount=np.inf)
+    assert "Every kick that was tried is survived" in words(ss.report(every, explorer=False).html)
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_basins_have_documents(kicked):
+    found = ss.basin(kicked[0], x=np.linspace(-1e-6, 1e-6, 5), v=np.geomspace(3e-7, 3e-6, 5), along="stiffness")
+    document = ss.report(found, explorer=False).html
+    assert f"{100 * found.share:.3g} % of the starting points return" in words(document)
+    assert document.count("<figure>") == 2
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_sensitivities_have_documents():
+    ranges = {"friction.a": (0.005, 0.009), "slider.stiffness": (1e9, 1e11)}
+    found = ss.sensitivity(OWN_RIG, ranges, "critical_stiffness", points=256)
+    text = words(ss.report(found, explorer=False).html)
+    assert "friction.a decides most about the critical stiffness" in text
+    assert "1 to 100 GPa/m" in text
+    assert f"{found.total['critical_stiffness'][0]:.3f}" in text
+
+
+@pytest.fixture(scope="module")
+def lab_results():
+    records = [lab.record(lab.rig(b=b), lab.STEP, seed=i) for i, b in enumerate((0.0145, 0.0150, 0.0140))]
+    fits = [ss.fit(lab.rig(), one, free=["a", "b", "d_c"]) for one in records]
+    draws = ss.bootstrap(fits[0], 16)
+    return {
+        "draws": draws, "prediction": ss.predict(lab.rig(), draws),
+        "population": ss.population(dict(zip("ABC", fits, strict=True)), count=200),
+        "comparison": ss.compare_laws(lab.rig(), records[0], ("slip", "aging")), "fit": fits[0],
+    }  # fmt: skip
+
+
+LAB = {
+    "draws": ("16 draws, bootstrap", "error of the draws", "friction.d_c"),
+    "prediction": ("How sure is that?", "probability"),
+    "population": ("Population of 3 experiments", "another experiment, 95 %", "with the others"),
+    "comparison": ("2 laws compared", "aging"),
+    "fit": ("Fit to synthetic", "How sure is that?", "16 draws, bootstrap"),
+}
+
+
+@pytest.mark.parametrize("name", LAB)
+def test_answers_of_records_have_documents(lab_results, name, request):
+    if name != "fit":  # whose pictures are the largest
+        request.getfixturevalue("unpainted")
+    options = {"draws": lab_results["draws"]} if name == "fit" else {}
+    document = ss.report(lab_results[name], explorer=False, **options).html
+    text = words(document)
+    for part in LAB[name]:
+        assert part in text, part
+    if name == "fit":
+        assert (
+            words(typed(f"friction.a {lab_results[name]['a'].shown()}, friction.b")) in text
+        )  # what it found, at once
+    shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
+    assert not re.search(r"\d um\b", shown)
+    assert len(document.encode()) <= 500_000
+
+
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(0, len(FRICTION) * len(CONTACTS), 37))
+@pytest.mark.campaign
+def test_reports_of_all_kinds_of_rigs_fit(number):
+    law, contact = FRICTION[number % len(FRICTION)], CONTACTS[number % len(CONTACTS)]
+    own = ss.Slider(friction=law, contact=contact, stiffness=9e9, mass=1e6 * (number % 2), drive=DRIVES[number % 3])
+    found = ss.report(own)
+    text = words(found.html)
+    assert "steady sliding at" in text.lower()
+    assert len(found.html.encode()) <= 500_000
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_the_command_writes_a_report(tmp_path):
+    ss.write_rig(OWN_RIG, tmp_path / "my rig.toml")
+    answered = run("report", tmp_path / "my rig.toml", "-o", tmp_path / "report.html", "--set", "stiffness=90 GPa/m")
+    assert answered.returncode == 0, answered.stderr
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<title>my rig – steadyslip</title>" in text
+    assert "Stable: steady sliding" in text
+    assert hashlib.sha256((tmp_path / "my rig.toml").read_bytes()).hexdigest() in text
+    assert "stiffness = 90000000000.0" in text  # not what the file says
+    refused = run("report", tmp_path / "my rig.toml", "-o", tmp_path / "report.pdf")
+    assert refused.returncode == 2
+    assert ".html" in refused.stderr
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_locked_rigs_have_reports_too():
+    text = words(ss.report(rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-1.0))).html)
+    assert "No steady sliding at 1 µm/s" in text
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_records_of_hostile_names_are_text():
+    record = lab.record(lab.rig(), lab.STEP)
+    hostile = dataclasses.replace(record, source="<script>alert(1)</script>")
+    shown = hostile._repr_html_()
+    assert "<script>alert" not in shown
+    assert "&lt;script&gt;alert" in shown

@@ -4,6 +4,7 @@ from . import figures as figures, testing as testing, units as units
 from .core.errors import (
     NoSteadySliding as NoSteadySliding,
     NotAvailable as NotAvailable,
+    NotKeptWarning as NotKeptWarning,
     OutOfRangeWarning as OutOfRangeWarning,
     ParameterError as ParameterError,
     QuantityError as QuantityError,

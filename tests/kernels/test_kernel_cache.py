@@ -1,10 +1,12 @@
 """Machine code that is kept: found again, made anew where anything is odd about it, named by all that it depends on."""
 
+import contextlib
 import os
 import pickle
 import stat
 import subprocess
 import sys
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import llvmlite.binding as llvm
@@ -123,8 +125,21 @@ def test_foreign_cache_is_not_opened(folder, monkeypatch, reason):
             os.mkfifo(file)
     opened = []
     monkeypatch.setattr(sealed, "unseal", lambda _, path, *__: opened.append(path) or memoryview(b""))
-    assert ask(8) == 8
-    assert not opened
+    with warned(f"chmod go-w {folder}" if reason == "folder" else "name another" if reason == "owner" else ""):
+        assert ask(8) == 8
+        assert not opened
+        build._Kept(folder / "another").read()
+
+
+@contextlib.contextmanager
+def warned(words):
+    """Something says once that nothing is kept, with these words; or without words nothing does."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        yield
+    assert [one.category for one in found] == [build.NotKeptWarning] * bool(words)
+    assert all(words in str(one.message) and "every start compiles" in str(one.message) for one in found)
+    assert "chmod" in words or not any("chmod" in str(one.message) for one in found)
 
 
 def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
@@ -187,12 +202,15 @@ def test_cache_that_cannot_be_written(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
     monkeypatch.setenv("STEADYSLIP_CACHE", str(blocked / "cache"))
-    assert ask(9) == 9
+    with warned("not a directory"):
+        assert ask(9) == 9
+        assert ask(10) == 10
     read_only = tmp_path / "read-only"
     read_only.mkdir()
     read_only.chmod(stat.S_IRUSR | stat.S_IXUSR)
     monkeypatch.setenv("STEADYSLIP_CACHE", str(read_only))
-    assert ask(9) == 9
+    with warned("" if os.access(read_only, os.W_OK) else "permission denied"):  # root may write anywhere
+        assert ask(9) == 9
     read_only.chmod(stat.S_IRWXU)
     monkeypatch.setenv("STEADYSLIP_CACHE", "")
     assert ask(9) == 9
@@ -203,6 +221,21 @@ def test_a_cache_in_the_own_home(tmp_path, monkeypatch):
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
     monkeypatch.setenv("STEADYSLIP_CACHE", "~/kernels")
     assert build.cache_folder() == tmp_path / "kernels"
+
+
+def test_the_command_line_says_in_one_line_that_nothing_is_kept(folder):
+    folder.mkdir(mode=0o777)
+    folder.chmod(0o777)
+    program = "from steadyslip.cli.ending import end; from tiny_kernel import ask; end(lambda: (ask(11), ask(12)))"
+    paths = [os.path.dirname(tiny_kernel.__file__), *sys.path]
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr.startswith("warning: machine code cannot be kept in")
+    assert done.stderr.count("\n") == 1
+    assert f"chmod go-w {folder}" in done.stderr
 
 
 @pytest.mark.parametrize("word", ["", "0", "no", "Off", "FALSE ", "1", "yes"])

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from io import TextIOWrapper
+from typing import Any
 
 import typer
 
@@ -22,7 +25,9 @@ def end(command: Callable[[], object]) -> None:
             stream.reconfigure(errors="replace")
     if sys.stdout is None:  # closed by who started this
         sys.exit(failed("there is no standard output to write the answer to", 2))
-    sys.exit(status_of(command))
+    with warnings.catch_warnings():
+        warnings.showwarning = partial(_show_warning, warnings.showwarning)
+        sys.exit(status_of(command))
 
 
 def status_of(command: Callable[[], object]) -> int:
@@ -59,6 +64,14 @@ def status_of(command: Callable[[], object]) -> int:
             70,
         )
     return _flushed(status)
+
+
+def _show_warning(otherwise: Callable[..., None], message: Warning | str, kind: type[Warning], *where: Any) -> None:
+    """Warnings of ours in one line, without where in the program they arose."""
+    if kind.__module__.startswith("steadyslip."):
+        failed(str(message), 0, "warning")
+    else:
+        otherwise(message, kind, *where)
 
 
 def _system_fault(error: OSError) -> str:

@@ -136,6 +136,10 @@ class OutOfRangeWarning(UserWarning):
     """Some rigs of an array have no answer: their numbers leave the range of floating point."""
 
 
+class NotKeptWarning(UserWarning):
+    """Machine code cannot be kept, so that every process compiles it anew."""
+
+
 class InternalError(SteadyslipError, RuntimeError):
     """Something that holds by the program's own design does not: a fault of ours, not of the input."""
 

@@ -6,28 +6,31 @@ text, or of what it is made of, of all versions that matter and of the processor
 temporary name and moved into place. It is opened only if it and its folder are this user's and nobody else can write to
 them, and if its seal (`steadyslip.files.sealed`) says that it is of this very function. Anything odd about it (damaged,
 of another function, foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder
-that cannot be written to means that nothing is kept. ``STEADYSLIP_CACHE`` names another folder; empty, none. With
+that cannot be written to means that nothing is kept. Of a folder in which nothing can be kept a warning tells, once.
+``STEADYSLIP_CACHE`` names another folder; empty, none. With
 ``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs it all.
 """
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import hashlib
+import multiprocessing
 import os
+import shlex
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cache, cached_property, lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
 import numpy as np
 
-from steadyslip.core.errors import NotAvailable
+from steadyslip.core.errors import NotAvailable, NotKeptWarning
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 from steadyslip.kernels import linking
@@ -165,7 +168,8 @@ class _Kept:
         if self.path is None:
             return None
         try:
-            if not is_private(self.path.parent.stat()):
+            if not is_private(folder := self.path.parent.stat()):
+                _warn_of(self.path.parent, "others may write to it, so that no code found there is run", folder.st_uid)
                 return None
             return bytes(read_sealed(self.path, KERNEL, self.path.name, private=True))
         except (OSError, NotAvailable):
@@ -175,11 +179,35 @@ class _Kept:
         """Write the file, or do without."""
         if self.path is None:
             return
-        with contextlib.suppress(OSError, NotAvailable):
+        try:
             self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             if "STEADYSLIP_CACHE" not in os.environ:
                 self.path.parent.chmod(0o700)  # earlier versions left it to the umask
             write_sealed(self.path, content, KERNEL, self.path.name, private=True)
+        except OSError as error:
+            _warn_of(self.path.parent, _reason(error))
+        except NotAvailable as error:
+            if isinstance(error.__cause__, OSError):
+                _warn_of(self.path.parent, _reason(error.__cause__))
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
+
+
+@cache
+def _warn_of(folder: Path, why: str, owner: int = -1) -> None:
+    """Say once why nothing is kept in a folder, and what to do; of several processes the first one says it."""
+    if multiprocessing.parent_process() is not None:
+        return
+    mend = ""
+    if owner >= 0 and owner == os.getuid():
+        mend = f"take that right from them (chmod go-w {shlex.quote(str(folder))}), or "
+    warnings.warn(
+        f"machine code cannot be kept in {str(folder)!r} ({why}): every start compiles it anew, which takes seconds; "
+        f"{mend}name another folder in STEADYSLIP_CACHE (an empty name: keep none, and say nothing)",
+        NotKeptWarning, stacklevel=2,
+    )  # fmt: skip
 
 
 def _file(key: str, name: str) -> _Kept:

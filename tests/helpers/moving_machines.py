@@ -8,7 +8,7 @@ import steadyslip as ss
 from machines import rate_state, surface
 from steadyslip.model.point import operating_point
 from steadyslip.model.reducing import reduce_model
-from steadyslip.model.reduction import SLOPES, TIME, P, Q
+from steadyslip.model.reduction import TIME
 from steadyslip.model.scales import eliminable
 
 TIMES = np.linspace(0.0, 20.0, 201)
@@ -60,7 +60,7 @@ def slopes_of_motion(machine):
     """Jacobian of the rates of motion in steady sliding, and the rates there."""
     point = operating_point(machine)
     model, reduction = point.model, reduce_model(point.model, eliminable(point))
-    at = dict(model.steady) | dict.fromkeys((P, Q, TIME, *SLOPES[:3]), sp.Integer(0))
+    at = dict(model.steady) | dict.fromkeys((*reduction.channels[1:], TIME, *reduction.slopes), sp.Integer(0))
     for one in reduction.slidings:
         if one.variable is not None:
             at[one.variable.w] = one.variable.w_of_v.xreplace(model.steady)

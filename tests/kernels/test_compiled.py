@@ -260,11 +260,11 @@ def test_a_plain_program_is_readable():
 
 
 def test_no_two_quantities_of_a_record_share_a_place():
-    layout = make_layout(lanes=1, size=3, kept=4, constants=5, harmonics=2, stages=7, seen=2, own=3, events=8,
+    layout = make_layout(lanes=1, size=3, kept=4, constants=5, inputs=4, harmonics=2, stages=7, seen=2, own=3, events=8,
                          massless=3, unknowns=2, contacts=2)  # fmt: skip
-    places = [(row, 1) for row in Row if row not in (Row.INPUT, Row.SLOPE)] + [(Row.INPUT, 3), (Row.SLOPE, 3)]
-    places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 6)]
-    places += [(layout.omega, 6), (layout.phase, 6), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
+    places = [*((row, 1) for row in Row), (layout.level, 4), (layout.slope, 4)]
+    places += [(layout.state, 3), (layout.rate, 3), (layout.continuous, 4), (layout.atol, 3), (layout.amplitude, 8)]
+    places += [(layout.omega, 8), (layout.phase, 8), (layout.constant, 5), (layout.old, 3), (layout.stage, 21)]
     places += [(layout.seen, 2), (layout.before, 3), (layout.mark, 8), (layout.happened, 8), (layout.counted, 16)]
     places += [
         (layout.guess, 2),

@@ -160,8 +160,8 @@ def odd(a, n):
 def test_transpiled_functions_do_what_they_do_in_python(monkeypatch):
     known = {"math": math, "SMALL": 1e-7}
     exec(ODD, known)
-    text = module_text("steadyslip.kernels.layout", ODD.replace("SMALL", "INPUTS"), {"odd"})
-    known["SMALL"] = 3  # INPUTS of that module
+    text = module_text("steadyslip.kernels.layout", ODD.replace("SMALL", "GROUP"), {"odd"})
+    known["SMALL"] = 8  # GROUP of that module
     script = Script(javascript.as_script(javascript.runtime(), text))
     rng = np.random.default_rng(5)
     for n in (1, 2, 6, 9):

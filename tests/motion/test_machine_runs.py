@@ -100,10 +100,6 @@ def test_runs_of_machines_in_files(tmp_path):
     [
         ([ss.DisturbanceStep(at=1, by=1.0)], "pieces.1.on: missing; name the body that disturbance-step acts on"),
         ([ss.NormalStressStep(at=1, by=1.0, on="belt")], "unknown contact 'belt'"),
-        (
-            [ss.DisturbanceStep(at=1, by=1.0, on="front"), ss.DisturbanceStep(at=2, by=1.0, on="back")],
-            "allowed: one body a run",
-        ),
         ([ss.DisplacementStep(at=1, by=1.0)], "a displacement step through a dashpot"),
     ],
 )

@@ -80,7 +80,7 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
         raise NotAvailable(f"the motion of the {what} is ill-posed")
     eliminate = eliminable(point)
     named = isinstance(rig, Machine)
-    reduction = reduce_model(point.model, eliminate, *((EVERYWHERE, EVERYWHERE) if named else ()))
+    reduction = reduce_model(point.model, eliminate, *(((EVERYWHERE,), (EVERYWHERE,)) if named else ()))
     kernel = Kernel(reduction, Choice(automatic_method(reduction, OPTIONS.rtol), "constant", 0, 1, True))
     kernel_text = javascript.machine(kernel.programs, kernel.layout)
     model, shares = point.model, Shares.of(rig, point.model)

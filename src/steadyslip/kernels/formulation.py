@@ -17,14 +17,11 @@ from steadyslip.kernels.methods import METHODS, Method
 from steadyslip.kernels.nodes import Value
 from steadyslip.kernels.rosenbrock import Pattern
 from steadyslip.kernels.source import Constants, Formulas
-from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, Reduction
+from steadyslip.model.reduction import TIME, V_LP, Reduction
 from steadyslip.model.unknowns import Unknowns
 
-CHANNELS = ("v", "q", "p")
 LEVELS = ("constant", "linear", "harmonic")
 OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
-_SLOPE_NAMES = {s: f"slope_{c}" for s, c in zip(SLOPES[:3], CHANNELS, strict=True)}
-_INPUT_NAMES = {s: f"in_{c}" for s, c in zip(INPUTS[:3], CHANNELS, strict=True)} | {TIME: "time"}
 
 
 @dataclass(frozen=True)
@@ -69,9 +66,9 @@ class Formulation:
         self.reduction, self.choice = reduction, choice
         self.method: Method = METHODS[choice.method]()
         self.size = self.counted = len(reduction.state)  # how many errors are averaged
-        self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | _INPUT_NAMES | _SLOPE_NAMES
+        self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | self._inputs
         own = (one.variable.w for one in reduction.slidings if one.variable is not None)
-        variables = {*reduction.state, *reduction.continuous, *INPUTS, *SLOPES[:3], *own}
+        variables = {*reduction.state, *reduction.continuous, *self._inputs, *own}
         self.unknowns = len(reduction.unknowns)
         self.names |= {symbol: f"z{k}" for k, symbol in enumerate(reduction.unknowns)}
         variables.update(reduction.unknowns)
@@ -82,10 +79,16 @@ class Formulation:
         self._write()
         self.layout = self._made_layout()
 
+    @property
+    def _inputs(self) -> dict[sp.Symbol, str]:
+        """Channels, their slopes and time by what programs call them."""
+        channels = {s: f"in{i}" for i, s in enumerate(self.reduction.channels)}
+        return channels | {s: f"slope{i}" for i, s in enumerate(self.reduction.slopes)} | {TIME: "time"}
+
     def _fixed(self, expression: sp.Expr) -> sp.Expr:
         """Lifted; slopes vanish where inputs are constant."""
         if self.choice.level == "constant":
-            expression = expression.xreplace(dict.fromkeys(SLOPES[:3], sp.Integer(0)))
+            expression = expression.xreplace(dict.fromkeys(self.reduction.slopes, sp.Integer(0)))
         return self.constants.lifted(expression)
 
     def _answers_to_constants(self) -> dict[int, sp.Expr]:
@@ -159,7 +162,7 @@ class Formulation:
                 entries += [self._fixed(e) for e in reduction.time_derivative()]
             self.jacobian = self._formulas(entries)
         self._write_velocity()
-        known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | _INPUT_NAMES | _SLOPE_NAMES
+        known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | self._inputs
         known |= {w: f"w{k}" for k, (w, _) in enumerate(reduction.restarts)}
         balances = [balance for _, balance in reduction.restarts]
         balances += [derivative(balance, w) for balance in balances for w, _ in reduction.restarts]
@@ -190,7 +193,7 @@ class Formulation:
         if own is None:
             raise InternalError("a single contact has its own velocity variable")
         inverse = own.w_of_v
-        variables = {*reduction.state, *reduction.continuous, *INPUTS, *reduction.unknowns}
+        variables = {*reduction.state, *reduction.continuous, *reduction.inputs, *reduction.unknowns}
         alone = speed.free_symbols & variables == {own.w} and not inverse.free_symbols & variables
         if own.w not in reduction.state:
             return
@@ -213,6 +216,7 @@ class Formulation:
             size=self.size,
             kept=len(reduction.continuous),
             constants=len(self.constants.all),
+            inputs=len(reduction.channels),
             harmonics=choice.harmonics,
             stages=self.method.stages if choice.dense else 0,
             terms=self.terms,

@@ -82,8 +82,7 @@ class Kernel(Formulation):
             first, (ratio, share, _) = outputs_at(self.layout, c), record.shares(c)
             for i in range(each):
                 program.store(first + i, seen[each * c + i], "y")
-            program.store(first + Out.V_LP, times(point["in_v"], ratio), "y")
-            program.store(first + Out.Q, point["in_q"], "y")
+            program.store(first + Out.V_LP, times(point["in0"], ratio), "y")
             program.store(first + Out.ADVANCE, times(advance, ratio), "y")
             place = found[len(seen) + len(self.reduction.further) + c] + times(moved, ratio) + times(advance, ratio)
             program.store(first + Out.PLACE, place, "y")

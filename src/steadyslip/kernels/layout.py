@@ -29,35 +29,33 @@ class Row(IntEnum):
     START, STOP, SEGMENT = 8, 9, 10
     """Start and end of the segment since the start of the run, and its number."""
     RTOL = 11
-    INPUT, SLOPE = 12, 15
-    """v_lp, q and p at the start of the segment and their slopes: three each."""
-    ACTIVE, FLAG, GOOD = 18, 19, 20
+    ACTIVE, FLAG, GOOD = 12, 13, 14
     """Whether there is a job, whether it needs the driver, whether the last step was accepted."""
-    ACCEPTED, REJECTED, FAILURES, ERROR = 21, 22, 23, 24
-    MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 25, 26, 27, 28, 29, 30
-    NEXT, TAKEN = 31, 32
+    ACCEPTED, REJECTED, FAILURES, ERROR = 15, 16, 17, 18
+    MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 19, 20, 21, 22, 23, 24
+    NEXT, TAKEN = 25, 26
     """How far into the segment the next sample is, and its number."""
-    V_DRIVE, LOG = 33, 34
+    V_DRIVE, LOG = 27, 28
     """Velocity of the drive, and whether there is a log."""
-    DONE, TAU_OLD, W_RATE_OLD = 35, 36, 37
+    DONE, TAU_OLD, W_RATE_OLD = 29, 30, 31
     """Length of the last step, where it began, and the rate of the velocity variable there."""
-    EXTENDED = 38
+    EXTENDED = 32
     """Whether the dense output of the last step is there."""
-    HAPPENED = 39
+    HAPPENED = 33
     """How many events the last step has."""
-    W_LIMIT, W_LP = 40, 41
+    W_LIMIT, W_LP = 34, 35
     """Velocity variable above which the block slips and that of the load point, while inputs are constant."""
     # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
-    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 42, 43, 44
-    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 45, 46, 47, 48, 49, 50
-    LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 51, 52, 53
-    PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 54, 55, 56
+    EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 36, 37, 38
+    EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 39, 40, 41, 42, 43, 44
+    LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47
+    PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 48, 49, 50
     # slip that may become a slip event: since when, and what was there
-    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 57, 58, 59, 60
-    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 61, 62, 63, 64, 65, 66
-    Z_OLD = 67
+    NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 51, 52, 53, 54
+    NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 55, 56, 57, 58, 59, 60
+    Z_OLD = 61
     """The first unknown of the balances at the start of the last step."""
-    H_OLD = 68
+    H_OLD = 62
     """Length of the last step that was accepted."""
 
 
@@ -65,7 +63,6 @@ TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
 """Numbers from `Row.EVENTS` to `Row.NOW_SEGMENT`, of the first contact; those of others have a group of their own."""
 
 
-INPUTS = 3
 MOST_FAILURES = 400.0
 """Steps in a row that may be in vain. A block with mass that is stopped falls by hundreds of decades in a moment: so
 much shorter may the step have to be than the one before."""
@@ -76,13 +73,13 @@ SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, a
 class Out(IntEnum):
     """Places of the outputs, counted from the end of the state."""
 
-    V, ACCELERATION, SIGMA, TAU, T, V_LP, Q, ADVANCE, W_SLOPE, UNKNOWN, PLACE, SHARE, COUNT = range(13)
-    """V_LP is the velocity of the load point as the contact feels it, Q the disturbance, ADVANCE the way of the load
-    point since the start of the segment. W_SLOPE is the slope of the dense output of the velocity variable and UNKNOWN
-    a guess of the first unknown of the balances: outputs need both. PLACE is the distance slipped since the start of
-    the run, SHARE the slip rate in steady sliding over that of the first contact. Further contacts follow, COUNT
-    numbers each, then events, what else is observed, and guesses of further unknowns. What `observe` gives of a contact
-    ends with ADVANCE."""
+    V, ACCELERATION, SIGMA, TAU, T, V_LP, ADVANCE, W_SLOPE, UNKNOWN, PLACE, SHARE, COUNT = range(12)
+    """V_LP is the velocity of the load point as the contact feels it, ADVANCE the way of the load point since the start
+    of the segment. W_SLOPE is the slope of the dense output of the velocity variable and UNKNOWN a guess of the first
+    unknown of the balances: outputs need both. PLACE is the distance slipped since the start of the run, SHARE the
+    slip rate in steady sliding over that of the first contact. Further contacts follow, COUNT numbers each, then
+    events, what else is observed, and guesses of further unknowns. What `observe` gives of a contact ends with
+    ADVANCE."""
 
 
 class Setting(IntEnum):
@@ -158,7 +155,10 @@ class Layout(NamedTuple):
     kept: int
     """Number of variables that jumps leave alone."""
     constants: int
+    inputs: int
+    """Channels of what is done to the rig: velocity of the load point, pushes, normal stresses."""
     harmonics: int
+    """Sine waves of each."""
     stages: int
     """That are kept for dense output; none without."""
     extra: int
@@ -187,6 +187,10 @@ class Layout(NamedTuple):
     rate: int
     continuous: int
     atol: int
+    level: int
+    """Inputs at the start of the segment,"""
+    slope: int
+    """their slopes, and their waves."""
     amplitude: int
     omega: int
     phase: int
@@ -219,16 +223,17 @@ class Layout(NamedTuple):
 
 
 def make_layout(
-    *, lanes: int, size: int, kept: int, constants: int, harmonics: int = 0, stages: int = 0, terms: int = 0,
-    massless: int = 0, unknowns: int = 0, solved: bool = False, w: int = -1, own: int = 0, directions: int = 0,
-    x: int = 0, seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False, contacts: int = 1,
-    further: int = 0,
+    *, lanes: int, size: int, kept: int, constants: int, inputs: int, harmonics: int = 0, stages: int = 0,
+    terms: int = 0, massless: int = 0, unknowns: int = 0, solved: bool = False, w: int = -1, own: int = 0,
+    directions: int = 0, x: int = 0, seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False,
+    contacts: int = 1, further: int = 0,
 ) -> Layout:  # fmt: skip
     """Put the groups one behind the other."""
-    waves, further_ones = INPUTS * harmonics, max(massless, unknowns, 1) - 1
+    waves, further_ones = inputs * harmonics, max(massless, unknowns, 1) - 1
     sizes = {
-        "state": size, "rate": size, "continuous": kept, "atol": size, "amplitude": waves, "omega": waves,
-        "phase": waves, "constant": constants, "old": size if stages else 0, "stage": size * stages,
+        "state": size, "rate": size, "continuous": kept, "atol": size, "level": inputs, "slope": inputs,
+        "amplitude": waves, "omega": waves, "phase": waves,
+        "constant": constants, "old": size if stages else 0, "stage": size * stages,
         "curve": size * terms if stages else 0,
         "mark": events, "happened": events, "counted": 2 * events, "seen": seen,
         "before": own if seen else 0,
@@ -241,7 +246,7 @@ def make_layout(
         places[name] = position
         position += count
     return Layout(
-        lanes=lanes, size=size, kept=kept, constants=constants, harmonics=harmonics, stages=stages,
+        lanes=lanes, size=size, kept=kept, constants=constants, inputs=inputs, harmonics=harmonics, stages=stages,
         massless=massless, unknowns=unknowns, solved=int(solved), w=w, own=own, directions=directions, x=x,
         events=events, watched=int(watched), extra=int(extra), contacts=contacts, further=further, rows=position,
         **places,

@@ -60,6 +60,7 @@ class LockstepKernel(Formulation):
             size=self.size,
             kept=0,
             constants=len(self.constants.all),
+            inputs=len(self.reduction.channels),
             stages=self.method.stages,
             terms=self.terms,
             extra=self.method.all_stages > self.method.stages,

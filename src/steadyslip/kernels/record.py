@@ -10,7 +10,7 @@ from typing import Any
 
 from steadyslip.kernels.driver.places import earlier_at, guess_at, scale_at
 from steadyslip.kernels.events import EVENTS
-from steadyslip.kernels.formulation import CHANNELS, OUTPUTS, Formulation
+from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Row
 from steadyslip.kernels.newton import solved
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, primitive, weighted
@@ -101,11 +101,12 @@ class Evaluator:
     def inputs(self, moment: Value) -> Values:
         """Inputs and their slopes at a local time of the segment."""
         load, found, constant = self.program.load, {}, self.kernel.choice.level == "constant"
-        for i, c in enumerate(CHANNELS):
-            value, slope, waves = load(Row.INPUT + i), load(Row.SLOPE + i), self._waves(i)
-            found[f"in_{c}"] = value if constant else level_at(moment, value, slope, waves, sine)
+        layout = self.kernel.layout
+        for i in range(layout.inputs):
+            value, slope, waves = load(layout.level + i), load(layout.slope + i), self._waves(i)
+            found[f"in{i}"] = value if constant else level_at(moment, value, slope, waves, sine)
             if not constant:
-                found[f"slope_{c}"] = slope_at(moment, slope, waves, cosine)
+                found[f"slope{i}"] = slope_at(moment, slope, waves, cosine)
         if self.kernel.reduction.model.imposed:
             found["time"] = load(Row.START) + moment
         return found
@@ -118,8 +119,8 @@ class Evaluator:
 
     def load_advance(self, moment: Value) -> Value:
         """How far the load point has moved since the start of the segment."""
-        load = self.program.load
-        moved: Value = integral_to(moment, load(Row.INPUT), load(Row.SLOPE), self._waves(0), cosine)
+        load, layout = self.program.load, self.kernel.layout
+        moved: Value = integral_to(moment, load(layout.level), load(layout.slope), self._waves(0), cosine)
         return moved
 
     def state(self) -> list[Node]:
@@ -219,7 +220,7 @@ class Evaluator:
         v, acceleration, sigma = found[:3]
         ratio, share, pressed = self.shares(contact)
         limits = {
-            "v_lp": times(point["in_v"], ratio),
+            "v_lp": times(point["in0"], ratio),
             "v_low": times(self.program.load(Row.V_LOW), share),
             "sigma_low": times(self.program.load(Row.SIGMA_LOW), pressed),
         }

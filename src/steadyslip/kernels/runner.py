@@ -81,8 +81,12 @@ def _constants(point: OperatingPoint, machine: Runner) -> np.ndarray:
 
 @question
 def runner(
-    model: Model, choice: Choice, eliminate: int | tuple[int | None, ...] | None = 0, push: str = "", press: str = ""
+    model: Model,
+    choice: Choice,
+    eliminate: int | tuple[int | None, ...] | None = 0,
+    pushes: tuple[str, ...] = (),
+    presses: tuple[str, ...] = (),
 ) -> Runner:
     """The kernel of a model; made once per process."""
-    reduction = reduce_model(model, eliminate, push, press)
+    reduction = reduce_model(model, eliminate, pushes, presses)
     return Runner(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Runner(reduction, choice)

@@ -77,7 +77,7 @@ class Watch(Evaluator):
         start, stop = program.load(Row.START), program.load(Row.STOP)
         self.time = select(self.tau < program.load(Row.END), smaller(start + self.tau, stop), stop)
         point = self.inputs(self.tau) | {f"y{i}": y for i, y in enumerate(self.there)}
-        self.v, self.v_lp = self.speed(self.constants | point)[0], point["in_v"]
+        self.v, self.v_lp = self.speed(self.constants | point)[0], point["in0"]
         self.stress = kernel.outputs(self.constants | point)[Out.T]
         self.place = self.there[kernel.layout.x] + program.load(Row.LOAD_MOVED) + self.load_advance(self.tau)
 

@@ -30,7 +30,7 @@ from steadyslip.core.questions import question
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.kinematics import in_variables, kinematics, solved_in_turn, solved_together
-from steadyslip.model.reduction import INPUTS, SLOPES, TIME, V_LP, P, Q, Reduction, Sliding
+from steadyslip.model.reduction import TIME, V_LP, Reduction, Sliding, channels_for, slope_of
 
 Row = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
@@ -44,7 +44,10 @@ STANDSTILL = -200
 
 @question
 def reduce_model(
-    model: Model, eliminate: int | tuple[int | None, ...] | None = 0, push: str = "", press: str = ""
+    model: Model,
+    eliminate: int | tuple[int | None, ...] | None = 0,
+    pushes: tuple[str, ...] = (),
+    presses: tuple[str, ...] = (),
 ) -> Reduction:
     """Choose the variables of a model and write their rates.
 
@@ -55,10 +58,10 @@ def reduce_model(
         Index of the memory variable, among those of its contact, that follows from the balance, where the form
         *eliminated* is possible, for all contacts or each; None forbids that form (the variable's weight in friction is
         zero or tiny).
-    push, press : str, optional
-        The coordinate that disturbances push, and the contact at which they press; where there is but one, that; or
-        `EVERYWHERE`, with shares that are constants. The former may be `steadyslip.machine.mechanism.LOAD_POINT`, the
-        latter the contact's name with `PORES` behind it.
+    pushes, presses : tuple of str, optional
+        The coordinates that disturbances push, and the contacts at which they press, a channel each; where there is but
+        one of them, that; or `EVERYWHERE`, with shares that are constants. One that is pushed may be
+        `steadyslip.machine.mechanism.LOAD_POINT`; one that is pressed, a contact's name with `PORES` behind it.
 
     Raises
     ------
@@ -66,23 +69,24 @@ def reduce_model(
         If the motion cannot be brought into this form.
     """
     each = eliminate if isinstance(eliminate, tuple) else (eliminate,) * len(model.contacts)
-    return _Reducing(model, push, press).reduction(each)
+    return _Reducing(model, pushes, presses).reduction(each)
 
 
 @question
 def can_eliminate(model: Model, index: int, which: int) -> bool:
     """Whether a memory variable of a contact follows from the balance of forces there."""
-    return _Reducing(model, "", "").victim(index, which) is not None
+    return _Reducing(model, (), ()).victim(index, which) is not None
 
 
 class _Reducing:
     """One pass from a Model to its Reduction."""
 
-    def __init__(self, model: Model, push: str, press: str) -> None:
+    def __init__(self, model: Model, pushes: tuple[str, ...], presses: tuple[str, ...]) -> None:
         if model.delays:
             raise NotAvailable("motion with a delay is not offered; its verdict is: analyze, stable_values, boundary")
         self.model, self.moving = model, kinematics(model)
-        self.given = _inputs(model, push, press)
+        self.channels = channels_for(len(pushes), len(presses))
+        self.given = _inputs(model, self.channels, pushes, presses)
         self.memory = tuple(item.symbol for item in (*model.memory, *model.states))
         self.integrals = tuple(item.symbol for item in model.integrals)
         owner = {s.symbol: contact for contact in model.contacts for s in (*contact.memory, *contact.own_states)}
@@ -157,7 +161,7 @@ class _Reducing:
         place = found[one.displacement]
         drift = self.rates[one.displacement].xreplace({one.velocity: sp.Integer(0)})
         terms = [derivative(place, s) * rate for s, rate in self.rates.items() if s is not one.displacement]
-        terms += [derivative(place, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
+        terms += self._in_time(place)
         return (sp.Add(*terms) - drift).xreplace(found)
 
     # -- rates
@@ -193,6 +197,7 @@ class _Reducing:
             slidings=tuple(map(self._sliding, range(len(model.contacts)))),
             shifts=tuple(one.speed / self._drive for one in self._free()),
             further=self._further(),
+            channels=self.channels,
         )
 
     def _find(self, heavy: list[Coordinate], light: list[int], eliminate: tuple[int | None, ...]) -> None:
@@ -301,8 +306,12 @@ class _Reducing:
     def _change(self, expression: sp.Expr) -> sp.Expr:
         """Rate of an expression in what moves and the inputs."""
         terms = [derivative(expression, symbol) * rate for symbol, rate in self.raw.items()]
-        terms += [derivative(expression, s) * slope for s, slope in zip(INPUTS, SLOPES, strict=True)]
-        return sp.Add(*terms)
+        return sp.Add(*terms, *self._in_time(expression))
+
+    def _in_time(self, expression: sp.Expr) -> list[sp.Expr]:
+        """Its rate through the inputs."""
+        terms = [derivative(expression, s) * slope_of(s) for s in self.channels]
+        return [*terms, derivative(expression, TIME)]
 
     def _acceleration_at(self, contact: Contact) -> sp.Expr:
         """Rate of a contact's velocity: by forces, where these accelerate all that moves with it."""
@@ -310,7 +319,7 @@ class _Reducing:
         moving = [one for one in self.model.coordinates if slip.has(one.velocity)]
         if not all(one.inertial for one in moving):
             return self._change(self._velocity(contact.velocity))
-        total = derivative(slip, V_LP) * SLOPES[0]
+        total = derivative(slip, V_LP) * slope_of(V_LP)
         return total + sp.Add(*(derivative(slip, one.velocity) * self._acceleration(one) for one in moving))
 
     def _acceleration(self, coordinate: Coordinate) -> sp.Expr:
@@ -354,23 +363,31 @@ class _Reducing:
         return tuple(names[symbol] for symbol in state)
 
 
-def _inputs(model: Model, push: str, press: str) -> Row:
-    """What stands for the inputs of a Model: disturbances act on one coordinate and at one contact, or `EVERYWHERE`."""
+def _inputs(
+    model: Model, channels: tuple[sp.Symbol, ...], pushes: tuple[str, ...], presses: tuple[str, ...]
+) -> Row:  # fmt: skip
+    """What stands for the inputs of a Model: a channel where it acts, or a share of it `EVERYWHERE`; else zero."""
+    _, first_push, first_press, *more = channels
     given: Row = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
-    alone, pulled = model.is_single, push == LOAD_POINT
-    if pulled:
-        given[model.inputs["loading"]] = Q
+    behind = max(len(pushes) - 1, 0)
+    acting = dict(zip(pushes, (first_push, *more[:behind]), strict=False))
+    pressing = dict(zip(presses, (first_press, *more[behind:]), strict=False))
+    if model.is_single:  # it needs no name, and one kernel serves whatever is done to it
+        acting = {name or model.coordinates[0].name: s for name, s in (acting or {"": first_push}).items()}
+        pressing = pressing or {model.contacts[0].name: first_press}
+    if LOAD_POINT in acting:
+        given[model.inputs["loading"]] = acting[LOAD_POINT]
     for one in model.coordinates:
-        shared = Q * share_of(one.push) if push == EVERYWHERE else sp.S.Zero
-        given[one.push] = Q if (alone and not pulled and push != EVERYWHERE) or one.name == push else shared
+        given[one.push] = acting.get(one.name, sp.Integer(0))
+        if EVERYWHERE in acting:
+            given[one.push] = acting[EVERYWHERE] * share_of(one.push)
     for contact in model.contacts:
-        filled = press == contact.name + PORES
-        pressed = P / contact.area if (alone and not filled) or contact.name == press else sp.Integer(0)
-        if press == EVERYWHERE:
-            pressed = P / contact.area * share_of(contact.press)
+        pressed = pressing.get(contact.name, sp.Integer(0)) / contact.area
+        if EVERYWHERE in pressing:
+            pressed = pressing[EVERYWHERE] / contact.area * share_of(contact.press)
         given[contact.press] = pressed + contact.imposed.xreplace({model.inputs["time"]: TIME})
         if contact.outside is not None:
-            given[contact.outside] = P / contact.area if filled else sp.Integer(0)
+            given[contact.outside] = pressing.get(contact.name + PORES, sp.Integer(0)) / contact.area
     return given
 
 

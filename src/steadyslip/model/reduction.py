@@ -13,10 +13,22 @@ from steadyslip.model.equations import Model
 from steadyslip.model.kinematics import VelocityVariable, W, only
 from steadyslip.model.unknowns import Unknowns
 
-__all__ = ["INPUTS", "SLOPES", "TIME", "V_LP", "P", "Q", "Reduction", "Sliding", "W"]
+__all__ = ["TIME", "V_LP", "P", "Q", "Reduction", "Sliding", "W"]
 V_LP, Q, P, TIME = sp.symbols("v_lp q p t", real=True)
-INPUTS = (V_LP, Q, P, TIME)
-SLOPES = (*sp.symbols("v_lp_dot q_dot p_dot", real=True), sp.Integer(1))
+
+
+def channels_for(pushes: int, presses: int) -> tuple[sp.Symbol, ...]:
+    """Symbols of the channels: load point, first push, first normal stress, there always; further ones behind them.
+
+    Their order is that of `steadyslip.protocol.protocol.channel_of`; no name of a part has a dot in it.
+    """
+    more = [sp.Symbol(f"q.{i}", real=True) for i in range(2, pushes + 1)]
+    return V_LP, Q, P, *more, *(sp.Symbol(f"p.{i}", real=True) for i in range(2, presses + 1))
+
+
+def slope_of(channel: sp.Symbol) -> sp.Symbol:
+    """Its rate of change."""
+    return sp.Symbol(f"{channel}_dot", real=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +88,8 @@ class Reduction(Keeper):
         How far each displacement moves back, the first ones of `continuous`, when the load point jumps ahead by one.
     further : dict of str to sympy.Expr
         What else is observed: velocity, acceleration and displacement of the coordinates of machines.
+    channels : tuple of sympy.Symbol
+        What is done to the rig: velocity of the load point, pushes and normal stresses; see `channels_for`.
     directions : tuple of tuple of sympy.Symbol
         State variables (see `steadyslip.model.variational`) that answer to changes of the constants, one tuple
         for each independent change; the kernel adds that to their `rates`, in the order of the first variables
@@ -96,6 +110,7 @@ class Reduction(Keeper):
     shifts: tuple[sp.Expr, ...]
     further: Mapping[str, sp.Expr] = field(default_factory=dict)
     directions: tuple[tuple[sp.Symbol, ...], ...] = ()
+    channels: tuple[sp.Symbol, ...] = (V_LP, Q, P)
 
     @property
     def velocity(self) -> str:
@@ -115,8 +130,13 @@ class Reduction(Keeper):
 
     @property
     def inputs(self) -> tuple[sp.Symbol, ...]:
-        """v_lp, q, p and time."""
-        return INPUTS
+        """The channels, and time."""
+        return (*self.channels, TIME)
+
+    @property
+    def slopes(self) -> tuple[sp.Symbol, ...]:
+        """How fast the channels change."""
+        return tuple(map(slope_of, self.channels))
 
     @property
     def searched(self) -> tuple[sp.Symbol, ...]:
@@ -139,6 +159,6 @@ class Reduction(Keeper):
     def time_derivative(self) -> list[sp.Expr]:
         """Partial derivative of the rates in time, through the inputs."""
         return [
-            sp.Add(*(self.derivative(rate, symbol) * slope for symbol, slope in zip(INPUTS, SLOPES, strict=True)))
+            sp.Add(*(self.derivative(rate, s) * slope for s, slope in zip(self.inputs, (*self.slopes, 1), strict=True)))
             for rate in self.rates
         ]

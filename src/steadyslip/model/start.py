@@ -14,7 +14,7 @@ from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
+from steadyslip.model.reduction import V_LP, Reduction
 from steadyslip.model.scales import slip_rates
 
 
@@ -79,7 +79,7 @@ def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
     model = reduction.model
     memory = [item.symbol for item in model.memory]
     ((w, balance),) = reduction.restarts
-    at_rest = {V_LP: model.parameters["drive.velocity"], Q: sp.Integer(0), P: sp.Integer(0), TIME: sp.Integer(0)}
+    at_rest = dict.fromkeys(reduction.inputs, sp.Integer(0)) | {V_LP: model.parameters["drive.velocity"]}
     at_rest |= {item.symbol: sp.Integer(0) for item in model.integrals}
     at_rest |= {item.symbol: sp.sympify(model.steady[item.symbol]) for item in model.states}
     expression = balance.xreplace({w: reduction.w_of_v}).xreplace(at_rest)
@@ -216,4 +216,4 @@ def _steady_unknowns(reduction: Reduction) -> ArrayFunction:
 @question
 def restored_of(reduction: Reduction) -> ArrayFunction:
     """What a jump leaves unchanged, from the state: for starting a kernel anywhere."""
-    return reduction.model.function(reduction.restored, *reduction.state, V_LP, Q, P, TIME)
+    return reduction.model.function(reduction.restored, *reduction.state, *reduction.inputs)

@@ -26,7 +26,7 @@ from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.scales import eliminable, natural_scales, posed, resolved, shortest_time, slip_rates
 from steadyslip.model.start import guesses, initial_values
-from steadyslip.motion.targets import targets
+from steadyslip.motion.targets import NOTHING, Targets, targets
 from steadyslip.protocol import Protocol, Segments, pack
 
 METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
@@ -103,8 +103,7 @@ class Jobs:
     eliminate: int | tuple[int | None, ...] | None
     options: Options
     size: int
-    push: str = ""
-    press: str = ""
+    targets: Targets = NOTHING
     near: np.ndarray | None = None
 
     @property
@@ -129,7 +128,8 @@ class Jobs:
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
 
     def runner(self, lanes: int, dense: bool) -> Runner:
-        return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate, self.push, self.press)
+        acting = self.targets.pushes, self.targets.presses
+        return runner(self.reduction.model, self.choice(lanes, dense), self.eliminate, *acting)
 
     def tables(self, machine: Runner, start: int, stop: int, watch: bool, record: bool) -> tuple[np.ndarray, ...]:
         """Constants, initial, settings and segment rows of some jobs."""
@@ -227,8 +227,8 @@ def prepare(
     )
     if branch and isinstance(rig, Machine):
         raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
-    push, press = targets(rig, plan)
-    point = operating_point(rig, own, branch=branch, imposed=push == LOAD_POINT)
+    acting = targets(rig, plan)
+    point = operating_point(rig, own, branch=branch, imposed=LOAD_POINT in acting.pushes)
     _refuse_singular(rig, point, bool(own))
     if not own:
         require_range(point)
@@ -237,18 +237,18 @@ def prepare(
     final = plan.until if until is None else until
     if final is None:
         raise ParameterError([Problem("until", "missing; give the end of the run in s, such as until=200")])
-    segments = pack(plan, point.drive, final)
+    segments = pack(plan, point.drive, final, acting.channels)
     if np.any(segments.jump) and any(one.damping and LOAD_POINT in one.senses for one in rig.mechanism().elements):
         raise ParameterError(
             [Problem("protocol", "a displacement step through a dashpot (slider.damping, of a link, a kd) is "
                      "an infinite force; use a short velocity step instead")]
         )  # fmt: skip
     eliminate = eliminable(point)
-    reduction = reduce_model(point.model, eliminate, push, press)
+    reduction = reduce_model(point.model, eliminate, acting.pushes, acting.presses)
     _refuse_endless(reduction, options.method)
     start, velocity = initial_values(reduction, point, initial)
     size = max(*map(np.size, point.sigmas), len(segments.start), len(start), point.size, 1)
-    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, push, press)
+    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, acting)
 
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:

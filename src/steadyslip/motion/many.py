@@ -306,7 +306,7 @@ class _Store:
     def __init__(
         self, jobs: Jobs, size: int, times: np.ndarray, observables: Sequence[str] | None, events: bool
     ) -> None:
-        self.units = observable_units(jobs.point.model, jobs.push)
+        self.units = observable_units(jobs.point.model, jobs.targets)
         wanted = list(self.units) if observables is None else list(observables)
         problems = [
             Problem("observables", unknown_name("observable", name, self.units))

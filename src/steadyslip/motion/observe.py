@@ -11,27 +11,29 @@ from steadyslip.kernels.runner import Runner
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model import Model, OperatingPoint
 from steadyslip.motion.jobs import Jobs
+from steadyslip.motion.targets import Targets
+from steadyslip.protocol.inputs import inputs_at
 
 Array = np.ndarray
 Tables = tuple[np.ndarray, ...]
-OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity", "disturbance",
+OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity",
             "load_displacement")  # fmt: skip
 """What the driver's `observe` gives, in this order."""
+LOADING = "loading"  # by which the imposed force of the drive changes
 STRESSES = ("normal_stress", "shear_stress", "spring_stress")
-EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s",
-               "disturbance": "Pa"}  # fmt: skip
+EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s"}
 
 
-def observable_units(model: Model, push: str = "") -> dict[str, str]:
-    """Names and SI units of everything that a run can show, whose disturbance acts on `push`."""
+def observable_units(model: Model, acting: Targets) -> dict[str, str]:
+    """Names and SI units of everything that a run can show, in which a protocol acts so."""
     if model.contacts[0].name:
-        return _machine_units(model, push)
-    units = {"x": "m", "v": "m/s"} | EXTRA_UNITS
+        return _machine_units(model, acting)
+    units = {"x": "m", "v": "m/s"} | EXTRA_UNITS | dict.fromkeys(acting.named(), "Pa")
     units |= {name: unit for name, (_, unit) in model.observables.items()}
     return units | {m.name: m.unit for m in model.variables}
 
 
-def _machine_units(model: Model, push: str) -> dict[str, str]:
+def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
     """Of a machine: by body and by contact, in forces."""
     units: dict[str, str] = {}
     for one in model.coordinates:
@@ -46,9 +48,10 @@ def _machine_units(model: Model, push: str) -> dict[str, str]:
         units |= {f"{contact.name}.slip": "m", f"{contact.name}.slip_rate": "m/s"}
     unit = model.roles["drive.velocity"].unit.removesuffix("/s")
     turning = "rad" if all(one.unit == "rad" for one in model.coordinates) else "m"  # where nothing is pushed
-    pushed = unit if push == LOAD_POINT else next((one.unit for one in model.coordinates if one.name == push), turning)
-    disturbance = "N m" if pushed == "rad" else "N"
-    units |= {"load_displacement": unit, "load_velocity": f"{unit}/s", "disturbance": disturbance}
+    ways = {LOAD_POINT: unit} | {one.name: one.unit for one in model.coordinates}
+    units |= {"load_displacement": unit, "load_velocity": f"{unit}/s"}
+    for name, (_, kind, on) in acting.named().items():
+        units[name] = "N m" if kind == "push" and ways.get(on, turning) == "rad" else "N"
     units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}
     return units | {m.name: m.unit for m in model.variables if m.name not in units}
 
@@ -76,7 +79,7 @@ def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
         if contact.velocity not in given:
             given[contact.velocity] = f"{own}slip_rate"
     if "loading" in model.inputs:
-        given[model.inputs["loading"]] = "disturbance"
+        given[model.inputs["loading"]] = LOADING
     given |= {item.symbol: item.name for item in (*model.memory, *model.states, *model.integrals)}
     given[model.inputs["load_velocity"]] = "load_velocity"
     known = set(given.values())
@@ -118,6 +121,11 @@ def observe(
     own = [item for item in model.variables if item.symbol in continuous and item.kind != "velocity"]
     found |= {item.name: continuous[item.symbol] for item in own}
     found |= dict(zip(reduction.further, kept[len(reduction.continuous) :], strict=True))
+    inputs = inputs_at(jobs.segments, first + lane, segment, time)
+    for name, (channel, _, on) in jobs.targets.named().items():
+        found[name] = inputs[:, channel]
+        if on == LOAD_POINT:
+            found[LOADING] = found[name]
     point = jobs.point.part(slice(first, last)).part(lane)
     if reduction.further:
         _of_the_drive(model, found, point)
@@ -138,7 +146,7 @@ def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
             return seen
         found |= {f"{contact.name}.{name}": seen[name] for name in STRESSES}
         found |= {f"{contact.name}.slip_rate": seen["v"], f"{contact.name}.way": seen["load_displacement"]}
-        found |= {f"{contact.name}.load": seen["load_velocity"], "disturbance": seen["disturbance"]}
+        found[f"{contact.name}.load"] = seen["load_velocity"]
     return found
 
 

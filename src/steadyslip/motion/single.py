@@ -163,7 +163,7 @@ def _history(
     lane = np.zeros(len(time), dtype=int)
     found = observe(jobs, machine, 0, lane, segment, time, points, outcome.tables)
     model = machine.reduction.model
-    units = {"t": "s"} | observable_units(model, jobs.push)
+    units = {"t": "s"} | observable_units(model, jobs.targets)
     contacts = tuple(contact.name for contact in model.contacts)
     surfaces = _surfaces(jobs.point)
     events = events_of(outcome.log, contacts, surfaces)

@@ -118,7 +118,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     try:
         rig = rig_from_text(attributes["rig"], str(path))
         protocol = protocol_from_text(attributes["rig"], str(path)) or Protocol()
-        units = {"t": "s"} | observable_units(build_model(rig), targets(rig, protocol)[0])
+        units = {"t": "s"} | observable_units(build_model(rig), targets(rig, protocol))
     except SteadyslipError as error:
         raise table.fault(f"its rig is refused: {error}") from error
     columns = {"time" if name == "t" else name: ColumnRule(("time",), unit) for name, unit in units.items()}

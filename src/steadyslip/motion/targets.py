@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.laws.contact import ContactLaw
@@ -11,19 +12,59 @@ from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.reducing import PORES
 from steadyslip.protocol import Protocol, protocol as channels
-from steadyslip.protocol.protocol import Piece
+from steadyslip.protocol.protocol import Piece, channel_of
 from steadyslip.protocol.stress import OnBlock, OnDrive, OnNormalStress, OnPores
 
 
-def targets(rig: Slider | Machine, plan: Protocol) -> tuple[str, str]:
-    """The coordinate that a protocol pushes, or the drive; and the contact that it presses, or into which it injects.
+@dataclass(frozen=True)
+class Targets:
+    """What a protocol acts on, and the channels in which it is told.
 
-    As `steadyslip.model.reducing.reduce_model` takes them; empty where it does neither.
+    Attributes
+    ----------
+    pushes : tuple of str
+        Coordinates that are pushed, or the drive, in the order of their first pieces.
+    presses : tuple of str
+        Contacts that are pressed, or into which is injected. Both as `steadyslip.model.reducing.reduce_model` takes
+        them: empty where nothing is done, and "" where the block of a slider is pushed or pressed.
+    channels : tuple of int
+        That of each piece.
+    """
+
+    pushes: tuple[str, ...] = ()
+    presses: tuple[str, ...] = ()
+    channels: tuple[int, ...] = ()
+
+    def named(self) -> dict[str, tuple[int, str, str]]:
+        """What a result calls the forces and stresses that act: channel, kind of target and its name, by that.
+
+        The only push of a run is its ``disturbance``, of several each has the name of what it pushes before it; so it
+        is with ``normal_disturbance`` and ``injection``. A push is there even where nothing is pushed.
+        """
+        found = {}
+        for number, name in enumerate(self.pushes or ("",)):
+            own = f"{name}." if name and len(self.pushes) > 1 else ""
+            place = channel_of(channels.DISTURBANCE, number, len(self.pushes))
+            found[f"{own}disturbance"] = (place, "push", name)
+        for number, name in enumerate(self.presses):
+            what = "injection" if name.endswith(PORES) else "normal_disturbance"
+            of_kind = sum(one.endswith(PORES) == name.endswith(PORES) for one in self.presses)
+            own = f"{name.removesuffix(PORES)}." if name.removesuffix(PORES) and of_kind > 1 else ""
+            place = channel_of(channels.NORMAL_STRESS, number, len(self.pushes))
+            found[f"{own}{what}"] = (place, "press", name)
+        return found
+
+
+NOTHING = Targets()
+
+
+def targets(rig: Slider | Machine, plan: Protocol) -> Targets:
+    """What a protocol pushes and presses, and where it injects.
 
     Raises
     ------
     ParameterError
-        If it is open what a piece acts on, several pieces act on different ones, or one on what does not feel it.
+        If it is open what a piece acts on, or one acts on what does not feel it.
     """
     return _Targets(rig, plan).found()
 
@@ -39,35 +80,46 @@ class _Targets:
         self.laws = laws
         self.bodies = list(rig.bodies) if isinstance(rig, Machine) else [""]
         self.problems: list[Problem] = []
-        self.own: dict[int, str] = {}
 
-    def found(self) -> tuple[str, str]:
-        """Both, or all problems."""
-        for i, piece in enumerate(self.plan.pieces, start=1):
-            where = f"protocol.pieces.{i}"
-            if isinstance(piece, OnDrive):
-                self._take(piece, where, LOAD_POINT)
-            elif isinstance(piece, OnBlock):
-                self._take(piece, f"{where}.on", self._chosen(piece, f"{where}.on", "body", self.bodies))
-            elif isinstance(piece, OnNormalStress):
-                self._take(piece, f"{where}.on", self._chosen(piece, f"{where}.on", "contact", list(self.laws)))
-            elif isinstance(piece, OnPores):
-                self._inject(piece, where)
+    def found(self) -> Targets:
+        """All of them, or all problems."""
+        own = [self._of(piece, f"protocol.pieces.{i}") for i, piece in enumerate(self.plan.pieces, start=1)]
         if self.plan.frees_load_point:
             self._load_point_is_free()
         if self.problems:
             raise ParameterError(self.problems)
-        return self.own.get(channels.DISTURBANCE, ""), self.own.get(channels.NORMAL_STRESS, "")
+        acting = {kind: self._in_order(kind, own) for kind in (channels.DISTURBANCE, channels.NORMAL_STRESS)}
+        pushes, presses = acting.values()
+        places = tuple(
+            channels.LOAD_POINT if name is None else channel_of(kind, acting[kind].index(name), len(pushes))
+            for kind, name in zip((piece.channel for piece in self.plan.pieces), own, strict=True)
+        )
+        return Targets(pushes, presses, places)
 
-    def _inject(self, piece: OnPores, where: str) -> None:
+    def _in_order(self, kind: int, own: list[str | None]) -> tuple[str, ...]:
+        """Names of what pieces of a kind act on, each once."""
+        pairs = zip(self.plan.pieces, own, strict=True)
+        return tuple(dict.fromkeys(name for piece, name in pairs if piece.channel == kind and name is not None))
+
+    def _of(self, piece: Piece, where: str) -> str | None:
+        """What a piece acts on; None for the motion of the load point, and where that is a problem."""
+        if isinstance(piece, OnDrive):
+            return LOAD_POINT
+        if isinstance(piece, OnBlock):
+            return self._chosen(piece, f"{where}.on", "body", self.bodies)
+        if isinstance(piece, OnNormalStress):
+            return self._chosen(piece, f"{where}.on", "contact", list(self.laws))
+        return self._injected(piece, where) if isinstance(piece, OnPores) else None
+
+    def _injected(self, piece: OnPores, where: str) -> str | None:
         wet = [name for name, law in self.laws.items() if law.has_pores()]
         if not wet:
             own = " and ".join(dict.fromkeys(law.name or type(law).__name__ for law in self.laws.values()))
             message = f"{piece.name} needs a contact with pore fluid, of law pore-fluid; here it is {own}"
             self.problems.append(Problem(where, message))
-            return
+            return None
         contact = self._chosen(piece, f"{where}.on", "contact with pore fluid", wet)
-        self._take(piece, f"{where}.on", None if contact is None else contact + PORES)
+        return None if contact is None else contact + PORES
 
     def _chosen(self, piece: Piece, where: str, kind: str, names: list[str]) -> str | None:
         given = getattr(piece, "on", None)
@@ -83,27 +135,6 @@ class _Targets:
             self.problems.append(Problem(where, unknown_name(kind, given, names)))
             return None
         return given or names[0]
-
-    def _take(self, piece: Piece, where: str, target: str | None) -> None:
-        if target is None:
-            return
-        other = self.own.setdefault(piece.channel, target)
-        if other != target:
-            kind = "body" if piece.channel == channels.DISTURBANCE else "contact"
-            message = (
-                f"{piece.name} acts on {self._called(target, kind)}, but an earlier piece acts on "
-                f"{self._called(other, kind)}; allowed: one {kind} a run"
-            )
-            self.problems.append(Problem(where, message))
-
-    def _called(self, target: str, kind: str) -> str:
-        if target == LOAD_POINT:
-            return "the drive's pull"
-        name = target.removesuffix(PORES)
-        whose = repr(name) if name else {"body": "the block", "contact": "the normal stress"}[kind]
-        if not target.endswith(PORES):
-            return whose
-        return f"the fluid of {name!r}" if name else "the fluid in the pores"
 
     def _load_point_is_free(self) -> None:
         for i, piece in enumerate(self.plan.pieces, start=1):

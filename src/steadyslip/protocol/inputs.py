@@ -80,7 +80,7 @@ def _parts(segments: Segments, lane: Any, segment: Any) -> tuple[Any, Array, Arr
 
 
 def inputs_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
-    """Load-point velocity (m/s), disturbance and added normal stress (Pa): (..., 3).
+    """Load-point velocity (m/s), disturbances and added normal stresses (Pa): (..., channels).
 
     Parameters
     ----------

@@ -16,15 +16,33 @@ from steadyslip.protocol.curves import Curve, Jump, Wave
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
 CHANNELS = 3
+"""That are always there: load point, first disturbance, first normal stress."""
 ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
+
+
+def channel_of(kind: int, number: int, disturbances: int) -> int:
+    """Which channel is disturbance or normal stress number 0, 1, ... of a run: further ones follow the first of each.
+
+    Parameters
+    ----------
+    kind : int
+        `DISTURBANCE` or `NORMAL_STRESS`.
+    number : int
+    disturbances : int
+        How many there are in the run.
+    """
+    if number == 0:
+        return kind
+    return CHANNELS + number - 1 + (max(disturbances - 1, 0) if kind == NORMAL_STRESS else 0)
 
 
 class Piece(FrozenRecord, family="protocol piece"):
     """Base of the pieces of a protocol: something that happens to one channel at some time.
 
-    A subclass is registered under a name, says which `channel` it acts on (load-point velocity,
-    disturbance stress or normal stress), and returns what it consists of from one of the methods.
-    Fields may be plain numbers or 1-D arrays with one value for each lane.
+    A subclass is registered under a name, says which kind of `channel` it acts on (load-point velocity,
+    disturbance stress or normal stress; a run has one of the latter two for whatever is acted on), and
+    returns what it consists of from one of the methods. Fields may be plain numbers or 1-D arrays with one
+    value for each lane.
     """
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", None)

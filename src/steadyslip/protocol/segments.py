@@ -22,7 +22,8 @@ class Segments:
     """Consecutive spans of time for each lane, and the channels on them.
 
     The channels are, in this order, the load-point velocity (m/s), the disturbance stress q (Pa) and the
-    added normal stress p (Pa). On a segment a channel is ``value + slope (t - start)`` plus the sum of
+    added normal stress p (Pa), then further ones of these two (`steadyslip.protocol.protocol.channel_of`). On a
+    segment a channel is ``value + slope (t - start)`` plus the sum of
     ``amplitude sin(angular_frequency (t - start) + phase)`` over the last axis.
 
     Parameters
@@ -32,9 +33,9 @@ class Segments:
         empty ones at its end.
     jump : ndarray (lanes, n)
         Displacement step of the load point at the start of the segment, m.
-    value, slope : ndarray (lanes, n, 3)
+    value, slope : ndarray (lanes, n, channels)
         Lines.
-    amplitude, angular_frequency, phase : ndarray (lanes, n, 3, h)
+    amplitude, angular_frequency, phase : ndarray (lanes, n, channels, h)
         Sine waves, as many as are present at once at most; the rest are zero.
     """
 
@@ -102,7 +103,7 @@ class _Terms:
         return max(lengths)
 
 
-def pack(protocol: Protocol, velocity: Any, until: Any) -> Segments:
+def pack(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...] | None = None) -> Segments:
     """Cut a protocol into segments.
 
     Parameters
@@ -113,6 +114,8 @@ def pack(protocol: Protocol, velocity: Any, until: Any) -> Segments:
         Velocity of the rig's drive, m/s.
     until : float or 1-D array
         End of each lane, s; what comes later, or at this very time, is cut.
+    channels : tuple of int, optional
+        That of each piece; the first of its kind unless given.
 
     Returns
     -------
@@ -126,47 +129,51 @@ def pack(protocol: Protocol, velocity: Any, until: Any) -> Segments:
     try:
         hash((protocol, velocity, until))
     except TypeError:  # arrays
-        return _packed(protocol, velocity, until)
-    return _packed_before(protocol, velocity, until)
+        return _packed(protocol, velocity, until, channels)
+    return _packed_before(protocol, velocity, until, channels)
 
 
-def _packed(protocol: Protocol, velocity: Any, until: Any) -> Segments:
+def _packed(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...] | None) -> Segments:
     final = column(until)
     if not np.all((final > 0) & np.isfinite(final)):
         raise ParameterError([Problem("until", f"got {until!r}; allowed: a finite number > 0 in s")])
-    terms = _terms(protocol, velocity)
+    own = tuple(piece.channel for piece in protocol.pieces) if channels is None else channels
+    terms = _terms(protocol, velocity, own)
     lanes = terms.lanes(final, column(velocity))
     start, end = _grid([*terms.breakpoints()], final)
     shape = (lanes, start.shape[1])
-    jump, value, slope = np.zeros(shape), np.zeros((*shape, CHANNELS)), np.zeros((*shape, CHANNELS))
+    count = max((*own, CHANNELS - 1)) + 1
+    jump, value, slope = np.zeros(shape), np.zeros((*shape, count)), np.zeros((*shape, count))
     for step in terms.jumps:
         jump += np.where((start == step.time) & (start < end), step.by, 0.0)
     for channel, curve in terms.curves:
         level, rate = curve.on(start)
         value[:, :, channel] += level
         slope[:, :, channel] += rate
-    waves = _waves(terms.waves, start, end, shape)
+    waves = _waves(terms.waves, start, end, (*shape, count))
     return Segments(_full(start, shape), _full(end, shape), jump, value, slope, *waves)
 
 
 @lru_cache(maxsize=32)
-def _packed_before(protocol: Protocol, velocity: float, until: float) -> Segments:
-    return Segments(*map(read_only, vars(_packed(protocol, velocity, until)).values()))
+def _packed_before(
+    protocol: Protocol, velocity: float, until: float, channels: tuple[int, ...] | None
+) -> Segments:  # fmt: skip
+    return Segments(*map(read_only, vars(_packed(protocol, velocity, until, channels)).values()))
 
 
-def _terms(protocol: Protocol, velocity: Any) -> _Terms:
+def _terms(protocol: Protocol, velocity: Any, channels: tuple[int, ...]) -> _Terms:
     terms = _Terms()
     drive: list[Curve] = []
     present: Any = velocity
-    for piece in protocol.pieces:
+    for piece, channel in zip(protocol.pieces, channels, strict=True):
         if (curve := piece.curve(present)) is not None:
             if piece.channel == LOAD_POINT:
                 drive.append(curve)
                 present = curve.right[:, -1]
             else:
-                terms.curves.append((piece.channel, curve))
+                terms.curves.append((channel, curve))
         if (wave := piece.wave()) is not None:
-            terms.waves.append((piece.channel, wave))
+            terms.waves.append((channel, wave))
         if (jump := piece.jump()) is not None:
             terms.jumps.append(jump)
     for earlier, later in pairwise(drive):
@@ -189,19 +196,20 @@ def _grid(breakpoints: list[Array], final: Array) -> tuple[Array, Array]:
     return points[:, :count], points[:, 1 : count + 1]
 
 
-def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, shape: tuple[int, ...]) -> tuple[Array, ...]:
+def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, sizes: tuple[int, ...]) -> tuple[Array, ...]:
     """Amplitude, angular frequency and phase of the waves on each segment, each channel's own from the first place."""
+    *shape, channels = sizes
     if not terms:
-        return tuple(np.zeros((*shape, CHANNELS, 0)) for _ in range(3))
+        return tuple(np.zeros((*sizes, 0)) for _ in range(3))
     active = [(start >= w.start) & (start < w.stop) & (start < end) for _, w in terms]
-    taken = np.zeros((CHANNELS, *shape), dtype=np.intp)
+    taken = np.zeros((channels, *shape), dtype=np.intp)
     places: list[NDArray[np.intp]] = []
     for (channel, _), present in zip(terms, active, strict=True):
         places.append(taken[channel].copy())
         taken[channel] += present
-    found = tuple(np.zeros((*shape, CHANNELS, int(taken.max(initial=0)))) for _ in range(3))
+    found = tuple(np.zeros((*sizes, int(taken.max(initial=0)))) for _ in range(3))
     for (channel, wave), present, place in zip(terms, active, places, strict=True):
-        lane, segment = np.nonzero(_full(present, shape))
+        lane, segment = np.nonzero(_full(present, tuple(shape)))
         slot = place[lane, segment]
         phase = wave.angular_frequency * (start - wave.start) + wave.phase
         for array, numbers in zip(found, (wave.amplitude, wave.angular_frequency, phase), strict=True):

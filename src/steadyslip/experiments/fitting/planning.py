@@ -45,8 +45,8 @@ def make_plan(
         )
     plan_protocol = None if protocol is None else in_units_of(rig, Protocol.of(protocol))
     if plan_protocol is not None:
-        push, press = targets(rig, plan_protocol)
-        if push or press:
+        acting = targets(rig, plan_protocol)
+        if any(acting.pushes) or any(acting.presses):
             raise NotAvailable("fits are not offered for creep and injection; allowed: other pieces, that move the "
                                "load point or change the normal stress")  # fmt: skip
     problems: list[Problem] = []

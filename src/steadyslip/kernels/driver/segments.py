@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from steadyslip.kernels.driver.balance import solve_balances
-from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, call
+from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
 
 
 def clock(R: Array, tau: float) -> float:
@@ -13,11 +13,11 @@ def clock(R: Array, tau: float) -> float:
     return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.END] else R[Row.STOP])
 
 
-def set_inputs(S: Array, lanes: int, lane: int, row: Array, first: int) -> None:
+def set_inputs(S: Array, layout: Layout, lanes: int, lane: int, row: Array, first: int) -> None:
     """Values and slopes of the inputs, for one lane, from where they begin in a row."""
-    for i in range(INPUTS):
-        S[(Row.INPUT + i) * lanes + lane] = row[first + i]
-        S[(Row.SLOPE + i) * lanes + lane] = row[first + INPUTS + i]
+    for i in range(layout.inputs):
+        S[(layout.level + i) * lanes + lane] = row[first + i]
+        S[(layout.slope + i) * lanes + lane] = row[first + layout.inputs + i]
 
 
 def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -> None:
@@ -26,12 +26,12 @@ def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -
     S[Row.START * lanes + lane] = row[0]
     S[Row.STOP * lanes + lane] = row[1]
     S[Row.END * lanes + lane] = row[1] - row[0]
-    set_inputs(S, lanes, lane, row, 3)
-    waves = INPUTS * layout.harmonics
+    set_inputs(S, layout, lanes, lane, row, 3)
+    waves, first = layout.inputs * layout.harmonics, 3 + 2 * layout.inputs
     for i in range(waves):
-        S[(layout.amplitude + i) * lanes + lane] = row[9 + i]
-        S[(layout.omega + i) * lanes + lane] = row[9 + waves + i]
-        S[(layout.phase + i) * lanes + lane] = row[9 + 2 * waves + i]
+        S[(layout.amplitude + i) * lanes + lane] = row[first + i]
+        S[(layout.omega + i) * lanes + lane] = row[first + waves + i]
+        S[(layout.phase + i) * lanes + lane] = row[first + 2 * waves + i]
 
 
 def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, segments: Array, y: Array) -> bool:

@@ -78,7 +78,7 @@ def observe(
     """Outputs and continuous variables at given points.
 
     `points` is (m, 1 + size + further unknowns); `own` (m,) the rig's row, `segment` and `times` where and when in its
-    protocol, since the start of the run. `values` is (8 contacts + kept + further, m): `Out` up to ADVANCE of each
+    protocol, since the start of the run. `values` is (7 contacts + kept + further, m): `Out` up to ADVANCE of each
     contact, which is here the way of the load point since the start of the run, the variables that jumps leave alone,
     and what else is observed.
     """
@@ -119,13 +119,13 @@ def field(
 ) -> None:  # fmt: skip
     """Rates (m, size) at given points, (m, 1 + size + further unknowns).
 
-    `inputs` (m, 7) holds v_lp, q, p, their slopes and the time, `own` the rig.
+    `inputs` (m, 2 inputs + 1) holds v_lp, q, p, ..., their slopes and the time, `own` the rig.
     """
     R, y = np.zeros(layout.rows), np.empty(width(layout))
     for m in range(points.shape[0]):
         place_rig(R, layout, constants, settings, own[m])
-        set_inputs(R, 1, 0, inputs[m], 0)
-        R[Row.START] = inputs[m, 6]
+        set_inputs(R, layout, 1, 0, inputs[m], 0)
+        R[Row.START] = inputs[m, 2 * layout.inputs]
         place_point(R, layout, routines, points, m, y)
         call(routines.rates, R, 0.0, y)
         for i in range(layout.size):

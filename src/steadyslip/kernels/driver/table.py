@@ -13,7 +13,7 @@ import numpy as np
 
 from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
-from steadyslip.kernels.layout import INPUTS, Array, Layout, Routines, Row, Status, call
+from steadyslip.kernels.layout import Array, Layout, Routines, Row, Status, call
 
 INSTANT = 1e-14  # share of the row: a motion that needs shorter steps runs away, and ends
 
@@ -38,8 +38,8 @@ def enter_row(
         if input_rates.shape[1] > 0:
             own = min(job, input_rates.shape[0] - 1)
             for d in range(layout.directions):
-                for i in range(INPUTS):
-                    place = places[INPUTS * d + i]
+                for i in range(layout.inputs):
+                    place = places[layout.inputs * d + i]
                     if place >= 0:
                         S[(layout.constant + place) * W + lane] = input_rates[own, d, k, i]
 

@@ -8,7 +8,7 @@ import sympy as sp
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.model import OperatingPoint
-from steadyslip.model.reduction import SLOPES, TIME, V_LP, P, Q, Reduction
+from steadyslip.model.reduction import TIME, V_LP, P, Q, Reduction
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.single import areas as areas_of
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
@@ -35,8 +35,7 @@ def _jacobian_of(reduction: Reduction) -> ArrayFunction:
 
 
 def _at_constant_inputs(reduction: Reduction, expressions: list[sp.Expr]) -> ArrayFunction:
-    still = {TIME: sp.Integer(0)}
-    still |= {s: sp.Integer(0) for s in sp.symbols("v_lp_dot q_dot p_dot", real=True)}
+    still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))
     at_rest = (sp.sympify(e).xreplace(still) for e in expressions)
     return reduction.model.function(at_rest, V_LP, Q, P, *reduction.state, *reduction.unknowns)
 
@@ -130,6 +129,6 @@ def slip_rates_at(rest: Rest, state: Array, unknowns: Array) -> Array:
 @question
 def _normal_of(reduction: Reduction) -> ArrayFunction:
     """Normal stresses."""
-    still = {TIME: sp.Integer(0)} | dict.fromkeys(SLOPES[:3], sp.Integer(0))
+    still = dict.fromkeys((TIME, *reduction.slopes), sp.Integer(0))
     wanted = (one.outputs["sigma"].xreplace(still) for one in reduction.slidings)
     return reduction.model.function(wanted, V_LP, Q, P, *reduction.state, *reduction.unknowns)

@@ -20,6 +20,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.start import initial_values
 from steadyslip.motion.jobs import Jobs, Options, automatic_method, prepare
+from steadyslip.motion.targets import Targets
 from steadyslip.nonlinear.kicks.neighbourhood import Neighbourhood
 from steadyslip.nonlinear.kicks.outcomes import contacts_of, outcomes_of
 from steadyslip.nonlinear.kicks.places import place_problems, refuse_jump, size_units, steady_speeds
@@ -164,9 +165,9 @@ class Kicked:
         self.size = max(values.size, 1)
         jobs = prepare(rig, None, 1.0, vary, {}, options_for(values.model, rtol), branch)
         if kick in ("force", "normal-force"):
-            push, press = (self.at, "") if kick == "force" else ("", self.at)
-            reduction = reduce_model(jobs.point.model, jobs.eliminate, push, press)
-            jobs = replace(jobs, push=push, press=press, reduction=reduction)
+            pushes, presses = ((self.at,), ()) if kick == "force" else ((), (self.at,))
+            reduction = reduce_model(jobs.point.model, jobs.eliminate, pushes, presses)
+            jobs = replace(jobs, targets=Targets(pushes, presses), reduction=reduction)
         self.jobs = jobs
         self.drive = np.broadcast_to(np.asarray(values.drive, dtype=float), (self.size,))
         self.rest = rest_of(self.jobs, self.drive, np.zeros(self.size))

@@ -151,7 +151,9 @@ class Runs:
         self.base, self.which = replace(jobs, options=self.options), which
         self.noise = 1e-13 if stiff else 1e-16
         self.finest = self.noise / self.options.rtol
-        self.machine = runner(self.reduction.model, Choice(method), jobs.eliminate, jobs.push, jobs.press)
+        self.machine = runner(
+            self.reduction.model, Choice(method), jobs.eliminate, jobs.targets.pushes, jobs.targets.presses
+        )
         self.sensitive = _with_sensitivities(self.reduction, method)
         self.steps, self._usual = 0, MOST_STEPS
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import steadyslip
 from steadyslip import figures
-from steadyslip.core.quantities import is_per_area, total_unit
+from steadyslip.core.areas import is_per_area, total_unit
+from steadyslip.core.entries import Option
 from steadyslip.core.records import FrozenRecord, Named, Part, Settings, key_of
-from steadyslip.core.roles import Option, Parameter, Series, Value
+from steadyslip.core.roles import Entry, Parameter, Series
 from steadyslip.experiments.spec import TABLES as FIT_TABLES
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
@@ -92,7 +93,7 @@ def row(item, role, totals: bool) -> str:
         unit, allowed = unit_of(role, totals), "list of finite numbers"
     elif isinstance(role, Option):
         unit, allowed = "", ", ".join(f"`{str(c).lower() if isinstance(c, bool) else c}`" for c in role.choices)
-    elif isinstance(role, Value):
+    elif isinstance(role, Entry):
         unit, allowed = getattr(role, "unit", ""), role.allowed()
     else:
         words = ", ".join(f"`{name}`" for name in role.family.registry)

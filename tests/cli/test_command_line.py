@@ -9,7 +9,7 @@ import pytest
 
 import steadyslip as ss
 from command import run, without_laws_of_tests
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"
 

@@ -9,8 +9,9 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from file_schema import file_schema
+from steadyslip.core.entries import Label, Names, Option, Quantity, Span, Text, Whole
 from steadyslip.core.records import Named, Part, Settings, is_required, role_of
-from steadyslip.core.roles import Label, Names, Option, Parameter, Quantity, Series, Span, Text, Whole
+from steadyslip.core.roles import Parameter, Series
 from steadyslip.experiments.fitting.settings import FitSettings
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.settings import RecordSettings

@@ -15,7 +15,8 @@ from fuzz_rigs import DRIVES, FRICTION
 from javascript import Script
 from moved import motion_text
 from rigs_of_theory import CONTACTS, ONE_MEMORY, SIGMA, V0, rate_state, rig
-from steadyslip.core.quantities import parse, unit
+from steadyslip.core.dimensions import unit
+from steadyslip.core.quantities import parse
 from steadyslip.explorer.assembly import parts
 from steadyslip.explorer.equations import _judged, _stable_set, linear_part
 from steadyslip.explorer.motion import OPTIONS, driver, motion_part

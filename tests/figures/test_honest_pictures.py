@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import lab_records as lab
 import steadyslip as ss
 from dimensionless import unit_rig
-from steadyslip.core.quantities import percent
+from steadyslip.core.telling import percent
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.map_axes import Scale, spaced_by_ratio
 from steadyslip.maps.view.cut import _quantiles, _with_failures

@@ -11,7 +11,7 @@ import steadyslip as ss
 from command import run
 from file_schema import file_schema
 from machines import brake, rate_state, surface, three_bodies, two_blocks, two_mass
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
 AXIS = EXAMPLES[0].with_name("feed-axis.toml")

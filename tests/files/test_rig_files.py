@@ -15,7 +15,8 @@ from hypothesis import given, settings, strategies as st
 import steadyslip as ss
 from command import run
 from file_schema import file_schema
-from steadyslip.core.roles import Option, Parameter, Role
+from steadyslip.core.entries import Option
+from steadyslip.core.roles import Parameter, Role
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import own_fields, sections
 from steadyslip.files.specifications.lines import key_lines, line_of

@@ -4,7 +4,7 @@ import sympy as sp
 
 import steadyslip as ss
 from rigs_of_theory import SIGMA, V0, rig
-from steadyslip.core.roles import positive
+from steadyslip.core.domains import positive
 
 FAMILIES = (ss.FrictionLaw, ss.ContactLaw)
 BEFORE = [dict(family.registry) for family in FAMILIES]

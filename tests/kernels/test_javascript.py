@@ -16,7 +16,7 @@ from javascript import Script
 from moved import DRIVER, moved, slip_events
 from rigs_of_theory import ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.core.quantities import printed, shown
+from steadyslip.core.telling import printed, shown
 from steadyslip.kernels import primitives
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program, primitive, select
 from steadyslip.kernels.printers import javascript, python

@@ -13,7 +13,7 @@ import sympy as sp
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.core.roles import nonnegative, positive, real
+from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.experiments.spec import spec_from_text
 from steadyslip.linear.state_space import jacobian
 from steadyslip.model import operating_point

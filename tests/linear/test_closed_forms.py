@@ -255,7 +255,7 @@ def test_names_of_a_law_never_clash_with_those_of_the_model():
     """A law may call its parameters and memory what it likes: the answer is that of the same law renamed."""
     import sympy as sp
 
-    from steadyslip.core.roles import positive
+    from steadyslip.core.domains import positive
 
     def law(first, second, memory):
         def strength(self, v, sigma, memory, tau):

@@ -38,7 +38,7 @@ def test_lock_up_edge_and_its_kind():
 
 def test_a_window_between_samples_is_found():
     """A narrow unstable window in velocity: friction weakens only around one speed."""
-    from steadyslip.core.roles import positive
+    from steadyslip.core.domains import positive
 
     class Dip(ss.FrictionLaw):
         centre: float = ss.parameter("m/s", positive, "velocity of the dip")

@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, D_C, EPS, ONE_MEMORY, SIGMA, V0, A, rate_state, rig
-from steadyslip.core.quantities import unit
+from steadyslip.core.dimensions import unit
 from steadyslip.linear import cubic
 from steadyslip.linear.polynomials import stable_set
 from steadyslip.linear.state_space import jacobian

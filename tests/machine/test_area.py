@@ -12,7 +12,8 @@ from matplotlib.text import Text
 
 import lab_records as lab
 import steadyslip as ss
-from steadyslip.core.quantities import outside, shown, shown_range
+from steadyslip.core.areas import outside
+from steadyslip.core.telling import shown, shown_range
 from steadyslip.maps import Map, run_map
 from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.threshold import Threshold

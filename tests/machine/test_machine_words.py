@@ -10,7 +10,7 @@ import steadyslip as ss
 from command import run
 from machines import brake, rate_state, two_mass
 from steadyslip.core.errors import ParameterError
-from steadyslip.core.quantities import shown, told_in
+from steadyslip.core.telling import shown, told_in
 from steadyslip.model.point import operating_point
 from steadyslip.nonlinear import commands
 from steadyslip.nonlinear.kicks.kicks import OF_MACHINES

@@ -6,7 +6,7 @@ import pytest
 import steadyslip as ss
 from dimensionless import A, unit_rig
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
-from steadyslip.core.roles import positive, real
+from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
 

@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.optimize import brentq
 
 import steadyslip as ss
-from steadyslip.core.roles import positive
+from steadyslip.core.domains import positive
 from steadyslip.model.build import build_model
 from steadyslip.model.point import operating_point
 from steadyslip.model.steady import steady_equation

@@ -8,7 +8,7 @@ import sympy as sp
 
 import steadyslip as ss
 from steadyslip import testing
-from steadyslip.core.roles import positive, real
+from steadyslip.core.domains import positive, real
 from steadyslip.testing import Conditions, ContractViolation, Surroundings
 from steadyslip.testing.precise import disagreement
 

@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from steadyslip import Slider, load_history, read_protocol, read_record, read_rig, simulate
+from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, QuantityError, SteadyslipError
-from steadyslip.core.quantities import parse, unit
+from steadyslip.core.quantities import parse
 from steadyslip.files.specifications import rig_from_text
 from steadyslip.files.specifications.lines import key_lines
 from steadyslip.files.specifications.toml import MOST_PARTS, NotToml, tables_of

@@ -12,7 +12,7 @@ import typer
 def _speak(context: typer.Context, rig: Path) -> Path:
     """Answer in the units of the file."""
     from steadyslip.core.errors import ParameterError
-    from steadyslip.core.quantities import told_in
+    from steadyslip.core.telling import told_in
     from steadyslip.files.specifications.read import text_of
     from steadyslip.files.specifications.written import units_of
 

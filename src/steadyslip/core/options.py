@@ -12,8 +12,10 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from steadyslip.core.domains import Domain, below_one, steps, tolerance
+from steadyslip.core.entries import Names, Option, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem, one
-from steadyslip.core.roles import Domain, Names, Option, Role, Text, Whole, below_one, fault, steps, tolerance
+from steadyslip.core.roles import Role, fault
 
 LARGEST = 1.7e308  # integers may be larger than any float
 MOST = 1e150  # whose square is finite

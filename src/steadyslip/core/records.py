@@ -11,18 +11,20 @@ schema, the reference page, the symbol in the equations and the range searched f
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cache
 from typing import Any, ClassVar, TypeVar, dataclass_transform
 
-import numpy as np
-
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came, one
+from steadyslip.core.areas import total_unit
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import Domain
+from steadyslip.core.entries import Option
+from steadyslip.core.errors import ParameterError, Problem, came, one
+from steadyslip.core.members import Members
+from steadyslip.core.names import unfit_name
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import total_unit
-from steadyslip.core.roles import Domain, Option, Parameter, Role, Series, Total, Value, fault
+from steadyslip.core.roles import Entry, Parameter, Role, Series, Total, fault
 
 
 @dataclass(frozen=True)
@@ -73,38 +75,6 @@ class Part(Role):
         return one(self.family.__name__) + (f" ({known})" if known else "")
 
 
-_PLAIN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-
-
-def unfit_name(name: Any) -> str:
-    """Why a name cannot be that of a member, part of dotted names; empty if it can."""
-    if isinstance(name, str) and _PLAIN_NAME.fullmatch(name) and len(name) <= 40:
-        return ""
-    return "is no name; allowed: up to 40 letters, digits, hyphens and underscores, a letter first"
-
-
-class Members(Mapping[str, Any]):
-    """Records by the names that the user gave them, in order; never changes."""
-
-    def __init__(self, of: Mapping[str, Any] | None = None) -> None:
-        self._of = dict(of or {})
-
-    def __getitem__(self, name: str) -> Any:
-        return self._of[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._of)
-
-    def __len__(self) -> int:
-        return len(self._of)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._of.items()))
-
-    def __repr__(self) -> str:
-        return repr(self._of)
-
-
 @dataclass(frozen=True)
 class Named(Role):
     """A field that holds a record for each of some dotted names; ``listed`` lets a list of values stand for one."""
@@ -125,39 +95,7 @@ class Named(Role):
         return "names and their values"
 
 
-@dataclass(frozen=True)
-class Condition:
-    """A relation that numbers of a record must obey together.
-
-    Attributes
-    ----------
-    name : str
-        Field that a message names, or a member of one, such as ``contacts.guide``.
-    holds : bool or ndarray of bool
-        Per rig, where the numbers are arrays.
-    message : str
-        What came and what is allowed, with places ``{}`` for `numbers`.
-    numbers : tuple of float or ndarray
-        On which the condition depends.
-    """
-
-    name: str
-    holds: Any
-    message: str
-    numbers: tuple[Any, ...] = ()
-
-    def problem(self, name: str = "") -> Problem | None:
-        """What is wrong, at the first position where it is; None if the condition holds."""
-        holds = np.asarray(self.holds)
-        if np.all(holds):
-            return None
-        arrays = np.broadcast_arrays(holds, *self.numbers)
-        where = tuple(int(i) for i in np.argwhere(~arrays[0])[0])
-        place = f" (at position {where})" if arrays[0].size > 1 else ""
-        return Problem(name or self.name, self.message.format(*(f"{float(a[where]):.12g}" for a in arrays[1:])) + place)
-
-
-Declared = Value | Part | Named
+Declared = Entry | Part | Named
 """What a field of a record may be."""
 _ROLE, _KEY = "steadyslip", "key"
 R = TypeVar("R", bound="FrozenRecord")
@@ -214,7 +152,7 @@ def named(family: type[FrozenRecord], doc: str, *, listed: bool = False) -> Any:
     return field(default=None, metadata={_ROLE: Named(family, doc, listed)})
 
 
-def setting(role: Value, *, default: Any = MISSING, key: str = "") -> Any:
+def setting(role: Entry, *, default: Any = MISSING, key: str = "") -> Any:
     """Declare a field of another kind; ``key`` is its name in files where Python keeps that word for itself."""
     return field(default=default, metadata={_ROLE: role, _KEY: key})
 
@@ -413,28 +351,6 @@ def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Co
         if isinstance(role, Part):
             for before, member in below(role, getattr(record, field_name), own[field_name], prefix):
                 yield from conditions(member, before)
-
-
-def resolve(name: str, known: Mapping[str, Any]) -> str:
-    """The full dotted name for `name`, which may leave out leading or middle parts where that is unique.
-
-    Raises
-    ------
-    UnknownNameError
-        If nothing, or more than one parameter, has that name.
-    """
-    if not isinstance(name, str):
-        raise UnknownNameError("parameter", name, known)
-    if name in known:
-        return name
-    first, _, rest = name.partition(".")
-    ends = [full for full in known if full.endswith("." + name)]
-    ends = ends or [full for full in known if rest and full.startswith(first + ".") and full.endswith("." + rest)]
-    if len(ends) == 1:
-        return ends[0]
-    if ends:
-        raise UnknownNameError("parameter (it is ambiguous)", name, ends)
-    raise UnknownNameError("parameter", name, known)
 
 
 def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:

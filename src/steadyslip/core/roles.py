@@ -1,7 +1,7 @@
 """What a field of a record, or an option of a call, may hold: each kind checks, explains, reads and writes its values.
 
-Numbers (`Parameter`), choices, measured columns, and what tables hold that say what to do with a rig: words, counts,
-names, quantities of any kind. A layer that needs another kind derives one from `Value`.
+Numbers (`Parameter`) and measured columns are here; choices, words, counts and names in `entries`. A layer that needs
+another kind derives one from `Entry`.
 """
 
 from __future__ import annotations
@@ -10,14 +10,15 @@ import json
 import math
 from contextlib import suppress
 from dataclasses import dataclass
-from numbers import Integral, Real
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import is_per_area, outside, total_unit
+from steadyslip.core.domains import Domain
 from steadyslip.core.errors import ParameterError, Problem, QuantityError, came, unknown_name
-from steadyslip.core.quantities import example, is_per_area, numbers, outside, parse, total_unit
+from steadyslip.core.quantities import example, numbers, parse
 
 Schema = dict[str, Any]
 
@@ -49,7 +50,7 @@ def fault(message: str) -> ParameterError:
     return ParameterError([Problem("", message)])
 
 
-class Value(Role):
+class Entry(Role):
     """One entry of a table in a file; subclasses are dataclasses that say in a phrase, `doc`, what it means."""
 
     doc: str
@@ -71,38 +72,6 @@ class Value(Role):
     def written(self, value: Any, area: float | None = None) -> str:
         """The value in TOML, of a rig with that area."""
         return json.dumps(value, ensure_ascii=False)
-
-
-@dataclass(frozen=True)
-class Domain:
-    """The values that a parameter may take: an interval, open or closed at each end."""
-
-    low: float
-    high: float
-    low_allowed: bool
-    high_allowed: bool
-    text: str
-    whole: bool = False
-
-    def contains(self, value: Any) -> Any:
-        """Elementwise test, false for NaN and infinity."""
-        above = value >= self.low if self.low_allowed else value > self.low
-        below = value <= self.high if self.high_allowed else value < self.high
-        return above & below & np.isfinite(value) & (not self.whole or np.floor(value) == value)
-
-
-_INF = math.inf
-positive = Domain(0, _INF, False, True, "a finite number > 0")
-nonnegative = Domain(0, _INF, True, True, "a finite number >= 0")
-real = Domain(-_INF, _INF, True, True, "a finite number")
-share = Domain(0, 1, True, True, "a number from 0 to 1")
-below_one = Domain(0, 1, True, False, "a number from 0 to below 1")
-tolerance = Domain(1e-14, 0.1, True, True, "a number from 1e-14 to 0.1")
-steps = Domain(1, 1e12, True, True, "a whole number from 1 to 1e12", whole=True)
-angle = Domain(-math.pi / 2, math.pi / 2, False, False, "an angle between -90 deg and 90 deg, both excluded")
-acute = Domain(0, math.pi / 2, False, False, "an angle between 0 and 90 deg, both excluded")
-turn = Domain(-2 * math.pi, 2 * math.pi, True, True, "an angle from -360 deg to 360 deg")
-count = Domain(1, 100_000, True, True, "a whole number from 1 to 100000", whole=True)
 
 
 KINDS = {
@@ -140,7 +109,7 @@ class InUnit(float):
 
 
 @dataclass(frozen=True)
-class Parameter(Value):
+class Parameter(Entry):
     """What a numeric field of a record means.
 
     Attributes
@@ -261,35 +230,7 @@ class Parameter(Value):
 
 
 @dataclass(frozen=True)
-class Option(Value):
-    """One of a few words or numbers, or true or false."""
-
-    choices: tuple[Any, ...]
-    doc: str
-
-    def checked(self, value: Any) -> Any:
-        for choice in self.choices:
-            if (
-                isinstance(value, type(choice))
-                and isinstance(value, bool) == isinstance(choice, bool)
-                and value == choice
-            ):
-                return value
-        raise self.refused(value) if self._truth else fault(unknown_name("choice", value, map(str, self.choices)))
-
-    @property
-    def _truth(self) -> bool:
-        return self.choices == (False, True)
-
-    def allowed(self) -> str:
-        return "true or false" if self._truth else ", ".join(map(str, self.choices))
-
-    def schema(self) -> Schema:
-        return {"enum": list(self.choices), "description": self.doc}
-
-
-@dataclass(frozen=True)
-class Series(Value):
+class Series(Entry):
     """A measured column: a tuple of finite numbers in the SI unit."""
 
     unit: str
@@ -344,137 +285,3 @@ def _per_area(text: str, unit: str, area: float) -> float:
 def _reads_back(value: float, factor: float) -> bool:
     """Whether a total gives the same number per unit area again; otherwise that number is written, with its unit."""
     return float(value) * factor / factor == float(value)
-
-
-@dataclass(frozen=True)
-class Text(Value):
-    """A word or a name, kept as it is."""
-
-    doc: str
-
-    def checked(self, value: Any) -> str:
-        if not isinstance(value, str) or not value:
-            raise self.refused(value)
-        return value
-
-    def allowed(self) -> str:
-        return "a text"
-
-    def schema(self) -> Schema:
-        return {"type": "string", "minLength": 1, "description": self.doc}
-
-
-@dataclass(frozen=True)
-class Label(Value):
-    """A name, or a number counted from 1."""
-
-    doc: str
-
-    def checked(self, value: Any) -> str | int:
-        if (isinstance(value, str) and value) or (isinstance(value, int) and value >= 1 and value is not True):
-            return value
-        raise self.refused(value)
-
-    def allowed(self) -> str:
-        return "a name, or a number from 1"
-
-    def schema(self) -> Schema:
-        return {
-            "anyOf": [{"type": "string", "minLength": 1}, {"type": "integer", "minimum": 1}],
-            "description": self.doc,
-        }
-
-
-@dataclass(frozen=True)
-class Names(Value):
-    """One name or a list of them, kept as a tuple."""
-
-    doc: str
-
-    def checked(self, value: Any) -> tuple[str, ...]:
-        if isinstance(value, str):
-            return (value,)
-        if not isinstance(value, (list, tuple)) or not all(isinstance(one, str) for one in value):
-            raise self.refused(value)
-        return tuple(value)
-
-    def allowed(self) -> str:
-        return "a list of names"
-
-    def schema(self) -> Schema:
-        word = {"type": "string"}
-        return {"anyOf": [word, {"type": "array", "items": word}], "description": self.doc}
-
-
-@dataclass(frozen=True)
-class Whole(Value):
-    """A whole number between two ends, both included."""
-
-    doc: str
-    low: int
-    high: int | None = None
-
-    def checked(self, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, Integral):
-            raise self.refused(value)
-        number = int(value)
-        if number < self.low or (self.high is not None and number > self.high):
-            raise self.refused(value)
-        return number
-
-    def allowed(self) -> str:
-        return (
-            f"a whole number >= {self.low}" if self.high is None else f"a whole number from {self.low} to {self.high}"
-        )
-
-    def schema(self) -> Schema:
-        ends = {"minimum": self.low} | ({} if self.high is None else {"maximum": self.high})
-        return {"type": "integer", **ends, "description": self.doc}
-
-
-@dataclass(frozen=True)
-class Span(Value):
-    """Start and end, as a pair of numbers in the SI unit."""
-
-    doc: str
-    unit: str
-
-    def checked(self, value: Any) -> tuple[float, float]:
-        if not isinstance(value, (list, tuple)) or len(value) != 2:
-            raise self.refused(value)
-        try:
-            start, end = numbers(value, self.unit)
-        except QuantityError as error:
-            raise ParameterError([Problem("", str(error))]) from error
-        return start, end
-
-    def allowed(self) -> str:
-        return f"[start, end] in {self.unit}"
-
-    def schema(self) -> Schema:
-        one = {"anyOf": [{"type": "number"}, {"type": "string", "description": f"text such as {example(self.unit)}"}]}
-        return {"type": "array", "items": one, "minItems": 2, "maxItems": 2, "description": f"{self.doc}, {self.unit}"}
-
-    def written(self, value: Any, area: float | None = None) -> str:
-        return f"[{', '.join(repr(one) for one in value)}]  # {self.unit}"
-
-
-@dataclass(frozen=True)
-class Quantity(Value):
-    """A number in an SI unit, or text with a unit, of a dimension that another part of the file decides."""
-
-    doc: str
-
-    def checked(self, value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, (str, Real)):
-            raise self.refused(value)
-        return value
-
-    def allowed(self) -> str:
-        return "a number in the SI unit, or text with a unit"
-
-    def schema(self) -> Schema:
-        return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": self.doc}
-
-    def written(self, value: Any, area: float | None = None) -> str:
-        return json.dumps(value) if isinstance(value, str) else repr(float(value))

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.records import FrozenRecord, Part, given, resolve, role_of
-from steadyslip.core.roles import Parameter, positive
+from steadyslip.core.records import FrozenRecord, Part, given, role_of
+from steadyslip.core.roles import Parameter
 from steadyslip.experiments.answers.laws import LawComparison, compare_laws
 from steadyslip.experiments.fitting.fit import fit
 from steadyslip.experiments.fitting.result import Fit
@@ -323,7 +325,7 @@ class _Filled:
 
 
 def _kind(item: Field[Any]) -> str:
-    """What a field's parameter is; see `steadyslip.core.records.KINDS`."""
+    """What a field's parameter is; see `steadyslip.core.roles.KINDS`."""
     role = role_of(item)
     return role.kind if isinstance(role, Parameter) else ""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 import math
 
-from steadyslip.core.quantities import printed
+from steadyslip.core.telling import printed
 from steadyslip.machine.drawing import DRIVEN, FORCED, INK, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from steadyslip.core.quantities import outside
+from steadyslip.core.areas import outside
 from steadyslip.core.records import twin
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.files.specifications.written import Given, Written, written

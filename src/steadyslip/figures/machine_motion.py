@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.figures.style import (
     BLACK,
     BLUE,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.quantities import percent, shown
+from steadyslip.core.telling import percent, shown
 from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, axes_or_new, printed
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL

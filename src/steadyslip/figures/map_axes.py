@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from steadyslip.core.quantities import percent, stress_name
+from steadyslip.core.areas import stress_name
+from steadyslip.core.telling import percent
 from steadyslip.figures.style import (
     BLACK,
     BLUE,

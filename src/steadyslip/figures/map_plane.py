@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.figures.chart import absence_reasons
 from steadyslip.figures.map_axes import (
     KINDS,

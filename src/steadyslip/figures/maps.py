@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
-from steadyslip.core.quantities import shown
-from steadyslip.core.records import resolve
+from steadyslip.core.names import resolve
+from steadyslip.core.telling import shown
 from steadyslip.figures.map_axes import legend, short, shown_name
 from steadyslip.figures.map_curves import curve, scatter
 from steadyslip.figures.map_plane import colour_scale, plane

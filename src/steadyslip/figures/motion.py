@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding, ParameterError, Problem
-from steadyslip.core.quantities import shown, stress_name
+from steadyslip.core.telling import shown
 from steadyslip.figures import machine_motion
 from steadyslip.figures.style import (
     BLACK,

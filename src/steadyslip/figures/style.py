@@ -10,7 +10,9 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from steadyslip.core.quantities import outside, printed as printed, shown, unit
+from steadyslip.core.areas import outside
+from steadyslip.core.dimensions import unit
+from steadyslip.core.telling import printed as printed, shown
 
 # Okabe & Ito (2008): told apart with every common kind of colour vision
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.core.quantities import shown_range
+from steadyslip.core.telling import shown_range
 from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, axes_or_new
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate

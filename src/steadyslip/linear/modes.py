@@ -13,8 +13,8 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import percent, shown
 from steadyslip.core.questions import question
+from steadyslip.core.telling import percent, shown
 from steadyslip.laws.contact import Motion
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.machine.machine import Machine

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.dimensions import Dimension, unit
 from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import Dimension, shown, unit
+from steadyslip.core.telling import shown
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.polynomials import Array, StableSet
 from steadyslip.linear.spectrum import is_ill_posed, nearness, spectrum, static_sum

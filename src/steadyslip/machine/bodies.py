@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from steadyslip.core.domains import nonnegative, real
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.core.roles import nonnegative, real
 
 
 class Body(FrozenRecord, family="body"):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from steadyslip.core.areas import total_unit
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.quantities import total_unit
 from steadyslip.core.records import parameters, replaced
 from steadyslip.core.roles import InUnit
 from steadyslip.machine.machine import Machine

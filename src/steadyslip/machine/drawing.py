@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.machine.links import Link
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT

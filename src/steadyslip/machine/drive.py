@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.core.roles import nonnegative, positive
 
 
 class Drive(FrozenRecord, family="drive", kw_only=False):

@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
+from steadyslip.core.domains import angle, nonnegative, positive
+from steadyslip.core.entries import Names
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import FrozenRecord, option, parameter, setting
-from steadyslip.core.roles import Names, angle, nonnegative, positive
 
 
 class Link(FrozenRecord, family="link"):

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.questions import Keeper, question
-from steadyslip.core.records import Address, FrozenRecord, parameters, replaced, resolve
+from steadyslip.core.records import Address, FrozenRecord, parameters, replaced
 from steadyslip.machine.mechanism import Mechanism
 
 S = TypeVar("S", bound="Rig")

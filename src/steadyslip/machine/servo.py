@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from steadyslip.core.domains import nonnegative, positive
+from steadyslip.core.entries import Text
 from steadyslip.core.records import FrozenRecord, parameter, setting
-from steadyslip.core.roles import Text, nonnegative, positive
 
 
 class MachineDrive(FrozenRecord, family="drive of a machine"):

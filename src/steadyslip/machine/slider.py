@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, parameter, part
-from steadyslip.core.roles import nonnegative, positive
+from steadyslip.core.records import parameter, part
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from steadyslip.core.domains import positive
+from steadyslip.core.entries import Text
 from steadyslip.core.records import FrozenRecord, parameter, part, setting
-from steadyslip.core.roles import Text, positive
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT

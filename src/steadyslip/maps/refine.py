@@ -21,8 +21,8 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.telling import shown
 from steadyslip.files.output import write_text
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import find_law

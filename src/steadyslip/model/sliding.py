@@ -9,12 +9,13 @@ from typing import overload
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import shown, stress_name
 from steadyslip.core.questions import question
+from steadyslip.core.telling import shown
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig

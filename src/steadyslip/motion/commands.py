@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.progress import progress_text
-from steadyslip.core.quantities import shown
-from steadyslip.core.roles import Parameter, positive
+from steadyslip.core.roles import Parameter
+from steadyslip.core.telling import shown
 from steadyslip.files.output import FIGURES, write_by_ending
 from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
 from steadyslip.files.standalone import write_page

@@ -12,9 +12,10 @@ import numpy as np
 
 from steadyslip.core.arrays import Together, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.names import resolve
 from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.core.progress import progress_bar
-from steadyslip.core.records import parameters, resolve
+from steadyslip.core.records import parameters
 from steadyslip.core.results import ReadOnly, read_only
 from steadyslip.kernels.layout import Final, Sampled
 from steadyslip.kernels.runner import STATUSES, TALLY

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import stress_name, totals
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, stress_name, totals
+from steadyslip.core.telling import shown
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import store

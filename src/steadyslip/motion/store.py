@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, SteadyslipError
-from steadyslip.core.quantities import outside
 from steadyslip.files.output import write_columns
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table

@@ -13,7 +13,7 @@ from typing import Any
 from steadyslip.core.errors import NotAvailable, ParameterError
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
 from steadyslip.files.standalone import write_page

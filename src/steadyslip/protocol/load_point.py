@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import count, nonnegative, positive, real
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.records import Condition, parameter, samples
-from steadyslip.core.roles import count, nonnegative, positive, real
+from steadyslip.core.records import parameter, samples
 from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
 from steadyslip.protocol.protocol import Piece
 from steadyslip.protocol.shapes import Harmonic, table_problems

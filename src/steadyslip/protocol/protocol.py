@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from steadyslip.core.arrays import check_together, checked_array
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
-from steadyslip.core.quantities import shown
 from steadyslip.core.records import FrozenRecord, parameter, parameters, parts, twin
-from steadyslip.core.roles import positive
+from steadyslip.core.telling import shown
 from steadyslip.protocol.curves import Curve, Jump, Wave
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)

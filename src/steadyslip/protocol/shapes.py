@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, parameter, samples
-from steadyslip.core.roles import nonnegative, positive, real
+from steadyslip.core.records import parameter, samples
 from steadyslip.protocol.curves import Curve, Wave, column, knots
 from steadyslip.protocol.protocol import Piece
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from steadyslip.core.entries import Text
 from steadyslip.core.records import setting
-from steadyslip.core.roles import Text
 from steadyslip.protocol.protocol import DISTURBANCE, NORMAL_STRESS, Piece
 from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, StressStep, StressTable
 

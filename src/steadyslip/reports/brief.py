@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, shown_range, stress_name
 from steadyslip.core.records import FrozenRecord, parameters
+from steadyslip.core.telling import shown, shown_range
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn
 from steadyslip.machine.machine import Machine

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from steadyslip import figures
-from steadyslip.core.quantities import percent, shown
+from steadyslip.core.telling import percent, shown
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction
 from steadyslip.experiments.fitting.words import warnings
 from steadyslip.figures.inline import drawn

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steadyslip import figures
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.figures.inline import drawn
 from steadyslip.figures.machine_verdict import left_out
 from steadyslip.reports import rig as of_rig

@@ -12,9 +12,9 @@ import numpy as np
 from steadyslip import figures
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import percent, shown, shown_range
 from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
+from steadyslip.core.telling import percent, shown, shown_range
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steadyslip import figures
+from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError
-from steadyslip.core.quantities import shown, stress_name
+from steadyslip.core.telling import shown
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn

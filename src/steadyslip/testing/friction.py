@@ -7,9 +7,9 @@ from typing import Any
 
 import mpmath
 
+from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import QuantityError
 from steadyslip.core.expressions import derivative
-from steadyslip.core.quantities import unit
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.testing.precise import (
     DIGITS,

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, stress_name
+from steadyslip.core.telling import shown
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.status import decided_by_rounding, on_edge

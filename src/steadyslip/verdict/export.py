@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from steadyslip.core.quantities import total
+from steadyslip.core.areas import total
 from steadyslip.verdict.holding import holding
 
 if TYPE_CHECKING:

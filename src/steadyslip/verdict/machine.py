@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
 from steadyslip.linear.modes import Mode, mode_of

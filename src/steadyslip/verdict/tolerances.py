@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import percent, shown_range
-from steadyslip.core.records import Address, resolve
+from steadyslip.core.records import Address
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.roles import Parameter, positive
+from steadyslip.core.roles import Parameter
+from steadyslip.core.telling import percent, shown_range
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status

@@ -7,7 +7,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from steadyslip.core.errors import InternalError
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 from steadyslip.verdict.holding import gain_words, holding

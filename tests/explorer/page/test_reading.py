@@ -8,7 +8,7 @@ import pytest
 import steadyslip as ss
 from explored_pages import INCLINED, Visit
 from rigs_of_theory import SIGMA, rig
-from steadyslip.core.roles import positive
+from steadyslip.core.domains import positive
 
 SIZES = [(360, 740), (390, 844), (768, 1024), (1280, 800), (1920, 1080)]
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite, whole
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, shown_range
-from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.telling import shown, shown_range
 from steadyslip.experiments.answers.inference import inference_data
 from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.options import NAMES, checked, finite, whole
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown
-from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.telling import shown
 from steadyslip.experiments.fitting.identify import Combination, combinations
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.measured.read import record_from_arrays

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import outside, percent, shown
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.telling import percent, shown
 from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.linear.stable_values import safety_factor

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from steadyslip.core.options import NAME, THREADS, checked, finite, whole
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.telling import shown
 from steadyslip.experiments.fitting.condensed import condensed
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit

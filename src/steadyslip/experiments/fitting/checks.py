@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.experiments.fitting.inputs import LEAST_RATE
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading, resting_rate

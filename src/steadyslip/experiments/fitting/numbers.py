@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import shown, shown_error, shown_range
-from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly, read_only
+from steadyslip.core.telling import shown, shown_error, shown_range
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
-from steadyslip.core.records import Address, parameters, resolve
+from steadyslip.core.names import resolve
+from steadyslip.core.records import Address, parameters
 from steadyslip.experiments.fitting.checks import check_changes, check_records
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import faults

@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from steadyslip.core.domains import Domain
+from steadyslip.core.entries import Names, Text, Whole
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import Settings, option, parameter, setting
-from steadyslip.core.roles import Domain, Names, Series, Text, Whole
+from steadyslip.core.roles import Series
 
 STARTS = 48
 LOSSES = ("linear", "soft-l1", "huber", "cauchy")

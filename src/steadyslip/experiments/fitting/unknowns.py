@@ -32,7 +32,7 @@ class Unknown:
     low, high : float
         What the parameter may be.
     kind : str
-        What its law says it is; see `steadyslip.core.records.KINDS`.
+        What its law says it is; see `steadyslip.core.roles.KINDS`.
     """
 
     name: str

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.quantities import shown, total
+from steadyslip.core.areas import total
+from steadyslip.core.telling import shown
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import Ramped, may_be_ramp
 from steadyslip.experiments.numerics.splitting import displacement_noise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
 Array = np.ndarray

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import Problem, QuantityError, unknown_name
-from steadyslip.core.quantities import described, example, unit
+from steadyslip.core.quantities import described, example
 
 ROLES = {
     "time": "s",

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
-from steadyslip.core.quantities import shown
-from steadyslip.core.roles import Parameter, positive
+from steadyslip.core.roles import Parameter
+from steadyslip.core.telling import shown
 from steadyslip.experiments.measured.clean import cleaned, without_stand_ins
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
 from steadyslip.experiments.measured.formats import read_columns

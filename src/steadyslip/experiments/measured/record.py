@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.domains import real
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.results import read_only
-from steadyslip.core.roles import Parameter, real
+from steadyslip.core.roles import Parameter
+from steadyslip.core.telling import shown
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from steadyslip.core.domains import positive
+from steadyslip.core.entries import Label, Span, Text, Whole
 from steadyslip.core.records import Settings, given, option, parameter, part, setting
-from steadyslip.core.roles import Label, Span, Text, Whole, positive
 from steadyslip.experiments.measured.columns import ROLES
 
 FEWEST_KEPT = 50

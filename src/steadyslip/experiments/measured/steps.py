@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.experiments.loading.loading import Change, Loading
 from steadyslip.experiments.loading.pressing import StressWave
 

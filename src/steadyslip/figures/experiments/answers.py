@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from scipy.stats import chi2
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.quantities import percent, shown
+from steadyslip.core.telling import percent, shown
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.experiments.panels import brief, grid
 from steadyslip.figures.style import (

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
-from steadyslip.core.records import FrozenRecord, Part, resolve
+from steadyslip.core.names import resolve
+from steadyslip.core.records import FrozenRecord, Part
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
     has_choice,

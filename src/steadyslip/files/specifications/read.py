@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import (
     InternalError,
     NotAvailable,
@@ -18,7 +19,7 @@ from steadyslip.core.errors import (
 )
 from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Part
-from steadyslip.core.roles import Parameter, positive
+from steadyslip.core.roles import Parameter
 from steadyslip.files.inputs import MOST_TEXT, UnreadableFile, read_bytes
 from steadyslip.files.specifications.changes import apply, full_name, split
 from steadyslip.files.specifications.layout import (

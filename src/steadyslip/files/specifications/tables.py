@@ -8,21 +8,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import Field, fields, replace
 from typing import Any
 
+from steadyslip.core.areas import is_per_area, total_unit
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, came, legible, unknown_name
-from steadyslip.core.quantities import is_per_area, total_unit
-from steadyslip.core.records import (
-    Declared,
-    FrozenRecord,
-    Members,
-    Named,
-    Part,
-    Settings,
-    is_required,
-    key_of,
-    role_of,
-    unfit_name,
-)
-from steadyslip.core.roles import Parameter, Value, positive
+from steadyslip.core.members import Members
+from steadyslip.core.names import unfit_name
+from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
+from steadyslip.core.roles import Entry, Parameter
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
 from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.doing import TURNING, turns_on
@@ -304,7 +296,7 @@ def _wanted(family: type[FrozenRecord], name: str) -> str:
 
 
 def _missing(role: Declared) -> str:
-    return f"missing ({role.doc})" + (f"; allowed: {role.allowed()}" if isinstance(role, Value) else "")
+    return f"missing ({role.doc})" + (f"; allowed: {role.allowed()}" if isinstance(role, Entry) else "")
 
 
 def _stand_in(law: type[FrozenRecord], valid: Mapping[str, Any], others: Mapping[str, Any]) -> FrozenRecord:

@@ -10,7 +10,7 @@ from typing import Any
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.core.records import FrozenRecord, Named, key_of
-from steadyslip.core.roles import Value
+from steadyslip.core.roles import Entry
 from steadyslip.files.output import write_text
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
@@ -90,7 +90,7 @@ def _table(header: str, record: FrozenRecord, first: list[str], path: str, area:
         value, key = getattr(record, item.name), key_of(item)
         if value is None or value == item.default:
             continue
-        if isinstance(role, Value):
+        if isinstance(role, Entry):
             lines.append(f"{key} = {role.written(value, area)}")
         elif isinstance(role, Named):
             below.append(_named(role, value, f"{path}.{key}"))

@@ -10,8 +10,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from steadyslip.core.areas import is_per_area, total_unit
+from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, QuantityError
-from steadyslip.core.quantities import is_per_area, total_unit, unit
 from steadyslip.core.records import Address, twin
 from steadyslip.files.specifications.read import rig_from_text
 from steadyslip.files.specifications.write import rig_to_text

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from steadyslip.core.records import Condition, parameter
-from steadyslip.core.roles import nonnegative, positive, real
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import nonnegative, positive, real
+from steadyslip.core.records import parameter
 from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
 
 

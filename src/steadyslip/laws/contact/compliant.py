@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.records import parameter
-from steadyslip.core.roles import nonnegative, positive
 from steadyslip.laws.contact.law import ContactLaw, Expression, Motion
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
+from steadyslip.core.domains import positive, real
 from steadyslip.core.records import parameter
-from steadyslip.core.roles import positive, real
 from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from steadyslip.core.domains import positive
 from steadyslip.core.errors import NotAvailable, Problem
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.core.roles import positive
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
 

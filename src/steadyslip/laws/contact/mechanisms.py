@@ -11,9 +11,10 @@ from collections.abc import Iterator
 
 import sympy as sp
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import acute, angle, nonnegative, positive, real, turn
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, option, parameter
-from steadyslip.core.roles import acute, angle, nonnegative, positive, real, turn
+from steadyslip.core.records import option, parameter
 from steadyslip.laws.contact.law import ContactLaw, Expression, Motion, PreloadedContact, Shape
 from steadyslip.units import deg
 

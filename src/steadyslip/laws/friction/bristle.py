@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
+from steadyslip.core.domains import nonnegative, positive
 from steadyslip.core.records import parameter
-from steadyslip.core.roles import nonnegative, positive
 from steadyslip.laws.friction.law import Expression, FrictionLaw
 
 REST = sp.Rational(1, 10**12)

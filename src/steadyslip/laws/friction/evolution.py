@@ -10,9 +10,10 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import nonnegative
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, FrozenRecord, parameter
-from steadyslip.core.roles import nonnegative
+from steadyslip.core.records import FrozenRecord, parameter
 from steadyslip.laws.friction.law import Expression
 from steadyslip.laws.friction.normal_memory import NormalMemory
 from steadyslip.laws.friction.state import State

@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 import sympy as sp
 
-from steadyslip.core.records import Condition, FrozenRecord
+from steadyslip.core.conditions import Condition
+from steadyslip.core.records import FrozenRecord
 
 Expression = Any  # SymPy expression, or a plain number when a law is evaluated by hand
 

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import nonnegative, positive, share
 from steadyslip.core.errors import Problem
-from steadyslip.core.records import Condition, FrozenRecord, parameter
-from steadyslip.core.roles import nonnegative, positive, share
+from steadyslip.core.records import FrozenRecord, parameter
 from steadyslip.laws.friction.law import Expression
 from steadyslip.laws.friction.state import State
 

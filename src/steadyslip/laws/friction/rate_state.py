@@ -9,10 +9,11 @@ from typing import ClassVar
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.conditions import Condition
+from steadyslip.core.domains import positive, real
 from steadyslip.core.errors import InternalError, Problem
 from steadyslip.core.expressions import asinh_exp
-from steadyslip.core.records import Condition, option, parameter, part, parts
-from steadyslip.core.roles import positive, real
+from steadyslip.core.records import option, parameter, part, parts
 from steadyslip.laws.friction.evolution import Evolution, Slip
 from steadyslip.laws.friction.law import Expression, FrictionLaw
 from steadyslip.laws.friction.normal_memory import NoMemory, NormalMemory

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from steadyslip.core.domains import nonnegative, positive, real
 from steadyslip.core.records import FrozenRecord, parameter
-from steadyslip.core.roles import nonnegative, positive, real
 
 
 class State(FrozenRecord):

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside
+from steadyslip.core.entries import Text
 from steadyslip.core.errors import ParameterError, Problem, SteadyslipError
-from steadyslip.core.quantities import outside
 from steadyslip.core.records import setting
-from steadyslip.core.roles import Text
 from steadyslip.linear import critical_stiffness, safety_factor, stable_stiffness
 from steadyslip.linear.linear_sets import most_values
 from steadyslip.linear.response import has_closed_form

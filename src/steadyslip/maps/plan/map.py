@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.pages import Displayed
-from steadyslip.core.records import Address, FrozenRecord, parameters, resolve
+from steadyslip.core.records import Address, FrozenRecord, parameters
 from steadyslip.core.roles import Parameter
 from steadyslip.files.specifications import rig_to_text
 from steadyslip.files.specifications.layout import find_law

@@ -16,9 +16,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from steadyslip.core.domains import Domain, below_one, positive, steps, tolerance
+from steadyslip.core.entries import Text
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, unknown_name
 from steadyslip.core.records import FrozenRecord, option, parameter, setting
-from steadyslip.core.roles import Domain, Text, below_one, positive, steps, tolerance
 from steadyslip.linear import growth_rate
 from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.spectrum import spectrum

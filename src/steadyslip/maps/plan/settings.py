@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from steadyslip.core.entries import Names, Quantity, Text, Whole
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import Settings, named, option, part, parts, setting
-from steadyslip.core.roles import Names, Quantity, Text, Whole
 from steadyslip.maps.plan.axes import METHODS, MOST_POINTS, SPACINGS, Grid, Samples
 from steadyslip.maps.plan.measures import Measure
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem, SteadyslipError, UnknownNameError
+from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
-from steadyslip.core.records import resolve
 from steadyslip.files.specifications.layout import MAP, Section
 from steadyslip.files.specifications.read import Specification, read_specification, text_of
 from steadyslip.maps.plan.axes import Grid

@@ -17,8 +17,8 @@ from steadyslip.core.errors import (
     UnknownNameError,
     unknown_name,
 )
+from steadyslip.core.names import resolve
 from steadyslip.core.quantities import parse
-from steadyslip.core.records import resolve
 from steadyslip.core.results import ReadOnly
 from steadyslip.linear.status import STABLE
 from steadyslip.maps.plan.axes import SAMPLE

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import outside, percent, shown, shown_range
+from steadyslip.core.telling import percent, shown, shown_range
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.store.arrays import Store

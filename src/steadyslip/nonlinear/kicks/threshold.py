@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import total
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import shown, total
+from steadyslip.core.telling import shown
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import beyond_range

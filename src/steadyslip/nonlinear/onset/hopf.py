@@ -21,7 +21,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.linear_sets import linear_sets
 from steadyslip.linear.polynomials import quietly, stable_set

@@ -17,8 +17,8 @@ from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, 
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import shown, shown_range
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.telling import shown, shown_range
 from steadyslip.linear.boundary import boundary, present_zeros
 from steadyslip.linear.polynomials import roots
 from steadyslip.linear.search import Search

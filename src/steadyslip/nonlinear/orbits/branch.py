@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.areas import outside, stress_name, total, totals
 from steadyslip.core.errors import unknown_name
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.quantities import outside, shown, stress_name, total, totals
+from steadyslip.core.telling import shown
 from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

@@ -10,7 +10,7 @@ import numpy as np
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import BRANCH, LOW_AND_HIGH, NAME, checked, finite, whole
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from steadyslip.core.errors import InternalError
-from steadyslip.core.quantities import shown
+from steadyslip.core.telling import shown
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure, Point, Track

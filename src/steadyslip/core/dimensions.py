@@ -1,0 +1,163 @@
+"""Units and their dimensions: words with small whole powers, multiplied or divided, such as ``kg/m^2``.
+
+Everyday units stand in the table below; other words go to pint.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from steadyslip import units
+from steadyslip.core.errors import QuantityError, came
+
+
+class Dimension(NamedTuple):
+    """Exponents of kilogram, metre, second and radian."""
+
+    mass: float = 0
+    length: float = 0
+    time: float = 0
+    angle: float = 0
+
+    def times(self, other: Dimension, power: float = 1) -> Dimension:
+        return Dimension(*(a + power * b for a, b in zip(self, other, strict=True)))
+
+
+_PREFIX = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+MICRO = str.maketrans({"µ": "u", "μ": "u", "·": " ", "×": " ", "−": "-"})
+"""Signs of units as people write them, and as they stand in the table."""
+_PREFIXED = {
+    "Pa": Dimension(1, -1, -2),
+    "N": Dimension(1, 1, -2),
+    "m": Dimension(0, 1),
+    "s": Dimension(0, 0, 1),
+    "Hz": Dimension(0, 0, -1),
+}
+_TABLE: dict[str, tuple[float, Dimension]] = {
+    "g": (1e-3, Dimension(1)),
+    "kg": (1.0, Dimension(1)),
+    "t": (1e3, Dimension(1)),
+    "min": (units.minute, Dimension(0, 0, 1)),
+    "h": (units.hour, Dimension(0, 0, 1)),
+    "hour": (units.hour, Dimension(0, 0, 1)),
+    "day": (units.day, Dimension(0, 0, 1)),
+    "yr": (units.year, Dimension(0, 0, 1)),
+    "year": (units.year, Dimension(0, 0, 1)),
+    "bar": (1e5, Dimension(1, -1, -2)),
+    "rad": (1.0, Dimension(0, 0, 0, 1)),
+    "deg": (units.deg, Dimension(0, 0, 0, 1)),
+    "degree": (units.deg, Dimension(0, 0, 0, 1)),
+    "degrees": (units.deg, Dimension(0, 0, 0, 1)),
+    "°": (units.deg, Dimension(0, 0, 0, 1)),
+    "rev": (2 * math.pi, Dimension(0, 0, 0, 1)),
+    "turn": (2 * math.pi, Dimension(0, 0, 0, 1)),
+    "rpm": (2 * math.pi / units.minute, Dimension(0, 0, -1, 1)),
+    "%": (1e-2, Dimension()),
+    "1": (1.0, Dimension()),
+}
+for _base, _dimension in _PREFIXED.items():
+    _TABLE[_base] = (1.0, _dimension)
+    for _letter, _factor in _PREFIX.items():
+        _TABLE.setdefault(_letter + _base, (_factor, _dimension))
+PLAIN_WORDS = {"1", "kg", "rad", *_PREFIXED}
+"""Words without a prefix."""
+PREFIXABLE = PLAIN_WORDS | {prefix + base for base in _PREFIXED for prefix in _PREFIX}
+"""Words that may have a prefix, with it and without."""
+
+_TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
+_ONE = re.compile(r"1\s*(?=/|$)")
+_SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
+_PLAIN = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
+MOST_TEXT = 200
+"""Characters of a quantity: longer texts are refused unread."""
+MOST_POWER = 9
+"""Largest power of a word in a unit."""
+
+
+@lru_cache(maxsize=256)
+def unit(text: str) -> tuple[float, Dimension]:
+    """SI factor and dimension of a unit such as ``"Pa s/m"``.
+
+    A unit is words with small whole powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
+    arithmetic, a stroke divides by the one factor behind it. Words that the table does not have go to pint.
+
+    Raises
+    ------
+    QuantityError
+        If the text is none, or a word is not that of a unit.
+    """
+    if len(text) > MOST_TEXT:
+        raise QuantityError(f"{came(text)} is not a unit: too long")
+    factor, dimension = 1.0, Dimension()
+    for word, power in factors(text):
+        value, base = _TABLE.get(word) or _from_pint(word)
+        factor *= float(np.float64(value) ** power)  # inf where a float would raise
+        dimension = dimension.times(base, power)
+    if not 0 < factor < math.inf:
+        raise QuantityError(f"{text!r} leaves the range of floating point")
+    return factor, dimension
+
+
+def factors(text: str) -> Iterator[tuple[str, int]]:
+    """The words of a unit with their powers, negative where divided by."""
+    fault = QuantityError(f"{text!r} is not a unit")
+    plain = _SUPERSCRIPT.sub(lambda run: "^" + run[0].translate(_PLAIN), text.translate(MICRO)).strip()
+    start = _ONE.match(plain)
+    position = start.end() if start else 0
+    wanted, sign, group = start is None, 1, 1
+    outer: list[int] = []  # signs in front of open brackets
+    while position < len(plain):
+        match = _TOKEN.match(plain, position)
+        if match is None:
+            raise fault
+        position = match.end()
+        mark, word, power = match[1], match[2], match[3] or match[4] or "1"
+        if word:
+            if len(power) > 3 or abs(int(power)) > MOST_POWER:
+                raise QuantityError(f"{text!r} is not a unit: powers are whole numbers up to {MOST_POWER}")
+            yield word, int(power) * sign * group
+        elif mark == ")":
+            if wanted or not outer:
+                raise fault
+            group = outer.pop()
+        elif mark == "(":
+            outer.append(group)
+            group *= sign
+        elif wanted:
+            raise fault
+        wanted = mark in ("(", "/", "*")
+        sign = -1 if mark == "/" else 1
+    if wanted or outer:
+        raise fault
+
+
+@lru_cache(maxsize=256)
+def _from_pint(word: str) -> tuple[float, Dimension]:
+    """SI factor and dimension of one word that the table does not have."""
+    registry = _pint_registry()
+    fault = QuantityError(f"{word!r} is not a unit")
+    try:
+        bases = [registry.Quantity(size, word).to_base_units() for size in (1.0, 2.0)]
+        exponents = dict(bases[0].dimensionality)
+        one, two = (float(base.magnitude) for base in bases)
+    except Exception as error:  # pint raises its own kinds, and others, for words that are none
+        raise fault from error
+    if not (math.isfinite(one) and one > 0 and math.isclose(two, 2 * one)):  # decibels, degrees Celsius
+        raise fault
+    known = {"[mass]": "mass", "[length]": "length", "[time]": "time"}
+    if not set(exponents) <= set(known):
+        raise QuantityError(f"{word!r} has a dimension that no parameter has")
+    return one, Dimension(**{known[key]: float(power) for key, power in exponents.items()})
+
+
+@lru_cache(maxsize=1)
+def _pint_registry():  # type: ignore[no-untyped-def]  # pint is imported lazily
+    import pint
+
+    return pint.UnitRegistry()

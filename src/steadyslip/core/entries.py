@@ -1,0 +1,174 @@
+"""What tables hold besides parameters: choices, words, counts, names, quantities of any kind."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import Any
+
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, unknown_name
+from steadyslip.core.quantities import example, numbers
+from steadyslip.core.roles import Entry, Schema, fault
+
+
+@dataclass(frozen=True)
+class Option(Entry):
+    """One of a few words or numbers, or true or false."""
+
+    choices: tuple[Any, ...]
+    doc: str
+
+    def checked(self, value: Any) -> Any:
+        for choice in self.choices:
+            if (
+                isinstance(value, type(choice))
+                and isinstance(value, bool) == isinstance(choice, bool)
+                and value == choice
+            ):
+                return value
+        raise self.refused(value) if self._truth else fault(unknown_name("choice", value, map(str, self.choices)))
+
+    @property
+    def _truth(self) -> bool:
+        return self.choices == (False, True)
+
+    def allowed(self) -> str:
+        return "true or false" if self._truth else ", ".join(map(str, self.choices))
+
+    def schema(self) -> Schema:
+        return {"enum": list(self.choices), "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Text(Entry):
+    """A word or a name, kept as it is."""
+
+    doc: str
+
+    def checked(self, value: Any) -> str:
+        if not isinstance(value, str) or not value:
+            raise self.refused(value)
+        return value
+
+    def allowed(self) -> str:
+        return "a text"
+
+    def schema(self) -> Schema:
+        return {"type": "string", "minLength": 1, "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Label(Entry):
+    """A name, or a number counted from 1."""
+
+    doc: str
+
+    def checked(self, value: Any) -> str | int:
+        if (isinstance(value, str) and value) or (isinstance(value, int) and value >= 1 and value is not True):
+            return value
+        raise self.refused(value)
+
+    def allowed(self) -> str:
+        return "a name, or a number from 1"
+
+    def schema(self) -> Schema:
+        return {
+            "anyOf": [{"type": "string", "minLength": 1}, {"type": "integer", "minimum": 1}],
+            "description": self.doc,
+        }
+
+
+@dataclass(frozen=True)
+class Names(Entry):
+    """One name or a list of them, kept as a tuple."""
+
+    doc: str
+
+    def checked(self, value: Any) -> tuple[str, ...]:
+        if isinstance(value, str):
+            return (value,)
+        if not isinstance(value, (list, tuple)) or not all(isinstance(one, str) for one in value):
+            raise self.refused(value)
+        return tuple(value)
+
+    def allowed(self) -> str:
+        return "a list of names"
+
+    def schema(self) -> Schema:
+        word = {"type": "string"}
+        return {"anyOf": [word, {"type": "array", "items": word}], "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Whole(Entry):
+    """A whole number between two ends, both included."""
+
+    doc: str
+    low: int
+    high: int | None = None
+
+    def checked(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, Integral):
+            raise self.refused(value)
+        number = int(value)
+        if number < self.low or (self.high is not None and number > self.high):
+            raise self.refused(value)
+        return number
+
+    def allowed(self) -> str:
+        return (
+            f"a whole number >= {self.low}" if self.high is None else f"a whole number from {self.low} to {self.high}"
+        )
+
+    def schema(self) -> Schema:
+        ends = {"minimum": self.low} | ({} if self.high is None else {"maximum": self.high})
+        return {"type": "integer", **ends, "description": self.doc}
+
+
+@dataclass(frozen=True)
+class Span(Entry):
+    """Start and end, as a pair of numbers in the SI unit."""
+
+    doc: str
+    unit: str
+
+    def checked(self, value: Any) -> tuple[float, float]:
+        if not isinstance(value, (list, tuple)) or len(value) != 2:
+            raise self.refused(value)
+        try:
+            start, end = numbers(value, self.unit)
+        except QuantityError as error:
+            raise ParameterError([Problem("", str(error))]) from error
+        return start, end
+
+    def allowed(self) -> str:
+        return f"[start, end] in {self.unit}"
+
+    def schema(self) -> Schema:
+        one = {"anyOf": [{"type": "number"}, {"type": "string", "description": f"text such as {example(self.unit)}"}]}
+        return {"type": "array", "items": one, "minItems": 2, "maxItems": 2, "description": f"{self.doc}, {self.unit}"}
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        return f"[{', '.join(repr(one) for one in value)}]  # {self.unit}"
+
+
+@dataclass(frozen=True)
+class Quantity(Entry):
+    """A number in an SI unit, or text with a unit, of a dimension that another part of the file decides."""
+
+    doc: str
+
+    def checked(self, value: Any) -> Any:
+        if isinstance(value, bool) or not isinstance(value, (str, Real)):
+            raise self.refused(value)
+        return value
+
+    def allowed(self) -> str:
+        return "a number in the SI unit, or text with a unit"
+
+    def schema(self) -> Schema:
+        return {"anyOf": [{"type": "number"}, {"type": "string"}], "description": self.doc}
+
+    def written(self, value: Any, area: float | None = None) -> str:
+        return json.dumps(value) if isinstance(value, str) else repr(float(value))

@@ -1,0 +1,135 @@
+"""Quantities for people: the unit and the digits in which they read best, or the unit that the user writes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from types import MappingProxyType
+
+from steadyslip import units
+from steadyslip.core.areas import outside
+from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
+
+_own: ContextVar[Mapping[Dimension, str]] = ContextVar("own units", default=MappingProxyType({}))
+
+
+@contextmanager
+def told_in(names: Iterable[str]) -> Iterator[None]:
+    """Tell people quantities in units of their own, such as rpm, bar or N/um, where these are one for a dimension.
+
+    Units with a prefix in front alone, such as kN or um/s, are no reason: they are told as reads best in any case.
+
+    >>> with told_in(["rpm", "kN", "MPa", "bar", "N/um"]):
+    ...     shown(10.0, "rad/s"), shown(2e4, "N"), shown(2e5, "Pa"), shown(12e6, "N/m")
+    ('95.49 rpm', '20 kN', '200 kPa', '12 N/um')
+    """
+    found: dict[Dimension, set[str]] = {}
+    for name in names:
+        found.setdefault(unit(name)[1], set()).add(name)
+    alone = {dimension: own for dimension, several in found.items() for own in several if len(several) == 1}
+    own = {
+        dimension: name for dimension, name in alone.items()
+        if any(word not in PREFIXABLE or (word not in PLAIN_WORDS and power < 0) for word, power in factors(name))
+    }  # fmt: skip
+    before = _own.set(own)
+    try:
+        yield
+    finally:
+        _own.reset(before)
+
+
+_SHOWN_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
+
+
+def _few(value: float, digits: int) -> str:
+    """A number with a few digits, without a power of ten up to five places."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < 1e5 else text
+
+
+def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
+    """A value for people: prefixed unit, a few digits, angles in degrees, leads in turns, totals if there is an `area`.
+
+    >>> shown(8.72093e9, "Pa/m"), shown(-0.7853981633974483, "rad"), shown(0.0145, "1")
+    ('8.721 GPa/m', '-45 deg', '0.0145')
+    >>> shown(0.01 / 6.283185307179586, "m/rad")
+    '10 mm/rev'
+    >>> shown(8.72093e9, "Pa/m", area=0.01)
+    '87.21 MN/m'
+    """
+    factor, si_unit = outside(si_unit, area)
+    value = value * factor
+    if si_unit == "1":
+        return _few(value, digits)
+    own = _own.get().get(unit(si_unit)[1])
+    scaled = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)  # of a power, a prefix would be one of the base
+    if own is not None and (value == 0 or scaled is None or 1e-3 <= abs(value / unit(own)[0]) < 1e5):
+        return f"{_few(value / unit(own)[0], digits)} {own}"
+    if si_unit == "rad":
+        return f"{_few(value / units.deg, digits)} deg"
+    if si_unit == "m/rad":
+        value, si_unit = value * 2 * math.pi, "m/rev"
+    if si_unit == "s" and math.isfinite(value) and abs(value) >= 600:
+        for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
+            if abs(value) >= 2 * size:
+                return f"{_few(value / size, digits)} {name}"
+    first = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)
+    if first is None or value == 0 or not math.isfinite(value):
+        return f"{_few(value, digits)} {si_unit}"
+    size = abs(value)
+    for factor, prefix in _SHOWN_PREFIXES:
+        if size >= 0.9999 * factor and (prefix not in ("G", "M", "k") or first[0] in ("Pa", "N")):
+            break
+    if not 1e-3 <= size / factor < 1e5:
+        return f"{_few(value, digits)} {si_unit}"
+    return f"{_few(value / factor, digits)} {prefix}{si_unit}"
+
+
+def shown_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
+    """A value and its error for people, both in the unit in which the value reads best.
+
+    >>> shown_error(1.009e-5, 8.7e-7, "m"), shown_error(0.00696, 0.00043, "1")
+    ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
+    """
+    scale, si_unit = outside(si_unit, area)
+    value, error = value * scale, error * scale
+    number, _, name = shown(value, si_unit).partition(" ")
+    factor = value / float(number) if float(number) else 1.0
+    return f"{number} ± {error / factor:.2g} {name}".rstrip()
+
+
+def shown_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:
+    """Two values for people, in the unit in which the second reads best.
+
+    >>> shown_range(8.52e-6, 1.195e-5, "m")
+    '8.52 to 11.95 um'
+    """
+    factor, si_unit = outside(si_unit, area)
+    low, high = low * factor, high * factor
+    number, _, name = shown(high, si_unit).partition(" ")
+    if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
+        return f"{shown(low, si_unit)} to {shown(high, si_unit)}"
+    return f"{low * float(number) / high:.4g} to {number} {name}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A share in percent with three digits, or as many as it takes to tell it from 0 and 100.
+
+    >>> percent(0.123456), percent(0.99981), percent(1.0)
+    ('12.3 %', '99.981 %', '100 %')
+    """
+    text = f"{100 * share:.3g}"
+    return f"{100 * share:.8g} %" if 0 < share < 1 and float(text) in (0, 100) else f"{text} %"
+
+
+def printed(text: str) -> str:
+    """Words with units as they are set in print: µm, m², kg/m³.
+
+    >>> printed("9.2 us, 3 um/s, 2 uN m at 5 m^2: ours")
+    '9.2 µs, 3 µm/s, 2 µN m at 5 m²: ours'
+    """
+    text = text.replace("^2", "²").replace("^3", "³")
+    return re.sub(r"(?<![A-Za-z])u(?=(?:m|s|N|Pa)(?![A-Za-z]))", "µ", text)

@@ -1,4 +1,4 @@
-"""Arrays in place of a record's numbers: the one place where they are checked and broadcast."""
+"""Arrays, and arrays in place of a record's numbers: the one place where these are checked and broadcast."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from steadyslip.core.errors import ParameterError, Problem, QuantityError
 from steadyslip.core.quantities import parse
 from steadyslip.core.records import FrozenRecord, conditions, twin
 from steadyslip.core.roles import Parameter
+
+Array = np.ndarray
+"""Of numbers; the docstring of what takes or gives it says which."""
 
 
 def checked_array(name: str, role: Parameter, value: Any) -> Any:

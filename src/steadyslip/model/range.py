@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
 from steadyslip.core.expressions import ArrayFunction, occurrences
 from steadyslip.core.questions import question
@@ -21,7 +22,6 @@ from steadyslip.model.linearisation import characteristic_coefficients, characte
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.steady import beyond_floats
 
-Array = NDArray[np.float64]
 ORDINARY = 1e20
 """Sizes up to which, and down to whose inverse, no product of a dozen numbers leaves the range."""
 _NEARER = (0.75, 0.5, 0.25, 0.0)

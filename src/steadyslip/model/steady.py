@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 
 Arguments = tuple[Any, ...]
-Array = np.ndarray
 GRID = np.geomspace(1e-12, 1e18, 6001)  # stresses between whose neighbours a root is looked for, Pa
 SOLVED = 1e-6  # misfit of a root as a share of its stress: a pole changes sign too
 _NEARLY_REAL = 1e-9  # relative imaginary part of what is real but for rounding

@@ -14,13 +14,13 @@ from itertools import combinations_with_replacement
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 
-Array = np.ndarray
 Index = tuple[int, ...]
 """(equation, variable, ...), variables in rising order."""
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.names import resolve
@@ -26,7 +27,6 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import operating_point
 
-Array = np.ndarray
 POWER = 12  # of 2: how many rigs inside the tolerances are looked at
 ALONE = 65  # values of a parameter that varies alone
 

@@ -6,11 +6,9 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
-Array = np.ndarray
 MEMBERS = "experiment"  # the dimension of what every experiment has
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite, whole
@@ -26,7 +27,6 @@ from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.pooling import Pooled, Told, pooled
 from steadyslip.model.sliding import steady_state
 
-Array = np.ndarray
 FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
 
 

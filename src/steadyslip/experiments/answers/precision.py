@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.names import resolve
 from steadyslip.core.options import NAMES, checked, finite, whole
@@ -28,7 +29,6 @@ from steadyslip.protocol import (
     VelocityStep,
 )
 
-Array = np.ndarray
 SAMPLES = 4000
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import outside
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
@@ -25,7 +26,6 @@ from steadyslip.nonlinear.kicks.brackets import threshold_brackets
 from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.spans import INTERRUPTED
 
-Array = np.ndarray
 COUNT = 4000
 KICKED = 200  # draws of which a threshold is found
 LEVELS = (0.025, 0.16, 0.5, 0.84, 0.975)

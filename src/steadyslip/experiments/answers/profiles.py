@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.options import NAME, THREADS, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
@@ -17,7 +18,6 @@ from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
 
-Array = np.ndarray
 LEVEL = 0.95  # at which a profile and an error are compared
 ALIKE = 0.15  # of the reach of the error to one side: difference of ends that is still Gaussian
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
 from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
@@ -18,7 +19,6 @@ from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 from steadyslip.experiments.numerics.sampling import walked
 
-Array = np.ndarray
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
 KINDS = ("auto", "block", "residual")
 WARM = 1e-6  # reduction still to be had, as a share of the sum, at which a refit is done: far below its scatter

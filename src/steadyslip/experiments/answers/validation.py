@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.options import checked, whole
 from steadyslip.core.results import ReadOnly
@@ -13,8 +14,6 @@ from steadyslip.experiments.answers.uncertainty import block_length
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import minimise
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

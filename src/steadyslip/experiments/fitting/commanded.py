@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.loading import Change, Course, Loading, resting_rate
 
-Array = np.ndarray
 STRAIGHT = 5e-4  # of the range of a curve: what straight lines may miss of it
 MOST_CUTS = 30  # of one interval between samples
 BRIEFEST = 1e-9  # of the record: a ramp shorter than that is a step

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.commanded import CommandedInputs
 from steadyslip.experiments.fitting.forward import Forward, InputTable
@@ -19,7 +20,6 @@ from steadyslip.experiments.loading.loading import Loading, resting_rate
 from steadyslip.experiments.measured.record import Record
 from steadyslip.machine.slider import Slider
 
-Array = np.ndarray
 RECENT = 6  # points of which is remembered what the model said,
 REMEMBERED = 200_000  # while they are few: of so many samples together
 

@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading
 
-Array = np.ndarray
 NODES = 7  # of one polynomial
 MISSED = 1e-3  # error of the interpolation: of the scatter for the model, of the largest for derivatives
 WORTHWHILE = 0.5  # share of the samples that may be left

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.kernels.experiment import LANES
 
-Array = np.ndarray
 MOST_STEPS = 40  # per row of the table and lane, on average, before a motion is given up
 LEAST_WORK = 6e7  # that the search of one model may be, however short its records,
 RUNS = 1000.0  # and what so many runs through all samples are, a step each

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.options import checked
 from steadyslip.experiments.fitting.checks import check_friction
 from steadyslip.experiments.fitting.comparison import Comparison
@@ -25,7 +26,6 @@ from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import describe, white
 from steadyslip.machine.slider import Slider
 
-Array = np.ndarray
 WIDTHS = 6  # of a loss, tried one after the other as long as each is narrower
 NARROWER = 0.8  # than so much of the one before
 BETTER = 1e-6  # reduction of the sum of squares, as a share, that makes another minimum of it

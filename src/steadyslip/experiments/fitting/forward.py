@@ -9,6 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.kernels.experiment import LANES, experiment_program
 from steadyslip.kernels.layout import Setting
@@ -18,7 +19,6 @@ from steadyslip.model.scales import scale_rows
 from steadyslip.motion.engine import run_many
 from steadyslip.motion.jobs import automatic_method
 
-Array = np.ndarray
 LOOSE = 1e-4  # error allowed in sensitivities: they steer the search, they are not its result
 LOOK = 0.3  # of the work of a step: to look up what is observed at a sample
 SIZES = (6, 8, 12)  # directions that kernels are made for: few kernels serve fits with any number of parameters

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.unknowns import Space
 
-Array = np.ndarray
 UNDETERMINED = 0.5  # standard deviation along a direction, in e-folds or natural sizes
 MENTIONED = 0.15  # weight in a direction from which on a parameter is named
 FELT = 0.1  # the same, of its change along one standard deviation

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.records import parameters, twin
 from steadyslip.experiments.fitting.commanded import STRAIGHT
@@ -18,7 +19,6 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.protocol import Protocol, Segments, pack
 from steadyslip.protocol.inputs import inputs_at
 
-Array = np.ndarray
 LEAST_RATE = 0.05  # change of ln(rate) that counts as a step
 PER_PERIOD = 300  # rows per period of a sine wave, on which it becomes straight: 6e-5 of its amplitude
 MOST_JUMPS = 20

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.unknowns import Space
 from steadyslip.machine.slider import Slider
 
-Array = np.ndarray
 SPREAD = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # multiples of its other scales from which a member that was idle starts
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
@@ -22,8 +23,6 @@ from steadyslip.experiments.fitting.refit import Ramped, driven_as_measured, wit
 from steadyslip.experiments.fitting.unknowns import Space, Unknown
 from steadyslip.experiments.numerics.noise import Noise
 from steadyslip.machine.slider import Slider
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.records import parameters
 from steadyslip.experiments.fitting.commanded import CommandedInputs
@@ -36,7 +37,6 @@ from steadyslip.model.scales import natural_scales
 from steadyslip.protocol import Protocol
 from steadyslip.protocol.protocol import NORMAL_STRESS
 
-Array = np.ndarray
 FRICTION = 0.01  # of friction: what matters
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
 from steadyslip.core.names import resolve
 from steadyslip.core.records import Address, parameters
@@ -20,7 +21,6 @@ from steadyslip.machine.slider import Slider
 from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol
 
-Array = np.ndarray
 MOST_SAMPLES, HANDY_SAMPLES = 40_000, 8_000
 """Samples of a record beyond which a fit works with means of them, and how many."""
 NEVER_FREE = ("drive.velocity", "slider.area")

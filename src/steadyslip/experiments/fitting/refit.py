@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.fitting.effort import Budget, Effort, work_of_search
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.loading.loading import Change, Loading, resting_rate
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 
-Array = np.ndarray
 SHARES = (0.01, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)  # of the longest that a ramp may be: durations that are tried
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.condensed import Condensed, condensed_along
@@ -20,7 +21,6 @@ from steadyslip.experiments.measured.record import transient_rows
 from steadyslip.experiments.numerics.least_squares import CLOSE, HOPE, SAME, Minima, minimise
 from steadyslip.experiments.numerics.noise import DETECTED, lag_one
 
-Array = np.ndarray
 THIN = 400  # samples on which many starts are tried
 HASTY = 8  # steps of the model per sample, on average, before a trial on few of them is given up
 SLOWER = 2.0  # times the steps of the slowest motion so far: beyond, one of a trial is given up

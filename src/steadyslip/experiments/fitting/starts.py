@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
 from steadyslip.core.questions import question
 from steadyslip.core.results import read_only
@@ -26,7 +27,6 @@ from steadyslip.experiments.measured.record import Record
 from steadyslip.experiments.measured.steps import LoadStep
 from steadyslip.model.sliding import steady_state
 
-Array = np.ndarray
 NEARBY = 0.5  # share of the window of a time over which starts are spread
 SPIKE = 2.0  # ranges of nearly all friction by which a sample alone is off its neighbours: no motion does that
 STIFFEST = 100.0  # k d_c/(aσ) of a start: beyond, a record shows no more of the stiffness

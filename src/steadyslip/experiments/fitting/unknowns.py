@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.records import Address
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.numerics.splitting import RESOLUTION
 
-Array = np.ndarray
 OFF = 6.0  # standard deviations from a line: not on it
 ON = 3.0  # the same: most likely on it
 SURE = 4.0  # standard errors by which rates must differ

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import STILL, off_the_line, turned
 from steadyslip.experiments.loading.loading import Change, Course
 from steadyslip.experiments.loading.runs import Run, straight_runs
@@ -15,7 +16,6 @@ from steadyslip.experiments.numerics.noise import describe
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import displacement_noise
 
-Array = np.ndarray
 RAMP = 40.0  # how much better a ramp must fit a displacement than a step, in units of its noise
 OUTLYING = 9.0  # squared deviation, in those units, from which on a sample weighs less
 BRIEF = 0.1  # of the samples of a run: a level of the sensor so short-lived may be the bottom of a glitch

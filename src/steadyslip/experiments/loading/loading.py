@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly, read_only
 
-Array = np.ndarray
 LoadCurve = Callable[[Array], Array]
 FELT = 1e-6  # of the highest level: uncertainty that could matter
 

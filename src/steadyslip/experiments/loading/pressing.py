@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.loading import Change, Course, LoadCurve
 from steadyslip.experiments.numerics.smoothing import smoothing_curve
 from steadyslip.experiments.numerics.splitting import FEWEST, level_noise, split
 
-Array = np.ndarray
 LEAST_STRESS = 2e-3  # change of normal stress, as a share, that counts as one
 APART = 6.0  # standard deviations from a level: on the way to another
 SUDDEN = 0.7  # share of the difference of two levels that lies between a few samples on both sides,

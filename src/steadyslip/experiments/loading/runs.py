@@ -12,10 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.loading.ends import run_at_start, turned
 from steadyslip.experiments.numerics.splitting import displacement_noise, split
 
-Array = np.ndarray
 SURE = 4.0  # standard errors by which rates must differ, and
 LIKE = 0.02  # share of the rate
 LEAST_CHANGE = 0.05  # share of the rate that counts as a change of it

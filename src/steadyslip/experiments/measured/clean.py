@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.telling import shown
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
-Array = np.ndarray
 GAP = 10.0  # times the usual spacing
 RESTART = 0.02  # of the rows: so many on end whose time goes back are a clock that begins anew
 COARSE, EVEN = 0.6, 1.25  # share of rows with a time of their own; ticks by which even rows may miss their stamps

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
@@ -18,8 +19,6 @@ from steadyslip.experiments.measured.clean import cleaned, without_stand_ins
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
 from steadyslip.experiments.measured.formats import read_columns
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, seconds
-
-Array = np.ndarray
 
 
 @checked()

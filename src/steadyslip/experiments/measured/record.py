@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.domains import real
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.pages import Displayed
@@ -25,7 +26,6 @@ from steadyslip.experiments.measured.steps import LoadStep, steps_of
 from steadyslip.experiments.numerics.noise import lasting
 from steadyslip.files.output import write_columns
 
-Array = np.ndarray
 FEWEST_ROWS = 20
 
 

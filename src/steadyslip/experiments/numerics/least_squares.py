@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Array = np.ndarray
+from steadyslip.core.arrays import Array
+
 Residuals = Callable[[Array, Array], tuple[Array, Array]]
 """From coordinates (m, p) and the lanes they belong to (m,): residuals (m, n) and their derivatives (m, p, n)."""
 

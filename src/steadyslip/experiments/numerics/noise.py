@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.results import ReadOnly
 
-Array = np.ndarray
 DETECTED = 4.0  # lag-1 autocorrelation, in standard errors of that of white noise
 MOST_LAGS = 40
 TAIL = 1e-4  # of the variance: autocovariance is followed until it has fallen below

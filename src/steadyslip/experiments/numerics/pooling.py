@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.experiments.numerics.sampling import walked
 
-Array = np.ndarray
 LEAST = -16.0  # logarithm of a spread, in units of the prior: below, it is none
 WALKERS, BURN = 40, 250
 APART = 20  # steps between draws of a walker, about as many as they remember,

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
-
-Array = np.ndarray
 
 
 def walked(log_density: Callable[[Array], Array], begin: Array, steps: int, seed: int, what: str) -> tuple[Any, float]:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 
-Array = np.ndarray
+from steadyslip.core.arrays import Array
+
 MOST_KNOTS = 4000
 CLEAN = 1e-3  # of its range: noise of a column that is followed sample by sample
 

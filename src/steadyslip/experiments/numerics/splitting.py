@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from steadyslip.core.arrays import Array
+
 EVIDENCE = 60.0  # how much the squared misfit must fall, in units of the noise variance
 FEWEST = 4  # samples between changes
 RESOLUTION = 1e-7  # of the whole range: noise of columns without any

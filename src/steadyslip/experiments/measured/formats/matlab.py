@@ -17,7 +17,6 @@ from scipy.io import loadmat, whosmat
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
 
-Array = np.ndarray
 DEEPEST = 8
 MOST_MEMBERS = 100_000
 CLASS = "MATLAB_class"

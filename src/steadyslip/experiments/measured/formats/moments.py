@@ -7,7 +7,8 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-Array = np.ndarray
+from steadyslip.core.arrays import Array
+
 DAY = 86_400.0
 _CLOCK = re.compile(r"^(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)(?: ?([AaPp])\.?[Mm]\.?)?$")
 _STOPWATCH = re.compile(r"^(\d{1,3}):([0-5]\d[.,]\d+)$")  # 1:30.5, with a fraction: not hours and minutes

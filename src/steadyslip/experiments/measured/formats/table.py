@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.columns import known_unit
 from steadyslip.experiments.measured.formats.moments import from_the_first
 
-Array = np.ndarray
 ENDED = 0.03  # of a column: what the last block of an acquisition may lack in some
 MOST_VALUES = 2**26
 """Numbers of a file."""

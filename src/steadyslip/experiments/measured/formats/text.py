@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.experiments.measured.columns import known_unit
 from steadyslip.experiments.measured.formats.labview import BEGIN, read_labview
@@ -20,7 +21,6 @@ from steadyslip.experiments.measured.formats.table import Table, check_size, cou
 from steadyslip.experiments.measured.formats.xlook import is_xlook, read_xlook
 from steadyslip.files.inputs import read_bytes
 
-Array = np.ndarray
 SHOWN = 8  # bad lines that a message lists
 LOOKED_UP = 500  # lines among which a header ends
 MOST_TEXT = 2**30  # bytes of a file

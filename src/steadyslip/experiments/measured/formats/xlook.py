@@ -11,9 +11,9 @@ import struct
 
 import numpy as np
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 
-Array = np.ndarray
 HEAD, CHANNELS, CHANNEL = 36, 32, 84
 UNUSED = "no_val"
 KINDS = (">f4", ">f8", "<f4", "<f8")

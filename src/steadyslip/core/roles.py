@@ -74,7 +74,7 @@ class Entry(Role):
         return json.dumps(value, ensure_ascii=False)
 
 
-KINDS = {
+PARAMETER_KINDS = {
     "friction level": "friction coefficient in steady sliding at the reference rate",
     "direct effect": "rise of friction per e-fold of velocity, at once",
     "evolution effect": "fall of friction per e-fold of velocity, as the state follows",
@@ -127,7 +127,8 @@ class Parameter(Entry):
     gauge : bool
         Changes no observable result (a reference that only shifts a state), so has no edge.
     kind : str
-        What it is to those who scale motions or fit records without knowing the law: one of `KINDS`, or nothing.
+        What it is to those who scale motions or fit records without knowing the law: one of `PARAMETER_KINDS`, or
+        nothing.
     size : float or None
         Change that matters, of a parameter that may be zero or of either sign; a positive one has its own size.
     letter : str
@@ -155,8 +156,8 @@ class Parameter(Entry):
     elsewhere: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind and self.kind not in KINDS:
-            raise TypeError(unknown_name("kind of parameter", self.kind, KINDS))
+        if self.kind and self.kind not in PARAMETER_KINDS:
+            raise TypeError(unknown_name("kind of parameter", self.kind, PARAMETER_KINDS))
 
     def checked(self, value: Any) -> float:
         """A number or text such as ``"5 MPa"`` as an SI float inside the parameter's domain."""

@@ -325,7 +325,7 @@ class _Filled:
 
 
 def _kind(item: Field[Any]) -> str:
-    """What a field's parameter is; see `steadyslip.core.roles.KINDS`."""
+    """What a field's parameter is; see `steadyslip.core.roles.PARAMETER_KINDS`."""
     role = role_of(item)
     return role.kind if isinstance(role, Parameter) else ""
 

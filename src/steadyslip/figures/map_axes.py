@@ -29,7 +29,7 @@ from steadyslip.maps.view.result import MapResult
 Array = np.ndarray
 MANY = 100.0  # ratio from which on an axis or colour scale is logarithmic
 OUT_OF_RANGE = "numbers out of the range of floating point"
-KINDS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
+KIND_COLOURS = (GREY, SKY, ORANGE, BLACK, BLUE, VERMILION, GREEN, PURPLE, YELLOW)
 
 
 def short(name: str) -> str:

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.figures.map_axes import (
-    KINDS,
+    KIND_COLOURS,
     OUT_OF_RANGE,
     Scale,
     entry,
@@ -103,7 +103,7 @@ def _curves_of_kinds(ax: Axes, found: MapResult, view: View, x: Array, order: Ar
     if name in view.shares:
         for code, word in enumerate(words):
             if view.shares[name][code].any():
-                ax.plot(x, view.shares[name][code][order], color=KINDS[code % len(KINDS)], label=word)
+                ax.plot(x, view.shares[name][code][order], color=KIND_COLOURS[code % len(KIND_COLOURS)], label=word)
         ax.set_ylabel("share of samples (1)")
         ax.set_ylim(-0.02, 1.02)
         return

@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 from steadyslip.core.telling import shown
 from steadyslip.figures.chart import absence_reasons
 from steadyslip.figures.map_axes import (
-    KINDS,
+    KIND_COLOURS,
     MANY,
     OUT_OF_RANGE,
     Scale,
@@ -140,7 +140,7 @@ def _colours(ax: Axes, found: MapResult, view: View, x: Array, y: Array, name: s
         raise ParameterError([Problem("show", message)])
     words = found.words(name)
     if words:
-        colours = [KINDS[i % len(KINDS)] for i in range(len(words))]
+        colours = [KIND_COLOURS[i % len(KIND_COLOURS)] for i in range(len(words))]
         norm = BoundaryNorm(np.arange(len(words) + 1) - 0.5, len(words))
         kinds = np.where(values >= 0, values, np.nan).astype(float)
         ax.pcolormesh(x, y, kinds, cmap=ListedColormap(colours), norm=norm, shading="nearest", rasterized=True)

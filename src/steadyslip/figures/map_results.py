@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import InternalError, ParameterError, Problem
-from steadyslip.figures.map_axes import KINDS, legend, place_axes, short
+from steadyslip.figures.map_axes import KIND_COLOURS, legend, place_axes, short
 from steadyslip.figures.style import BLACK, BLUE, ORANGE, axes_or_new
 from steadyslip.maps.refine import Refined
 from steadyslip.maps.sensitivity import Sensitivity
@@ -50,7 +50,7 @@ def refined(found: Refined, ax: Axes | None = None) -> Axes:
     values = found.points[found.of]
     words = found.map.words(found.of)
     if words:
-        groups = [(values == code, words[code], KINDS[code % len(KINDS)]) for code in np.unique(values)]
+        groups = [(values == code, words[code], KIND_COLOURS[code % len(KIND_COLOURS)]) for code in np.unique(values)]
     else:
         if found.level is None:
             raise InternalError("found.level is not None")

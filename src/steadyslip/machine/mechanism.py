@@ -14,7 +14,7 @@ from typing import Any
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 
-Row = Mapping[str, Any]
+Shares = Mapping[str, Any]
 LOAD_POINT, GROUND = "drive", "ground"
 NORMAL = ".normal"
 """Behind a body's name: its coordinate away from the surface."""
@@ -39,9 +39,9 @@ class Element:
     ----------
     name : str
         Dotted name of the link, or that of the drive; empty where nobody asks for its force.
-    acts : Row
+    acts : Shares
         Where the force acts.
-    senses : Row
+    senses : Shares
         The stretch; for a spring the same row.
     stiffness, damping
         Zero where there is none.
@@ -52,8 +52,8 @@ class Element:
     """
 
     name: str
-    acts: Row
-    senses: Row
+    acts: Shares
+    senses: Shares
     stiffness: Any
     damping: Any
     grounded: bool = False
@@ -64,8 +64,8 @@ class Element:
 class Integral:
     """A controller's integral action: a force −`acts`·gain · I with dI/dt = `senses`; with a delay, I that long ago."""
 
-    acts: Row
-    senses: Row
+    acts: Shares
+    senses: Shares
     gain: Any
     delay: Any = 0
 
@@ -78,7 +78,7 @@ class Touch:
     ----------
     name : str
         Of the contact; empty where there is but one.
-    slip, separation : Row
+    slip, separation : Shares
         Slip, and distance of the surfaces where bodies move away from them; an empty row where they cannot.
     area : float or 1
         Over which the laws' stresses act.
@@ -90,8 +90,8 @@ class Touch:
     name: str
     friction: FrictionLaw
     contact: ContactLaw
-    slip: Row
-    separation: Row
+    slip: Shares
+    separation: Shares
     area: Any
     loaded_by: str = ""
 

@@ -19,7 +19,7 @@ from steadyslip.model.determinant import Polynomial, determinant, expanded, mach
 from steadyslip.model.equations import Model
 from steadyslip.model.statics import StandIns
 
-Row = dict[sp.Symbol, sp.Expr]
+Gradient = dict[sp.Symbol, sp.Expr]
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Linearisation:
 
     model: Model
     columns: tuple[sp.Symbol, ...]
-    rows: dict[sp.Symbol, Row]
-    outputs: dict[str, Row]
+    rows: dict[sp.Symbol, Gradient]
+    outputs: dict[str, Gradient]
 
 
 @question
@@ -61,11 +61,11 @@ def linearise(model: Model) -> Linearisation:
     columns |= dict.fromkeys(contact.friction for contact in model.contacts if contact.unknown is contact.friction)
     inputs = [s for name, s in model.inputs.items() if name != "time"]
     basis = [*columns, *(one.acceleration for one in model.coordinates), *model.late, *inputs]
-    intermediate: dict[sp.Symbol, Row] = {}
+    intermediate: dict[sp.Symbol, Gradient] = {}
 
-    def gradient(expression: sp.Expr) -> Row:
+    def gradient(expression: sp.Expr) -> Gradient:
         """Total derivative with respect to the basis, at steady sliding."""
-        total: Row = {}
+        total: Gradient = {}
         free = expression.free_symbols
         for name in basis:
             value = model.at_steady(derivative(expression, name)) if name in free else sp.Integer(0)

@@ -32,7 +32,7 @@ from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.kinematics import in_variables, kinematics, solved_in_turn, solved_together
 from steadyslip.model.reduction import TIME, V_LP, Reduction, Sliding, channels_for, slope_of
 
-Row = dict[sp.Symbol, sp.Expr]
+Replacements = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
 EVERYWHERE = "*"
 """In place of a name: disturbances act on every coordinate, or at every contact, by a share that is a constant."""
@@ -96,7 +96,7 @@ class _Reducing:
         }  # fmt: skip
         self.balances = [self._variables(contact.balance, contact) for contact in model.contacts]
         self.rates = {symbol: self._variables(rate, owner.get(symbol)) for symbol, rate in model.rate_of.items()}
-        self.found: Row = {}
+        self.found: Replacements = {}
         self._forces()
         self._light()
 
@@ -156,7 +156,7 @@ class _Reducing:
             found[one.velocity] = self._followed(one, found)
         self.found = found
 
-    def _followed(self, one: Coordinate, found: Row) -> sp.Expr:
+    def _followed(self, one: Coordinate, found: Replacements) -> sp.Expr:
         """Velocity of a coordinate whose displacement follows from those of others."""
         place = found[one.displacement]
         drift = self.rates[one.displacement].xreplace({one.velocity: sp.Integer(0)})
@@ -207,7 +207,7 @@ class _Reducing:
         )
         self.light = [(replaced(self.inlined(self.balances[i]), self.pushed), self._w(i)) for i in light]
         self.victims = self._victims(light, eliminate)
-        self.closed: Row = {}
+        self.closed: Replacements = {}
         velocities: Equations = []
         if not self.victims:
             self.closed, velocities = solved_in_turn(self.light)
@@ -247,9 +247,9 @@ class _Reducing:
         """Coordinates whose displacement does not follow from those of others."""
         return [one for one in self.model.coordinates if one.displacement not in self.found]
 
-    def _victims(self, light: list[int], eliminate: tuple[int | None, ...]) -> Row:
+    def _victims(self, light: list[int], eliminate: tuple[int | None, ...]) -> Replacements:
         """Memory variables that follow from the balance, and what they are; none unless every light contact has one."""
-        found: Row = {}
+        found: Replacements = {}
         for i in light:
             own = self.victim(i, eliminate[i])
             if own is None:
@@ -257,7 +257,7 @@ class _Reducing:
             found |= own
         return found
 
-    def victim(self, index: int, which: int | None) -> Row | None:
+    def victim(self, index: int, which: int | None) -> Replacements | None:
         """A memory variable of a contact from its balance; None where that is not linear in it."""
         variable, memory = self.moving.variables[index], self.model.contacts[index].memory
         if variable is None or variable.kind != "logarithm" or which is None or which >= len(memory):
@@ -278,7 +278,7 @@ class _Reducing:
 
     def _raw_rates(self, heavy: list[Coordinate]) -> None:
         """Rates of everything that moves, memory variables that follow from a balance and their w included."""
-        self.raw: Row = {}
+        self.raw: Replacements = {}
         for symbol in (*(one.displacement for one in self._free()), *self.memory, *self.integrals):
             self.raw[symbol] = replaced(self.inlined(self.rates[symbol]), self.pushed)
         for one in heavy:
@@ -365,10 +365,10 @@ class _Reducing:
 
 def _inputs(
     model: Model, channels: tuple[sp.Symbol, ...], pushes: tuple[str, ...], presses: tuple[str, ...]
-) -> Row:  # fmt: skip
+) -> Replacements:  # fmt: skip
     """What stands for the inputs of a Model: a channel where it acts, or a share of it `EVERYWHERE`; else zero."""
     _, first_push, first_press, *more = channels
-    given: Row = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
+    given: Replacements = {model.inputs["load_velocity"]: V_LP, model.inputs["time"]: TIME}
     behind = max(len(pushes) - 1, 0)
     acting = dict(zip(pushes, (first_push, *more[:behind]), strict=False))
     pressing = dict(zip(presses, (first_press, *more[behind:]), strict=False))

@@ -18,7 +18,7 @@ from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
-from steadyslip.machine.mechanism import LOAD_POINT, Mechanism, Row
+from steadyslip.machine.mechanism import LOAD_POINT, Mechanism, Shares
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class StandIns:
         return expression.xreplace(self.names)
 
 
-def row_of(row: Row, values: Mapping[str, Any]) -> sp.Expr:
+def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
     """What a row makes of values of the coordinates, and of the load point where they have one."""
     return sp.Add(*(sp.sympify(coefficient) * values[name] for name, coefficient in row.items() if name in values))
 

@@ -29,7 +29,7 @@ from steadyslip.model.start import guesses, initial_values
 from steadyslip.motion.targets import NOTHING, Targets, targets
 from steadyslip.protocol import Protocol, Segments, pack
 
-METHODS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
+METHOD_WORDS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
 MOST_SOLVED = 8  # stages of a method, where the balance has to be solved in each
 BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this far beyond the drive there is no return
@@ -63,8 +63,8 @@ class Options:
 
     def __post_init__(self) -> None:
         problems = []
-        if self.method not in METHODS:
-            problems.append(Problem("method", unknown_name("method", self.method, METHODS)))
+        if self.method not in METHOD_WORDS:
+            problems.append(Problem("method", unknown_name("method", self.method, METHOD_WORDS)))
         for name, role in INTEGRATION.items():
             try:
                 role.checked(getattr(self, name))
@@ -123,7 +123,7 @@ class Jobs:
 
     def choice(self, lanes: int, dense: bool) -> Choice:
         """The kernel that these jobs need."""
-        method = METHODS[self.options.method] or automatic_method(self.reduction, self.options.rtol)
+        method = METHOD_WORDS[self.options.method] or automatic_method(self.reduction, self.options.rtol)
         harmonics = self.segments.amplitude.shape[-1]
         return Choice(method, self.segments.level(), harmonics, lanes, dense)
 
@@ -253,14 +253,14 @@ def prepare(
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:
     """A method with so many stages that an equation to be solved in each takes minutes to compile."""
-    if not reduction.unknowns or METHODS[method] not in TABLEAUS:
+    if not reduction.unknowns or METHOD_WORDS[method] not in TABLEAUS:
         return
     stages = {name: make().stages for name, make in TABLEAUS.items()}
-    if stages[METHODS[method]] > MOST_SOLVED:
+    if stages[METHOD_WORDS[method]] > MOST_SOLVED:
         allowed = ", ".join(["auto", *(name for name, count in stages.items() if count <= MOST_SOLVED)])
         message = (
             f"got {method!r}; for this rig velocity follows from an equation that has to be solved in each of its "
-            f"{stages[METHODS[method]]} stages, which would take minutes to compile; allowed here: {allowed}"
+            f"{stages[METHOD_WORDS[method]]} stages, which would take minutes to compile; allowed here: {allowed}"
         )
         raise ParameterError([Problem("method", message)])
 

@@ -20,7 +20,7 @@ from steadyslip.experiments.numerics.least_squares import Minima, minimise
 from steadyslip.experiments.numerics.sampling import walked
 
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
-KINDS = ("auto", "block", "residual")
+BOOTSTRAPS = ("auto", "block", "residual")
 WARM = 1e-6  # reduction still to be had, as a share of the sum, at which a refit is done: far below its scatter
 LONGEST_BLOCK = 0.1  # of a record
 
@@ -150,8 +150,8 @@ def bootstrap(
     -------
     Draws
     """
-    if kind not in KINDS:
-        raise ParameterError([Problem("kind", unknown_name("choice", kind, KINDS))])
+    if kind not in BOOTSTRAPS:
+        raise ParameterError([Problem("kind", unknown_name("choice", kind, BOOTSTRAPS))])
     if not (isinstance(count, int) and count >= 2):
         raise ParameterError([Problem("count", f"got {count!r}; allowed: a whole number >= 2")])
     generator = np.random.default_rng(seed)

@@ -31,7 +31,7 @@ class Unknown:
     low, high : float
         What the parameter may be.
     kind : str
-        What its law says it is; see `steadyslip.core.roles.KINDS`.
+        What its law says it is; see `steadyslip.core.roles.PARAMETER_KINDS`.
     """
 
     name: str

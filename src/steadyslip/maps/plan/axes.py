@@ -18,7 +18,7 @@ from steadyslip.core.roles import Parameter
 
 Array = np.ndarray
 SPACINGS = ("linear", "log")
-METHODS = ("sobol", "latin-hypercube")
+SAMPLERS = ("sobol", "latin-hypercube")
 SAMPLE = "sample"
 COMPLETE = "complete"  # the array of marks
 MOST_POINTS = 10**12
@@ -259,8 +259,8 @@ def make_sampling(given: Any, roles: Mapping[str, Parameter]) -> Sampling:
 
 def _generated(given: Samples, roles: Mapping[str, Parameter]) -> Generated:
     problems, ranges = [], []
-    if given.method not in METHODS:
-        problems.append(Problem("map.samples.method", unknown_name("method", given.method, METHODS)))
+    if given.method not in SAMPLERS:
+        problems.append(Problem("map.samples.method", unknown_name("method", given.method, SAMPLERS)))
     if isinstance(given.seed, bool) or not isinstance(given.seed, (int, np.integer)) or given.seed < 0:
         problems.append(Problem("map.samples.seed", f"got {given.seed!r}; allowed: a whole number >= 0"))
     try:

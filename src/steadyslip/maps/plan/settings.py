@@ -8,7 +8,7 @@ from typing import Any
 from steadyslip.core.entries import Names, Quantity, Text, Whole
 from steadyslip.core.errors import Problem
 from steadyslip.core.records import Settings, named, option, part, parts, setting
-from steadyslip.maps.plan.axes import METHODS, MOST_POINTS, SPACINGS, Grid, Samples
+from steadyslip.maps.plan.axes import MOST_POINTS, SAMPLERS, SPACINGS, Grid, Samples
 from steadyslip.maps.plan.measures import Measure
 
 MOST_GIVEN = 2**24  # points of a chunk, where somebody says how many
@@ -44,7 +44,7 @@ class SampleSettings(Settings):
         default=None,
     )
     method: str | None = option(
-        *METHODS, default=None,
+        *SAMPLERS, default=None,
         doc="`sobol` (unless given): scrambled Sobol points, up to 2³²; `latin-hypercube`: up to 2²²",
     )  # fmt: skip
     seed: int = setting(Whole("samples follow from it", 0, LARGEST_SEED), default=0)
@@ -64,7 +64,7 @@ class SampleSettings(Settings):
 
     def samples(self) -> Samples:
         ranges = {name: (one.start, one.stop, one.spacing) for name, one in (self.over or {}).items()}
-        return Samples(ranges, self.points or 1, self.method or METHODS[0], self.seed)
+        return Samples(ranges, self.points or 1, self.method or SAMPLERS[0], self.seed)
 
 
 class MapSettings(Settings):

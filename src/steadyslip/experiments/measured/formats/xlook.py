@@ -16,7 +16,7 @@ from steadyslip.core.errors import NotAvailable
 
 HEAD, CHANNELS, CHANNEL = 36, 32, 84
 UNUSED = "no_val"
-KINDS = (">f4", ">f8", "<f4", "<f8")
+NUMBER_KINDS = (">f4", ">f8", "<f4", "<f8")
 
 
 def is_xlook(raw: bytes) -> bool:
@@ -57,7 +57,7 @@ def read_xlook(raw: bytes, source: str) -> tuple[list[str], list[str | None], Ar
             units.append(_text(raw[start + 13 : start + 26]) or None)
     names = [*names, *(f"column {k}" for k in range(len(names) + 1, columns + 1))][:columns]
     units = [*units, *([None] * columns)][:columns]
-    for kind in (kind for kind in KINDS if int(kind[-1]) == width):
+    for kind in (kind for kind in NUMBER_KINDS if int(kind[-1]) == width):
         values = np.frombuffer(raw, kind, rows * columns, HEAD + CHANNELS * CHANNEL).reshape(columns, rows)
         found = values.astype(float)
         size_of = np.abs(found[found != 0.0])

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from steadyslip.kernels.printers.native.lines import MEMORY, ArrayView, Lines, Scalar, Type, Value
+from steadyslip.kernels.printers.native.lines import MEMORY, ArrayView, Lines, Operand, Scalar, Type
 
 HEAD = object.__basicsize__  # bytes of every object of Python
 DATA, INDICES, SIZES, DESCRIPTOR, FLAGS = HEAD, HEAD + 8, HEAD + 16, HEAD + 40, HEAD + 48
@@ -48,7 +48,7 @@ def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: 
         Lines. The function returns the other's result, which must not be negative, 0 if it has none, -1 - i if argument
         i is not as declared.
     """
-    body, given = Lines(opaque), list[Value]()
+    body, given = Lines(opaque), list[Operand]()
     for i, text in enumerate(types):
         kind, count = argument(text)
         given.append(_array(body, i, kind, count, i < constant) if count else Scalar(kind, f"%a{i}"))

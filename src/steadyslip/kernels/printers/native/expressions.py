@@ -10,7 +10,7 @@ from typing import Protocol
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.kernels.printers.native import arrays
-from steadyslip.kernels.printers.native.lines import TEXT, ArrayView, Lines, Scalar, Several, Type, Value, real
+from steadyslip.kernels.printers.native.lines import TEXT, ArrayView, Lines, Operand, Scalar, Several, Type, real
 
 ANNOTATED = {"float": "real", "int": "int", "bool": "bool", "None": "none"}
 _ARITHMETIC: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
@@ -69,7 +69,7 @@ class Expressions:
 
     # -- names
 
-    def _assign(self, node: ast.AST, name: str, value: Value) -> None:
+    def _assign(self, node: ast.AST, name: str, value: Operand) -> None:
         """What a name holds from now on."""
         if isinstance(value, Several):
             raise self.refuse(node, f"another value for {name}")
@@ -84,7 +84,7 @@ class Expressions:
         for (kind, text), room in zip(self.lines.flat(value), known.rooms, strict=True):
             self.lines.add(f"store {kind} {text}, {self.lines.pointer(kind)} {room}")
 
-    def _held(self, node: ast.AST, name: str) -> Value:
+    def _held(self, node: ast.AST, name: str) -> Operand:
         """What a name holds."""
         if name in self.several:
             return self.several[name]
@@ -94,7 +94,7 @@ class Expressions:
             return self._number(self.numbers[name])
         raise self.refuse(node, f"the name {name}")
 
-    def _kept(self, variable: _Variable) -> Value:
+    def _kept(self, variable: _Variable) -> Operand:
         type_ = str(variable.type)
         kind, count = arrays.argument(type_.removeprefix("constant "))
         kinds = [self.lines.pointer(kind), *["i64"] * count] if "[" in type_ else [TEXT[kind]]
@@ -111,7 +111,7 @@ class Expressions:
             return Scalar("bool", str(value).lower())
         return real(value) if isinstance(value, float) else Scalar("int", str(int(value)))
 
-    def _as(self, node: ast.AST, value: Value, kind: str) -> Scalar:
+    def _as(self, node: ast.AST, value: Operand, kind: str) -> Scalar:
         """A value as the kind of number that is wanted."""
         found = self.lines.converted(value, kind) if isinstance(value, Scalar) else None
         if found is None:
@@ -141,7 +141,7 @@ class Expressions:
         zero = real(0.0).text if value.kind == "real" else "0"
         return self.lines.compared(_COMPARE[ast.NotEq], value.kind, value.text, zero).text
 
-    def _value(self, node: ast.expr) -> Value:
+    def _value(self, node: ast.expr) -> Operand:
         match node:
             case ast.Constant(value=bool() | int() | float() as number):
                 return self._number(number)
@@ -197,7 +197,7 @@ class Expressions:
                 raise self.refuse(one, "an index that counts from the end, or a slice,")
         return [self._whole_number(one) for one in nodes]
 
-    def _indexed(self, node: ast.expr, owner: ast.expr, index: ast.expr) -> Value:
+    def _indexed(self, node: ast.expr, owner: ast.expr, index: ast.expr) -> Operand:
         """An element, a view of an array, or one of several values."""
         found = self._value(owner)
         if isinstance(found, Several) and isinstance(index, ast.Constant) and isinstance(index.value, int):
@@ -257,7 +257,7 @@ class Expressions:
         lines.begin(done)
         return lines.get("bool", room)
 
-    def _either(self, test: ast.expr, yes: ast.expr, no: ast.expr) -> Value:
+    def _either(self, test: ast.expr, yes: ast.expr, no: ast.expr) -> Operand:
         """One of two values, of which only one is found."""
         self.choices += 1
         name = f"either {self.choices}"  # no name of Python
@@ -279,7 +279,7 @@ class Expressions:
         finally:
             self.lines, self.made, self.variables = lines, made, known
 
-    def _call(self, node: ast.expr, function: ast.expr, given: Sequence[ast.expr]) -> Value:
+    def _call(self, node: ast.expr, function: ast.expr, given: Sequence[ast.expr]) -> Operand:
         match function:
             case ast.Name(id="call"):
                 return self._routine(given)
@@ -314,12 +314,12 @@ class Expressions:
         self.made.append(self.lines.room(self.lines.pointer("real")))
         return arrays.made(self.lines, sizes, self.made[-1])
 
-    def _function(self, node: ast.expr, name: str, given: Sequence[ast.expr]) -> Value:
+    def _function(self, node: ast.expr, name: str, given: Sequence[ast.expr]) -> Operand:
         """A call of another of the driver's functions; numbers are handed over as it declares them."""
         heads = self.others.functions[name][0].args.args
         if len(heads) != len(given):
             raise self.refuse(node, f"a call of {name} with {len(given)} arguments")
-        values: list[Value] = []
+        values: list[Operand] = []
         for head, one in zip(heads, given, strict=True):
             value = self._value(one)
             kind = ANNOTATED.get(ast.unparse(head.annotation) if head.annotation else "")

@@ -15,7 +15,7 @@ from importlib import import_module
 from steadyslip.kernels.driver_text import numbered
 from steadyslip.kernels.printers.native import arrays
 from steadyslip.kernels.printers.native.expressions import ANNOTATED, Expressions
-from steadyslip.kernels.printers.native.lines import MEMORY, TEXT, ArrayView, Lines, Scalar, Several, Type, Value
+from steadyslip.kernels.printers.native.lines import MEMORY, TEXT, ArrayView, Lines, Operand, Scalar, Several, Type
 
 
 def translated(
@@ -125,12 +125,12 @@ class _Function(Expressions):
     def _array(self) -> str:
         return self.lines.pointer("real")
 
-    def _received(self, type_: Type, heads: list[str]) -> Value:
+    def _received(self, type_: Type, heads: list[str]) -> Operand:
         """An argument, and what it is in the head of the function."""
         if not isinstance(type_, str):
             return Several(tuple(self._received(one, heads) for one in type_))
         kind, count = arrays.argument(type_.removeprefix("constant "))
-        value: Value = Scalar(kind, f"%a{len(heads)}")
+        value: Operand = Scalar(kind, f"%a{len(heads)}")
         if "[" in type_:
             names = [f"%a{len(heads) + i}" for i in range(count + 1)]
             value = ArrayView(kind, names[0], tuple(names[1:]), type_.startswith("constant "))
@@ -238,12 +238,12 @@ class _Function(Expressions):
                 for target in targets:
                     self._write(target, found)
 
-    def _lasting(self, node: ast.AST, value: Value) -> Value:
+    def _lasting(self, node: ast.AST, value: Operand) -> Operand:
         if isinstance(value, Scalar):
             raise self.refuse(node, "a number among several that are kept")
         return value
 
-    def _write(self, target: ast.expr, value: Value) -> None:
+    def _write(self, target: ast.expr, value: Operand) -> None:
         match target:
             case ast.Name(id=name):
                 self._assign(target, name, value)
@@ -268,5 +268,5 @@ class _Function(Expressions):
         self.lines.add(f"ret {TEXT[self.result]} {found.text if isinstance(found, Scalar) else ''}".rstrip())
 
 
-def _parts(value: Value) -> tuple[Value, ...]:
+def _parts(value: Operand) -> tuple[Operand, ...]:
     return value.values if isinstance(value, Several) else (value,)

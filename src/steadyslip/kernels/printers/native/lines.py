@@ -42,7 +42,7 @@ class ArrayView:
 class Several:
     """Values at once, each known by its place."""
 
-    values: tuple[Value, ...]
+    values: tuple[Operand, ...]
 
     @property
     def type(self) -> Type:
@@ -50,7 +50,7 @@ class Several:
 
 
 Type = str | tuple["Type", ...]
-Value = Scalar | ArrayView | Several
+Operand = Scalar | ArrayView | Several
 
 
 def real(number: float) -> Scalar:
@@ -135,7 +135,7 @@ class Lines:
 
     # -- calls
 
-    def flat(self, value: Value) -> list[tuple[str, str]]:
+    def flat(self, value: Operand) -> list[tuple[str, str]]:
         """What a call hands over: types and names."""
         if isinstance(value, Scalar):
             return [(TEXT[value.kind], value.text)]
@@ -143,7 +143,7 @@ class Lines:
             return [(self.pointer(value.kind), value.pointer), *(("i64", size) for size in value.sizes)]
         return [one for part in value.values for one in self.flat(part)]
 
-    def call(self, symbol: str, result: str, given: Sequence[Value]) -> Scalar:
+    def call(self, symbol: str, result: str, given: Sequence[Operand]) -> Scalar:
         """The result of a function."""
         arguments = ", ".join(f"{kind} {text}" for kind, text in self.flat(Several(tuple(given))))
         line = f"call {TEXT[result]} {symbol}({arguments})"

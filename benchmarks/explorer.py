@@ -43,7 +43,7 @@ from machines import at_random
 from moved import compiled_run, motion_text, moved, slip_events
 from rigs_of_theory import CONTACTS
 from steadyslip.model.point import operating_point
-from steadyslip.model.scales import posed
+from steadyslip.model.posed import posed
 
 CHANGES = ({}, {"stiffness": 0.01}, {"stiffness": 100.0}, {"drive.velocity": 30.0}, {"stiffness": 3.0, "mass": 10.0})
 BAR = 1e-12

@@ -28,8 +28,10 @@ from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
 from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
+from steadyslip.model.posed import posed
 from steadyslip.model.reducing import reduce_model
-from steadyslip.model.scales import eliminable, natural_scales, posed
+from steadyslip.model.scales import natural_scales
+from steadyslip.model.weights import eliminable
 from steadyslip.motion.jobs import prepare
 from users_laws import USERS, Turning
 

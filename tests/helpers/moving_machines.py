@@ -9,7 +9,7 @@ from machines import rate_state, surface
 from steadyslip.model.point import operating_point
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import TIME
-from steadyslip.model.scales import eliminable
+from steadyslip.model.weights import eliminable
 
 TIMES = np.linspace(0.0, 20.0, 201)
 

@@ -11,8 +11,10 @@ import steadyslip as ss
 from steadyslip.core.questions import Keeper, question
 from steadyslip.model import build_model, operating_point
 from steadyslip.model.linearisation import characteristic_coefficients, linearise
+from steadyslip.model.posed import posed
 from steadyslip.model.reducing import reduce_model
-from steadyslip.model.scales import natural_scales, posed, scale_rows, weights
+from steadyslip.model.scales import natural_scales, scale_rows
+from steadyslip.model.weights import weights
 from steadyslip.motion.engine import Call
 from steadyslip.motion.jobs import Options, prepare
 from steadyslip.nonlinear.kicks.settled import rest_of

@@ -15,8 +15,8 @@ from steadyslip.linear.polynomials import is_hurwitz
 from steadyslip.linear.status import without_edge
 from steadyslip.linear.stiffness import in_chunks, interval_ends
 from steadyslip.model.point import operating_point
+from steadyslip.model.posed import resolved
 from steadyslip.model.range import in_range, surely_in_range
-from steadyslip.model.scales import resolved
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCREW = EXAMPLES / "lead-screw.toml"

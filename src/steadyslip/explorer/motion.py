@@ -27,9 +27,10 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
 from steadyslip.model.point import operating_point
+from steadyslip.model.posed import posed
 from steadyslip.model.reducing import EVERYWHERE, reduce_model
 from steadyslip.model.reduction import Reduction
-from steadyslip.model.scales import LEAST_WEIGHT, eliminable, posed
+from steadyslip.model.weights import LEAST_WEIGHT, eliminable
 from steadyslip.motion.jobs import Options, automatic_method
 from steadyslip.protocol import (
     DisplacementStep,

@@ -21,9 +21,11 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.machine.slider import Slider
 from steadyslip.model.equations import Contact, Coordinate, Model
+from steadyslip.model.posed import rising
 from steadyslip.model.reducing import share_of
 from steadyslip.model.reduction import Reduction
-from steadyslip.model.scales import Weights, joined_sizes, moving_parts, rising, shortest_time, sizes, weighed
+from steadyslip.model.scales import joined_sizes, moving_parts, shortest_time, sizes
+from steadyslip.model.weights import Weights, weighed
 from steadyslip.motion.jobs import Options, numbers
 
 

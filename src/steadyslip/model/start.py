@@ -15,7 +15,7 @@ from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import V_LP, Reduction
-from steadyslip.model.scales import slip_rates
+from steadyslip.model.weights import slip_rates
 
 
 @question

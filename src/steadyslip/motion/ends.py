@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.scales import slip_rates
+from steadyslip.model.weights import slip_rates
 
 Array = np.ndarray
 LOST, BLOWN_UP = "contact lost", "blow-up"

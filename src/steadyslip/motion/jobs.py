@@ -21,11 +21,13 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.posed import posed, resolved
 from steadyslip.model.range import in_range, require_range
 from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import Reduction
-from steadyslip.model.scales import eliminable, natural_scales, posed, resolved, shortest_time, slip_rates
+from steadyslip.model.scales import natural_scales, shortest_time
 from steadyslip.model.start import guesses, initial_values
+from steadyslip.model.weights import eliminable, slip_rates
 from steadyslip.motion.targets import NOTHING, Targets, targets
 from steadyslip.protocol import Protocol, Segments, pack
 
@@ -113,7 +115,7 @@ class Jobs:
 
     @property
     def posed(self) -> np.ndarray:
-        """Whether the equations determine the motion near steady sliding; see `steadyslip.model.scales.posed`."""
+        """Whether the equations determine the motion near steady sliding; see `steadyslip.model.posed.posed`."""
         return posed(self.point)
 
     @property

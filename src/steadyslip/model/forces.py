@@ -1,0 +1,295 @@
+"""A Mechanism in symbols: forces on its coordinates, and the stresses at its contacts, which follow from the statics.
+
+A block with one contact takes its friction from the balance of forces, τ = T − ηv − m v̇ + q, and its friction law fixes
+the acceleration or velocity. Everywhere else friction has a symbol that its law fixes, and each coordinate a balance of
+its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import derivative
+from steadyslip.laws.contact import Motion
+from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Touch
+from steadyslip.model.statics import Statics, row_of, statics
+
+V_LP, Q, P, TIME = (sp.Symbol(name, real=True) for name in ("v_lp", "q", "p", "t"))
+INTEGRAL = sp.Symbol("I_x", real=True)
+Letters = Callable[[str], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A contact on its way into the Model: its symbols, and what the laws say in them."""
+
+    touch: Touch
+    slip: sp.Expr
+    velocity: sp.Symbol
+    acceleration: sp.Expr
+    speed: sp.Expr
+    spring: sp.Symbol
+    tau: sp.Symbol
+    sigma: sp.Symbol
+    sigma_ss: sp.Symbol
+    memory: tuple[sp.Symbol, ...]
+    states: tuple[sp.Symbol, ...]
+    press: sp.Symbol
+    outside: sp.Symbol
+
+    @cached_property
+    def tau_ss(self) -> sp.Expr:
+        """Friction in steady sliding."""
+        return sp.sympify(self.touch.friction.steady_strength(self.speed, self.sigma_ss))
+
+
+class Forces:
+    """Symbols of a mechanism, and what its contacts and links do in them."""
+
+    def __init__(self, mechanism: Mechanism, letter: Letters, imposed: bool) -> None:
+        self.mechanism, self.letter, self.imposed = mechanism, letter, imposed
+        self.loading = sp.Symbol(letter("drive.loading"), real=True) if imposed else sp.Integer(0)
+        if imposed:
+            self._check_loading()
+        names = [one.name for one in mechanism.coordinates]
+        self.single = len(names) == 1 and [dict(touch.slip) for touch in mechanism.touches] == [{names[0]: 1}]
+        self.bare = not all(touch.name for touch in mechanism.touches)
+
+        def symbols(of: str, alone: str) -> dict[str, sp.Symbol]:
+            return {n: sp.Symbol(alone if self.single else letter(f"{n}.{of}"), real=True) for n in names}
+
+        self.x, self.v, self.a = symbols("x", "x"), symbols("v", "v"), symbols("a", "a_x")
+        self.push = {names[0]: Q} if self.single else symbols("q", "q")
+        self.moving = self.v | {LOAD_POINT: V_LP}
+        self.speeds = {c.name: sp.sympify(c.speed) for c in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
+        self.places = [self._place(touch) for touch in mechanism.touches]
+        self.definitions: dict[sp.Symbol, sp.Expr] = {}
+        self.late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = {}
+        self._define()
+
+    def _check_loading(self) -> None:
+        """One link, or a controller, must carry the force of the drive."""
+        acting = [dict(one.acts) for one in self.mechanism.elements if LOAD_POINT in one.senses and _present(one)]
+        if not acting or any(acts != acting[0] for acts in acting):
+            names = ", ".join(one.name for one in self.mechanism.elements if LOAD_POINT in one.senses and one.name)
+            raise NotAvailable(
+                f"a drive that pulls with a force of its own needs one link that carries it; {names or 'none'} "
+                "would share it, and how is open"
+            )
+        if any(LOAD_POINT in touch.slip for touch in self.mechanism.touches):
+            raise NotAvailable(
+                "a drive that pulls with a force of its own is not offered where a contact slides on the drive"
+            )
+
+    # -- contacts in symbols
+
+    def _place(self, touch: Touch) -> Place:
+        def symbol(name: str, **assumptions: bool) -> sp.Symbol:
+            return sp.Symbol(name if self.single else self.letter(f"{touch.name}.{name}"), **assumptions)
+
+        body = next(iter(touch.slip))
+        memory = tuple(
+            sp.Symbol(self.letter(f"{touch.name or 'memory'}.{name}"), real=True) for name in touch.friction.memory()
+        )
+        states = tuple(
+            sp.Symbol(self.letter(f"{touch.name or 'contact'}.{name}"), real=True) for name in touch.contact.memory()
+        )
+        return Place(
+            touch,
+            row_of(touch.slip, self.x),
+            self.v[body] if self.single else symbol("v", real=True),
+            row_of(touch.slip, self.a),
+            row_of(touch.slip, self.speeds),
+            symbol("T", real=True),
+            symbol("tau", real=True),
+            symbol("sigma", positive=True),
+            symbol("sigma_ss", positive=True),
+            memory,
+            states,
+            P if self.single else symbol("p", real=True),
+            sp.Symbol(self.letter(f"{touch.name or 'contact'}.p_out"), real=True),
+        )
+
+    @cached_property
+    def friction(self) -> dict[sp.Symbol, sp.Expr]:
+        """Symbols that stand for friction until the statics are solved, and what it is."""
+        return {sp.Symbol(f"friction_{i}"): place.tau_ss for i, place in enumerate(self.places)}
+
+    @cached_property
+    def statics(self) -> Statics:
+        """How far everything is displaced in steady sliding, in terms of friction and normal stresses."""
+        distance = sp.Symbol("distance", real=True)
+        friction, normal = {}, {}
+        for place, held in zip(self.places, self.friction, strict=True):
+            touch = place.touch
+            friction[touch.name] = held
+            normal[touch.name] = (place.sigma_ss, sp.Integer(0))
+            if touch.separation and touch.contact.is_compliant():
+                still = replace(self._motion(place, sp.nan, sp.nan, distance, distance), separation_rate=0)
+                pressed = sp.sympify(touch.contact.normal_stress(still))
+                normal[touch.name] = (pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance))
+        return statics(self.mechanism, friction, normal)
+
+    def _known(self, expression: sp.Expr) -> sp.Expr:
+        """A result of the statics in lowest terms, so that a stiffness which does not matter is not in it."""
+        return sp.cancel(sp.together(expression)).xreplace(self.friction)
+
+    def _motion(self, place: Place, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any) -> Motion:
+        return Motion(
+            place.slip, place.velocity, place.acceleration, place.spring, spring_ss, place.tau, place.tau_ss,
+            stiffness, place.speed, separation, steady_separation, row_of(place.touch.separation, self.v),
+            place.states, tuple(map(sp.sympify, place.touch.contact.steady_memory(place.speed))), place.outside,
+        )  # fmt: skip
+
+    # -- forces
+
+    def _tension(self, element: Element, displacement: Mapping[str, sp.Expr], speed: Mapping[str, Any]) -> sp.Expr:
+        """Force in an element."""
+        return element.stiffness * row_of(element.senses, displacement) + element.damping * row_of(
+            element.senses, speed
+        )
+
+    def _grouped(self, elements: list[Element]) -> list[Element]:
+        """Elements that act and sense alike made one: a spring and the controller beside it."""
+        groups: dict[Any, list[Element]] = {}
+        for one in elements:
+            groups.setdefault((tuple(one.acts.items()), tuple(one.senses.items()), one.delay), []).append(one)
+        return [
+            Element(
+                "", several[0].acts, several[0].senses, sp.Add(*(sp.sympify(one.stiffness) for one in several)),
+                sp.Add(*(sp.sympify(one.damping) for one in several)), several[0].grounded, several[0].delay,
+            )
+            for several in groups.values()
+        ]  # fmt: skip
+
+    def _pull(self, name: str, elements: list[Element]) -> sp.Expr:
+        """Force of elements on a coordinate, besides that of steady displacements."""
+        total, acting = sp.Integer(0), [one for one in elements if name in one.acts]
+        if self.imposed:
+            driven = [one for one in acting if LOAD_POINT in one.senses and _present(one)]
+            acting = [one for one in acting if LOAD_POINT not in one.senses]
+            total -= sp.Add(*(one.acts[name] * self._tension(one, {}, self.speeds) for one in driven))
+            total += self._loaded(driven[0], name) * self._per_area() if driven else 0
+        for one in self._grouped(acting):
+            total -= one.acts[name] * one.stiffness * row_of(one.senses, self._before(one.delay, self.x))
+            total -= one.acts[name] * one.damping * row_of(one.senses, self._before(one.delay, self.moving))
+        late = 0 if self.mechanism.integral is None else self.mechanism.integral.delay
+        return total - self._integrated(name, self._before(late, {"": INTEGRAL})[""])
+
+    def _loaded(self, element: Element, name: str) -> sp.Expr:
+        """What the imposed force does through its element: as much at the drive's end as is imposed there."""
+        at_drive = element.acts.get(LOAD_POINT, -1)
+        return -sp.sympify(element.acts[name]) / at_drive * self.loading
+
+    def _per_area(self) -> Any:
+        """What a unit of the force of the drive is: of a slider a stress."""
+        return self.places[0].touch.area if self.bare else 1
+
+    def _before(self, delay: Any, now: Mapping[str, sp.Symbol]) -> Mapping[str, sp.Symbol]:
+        """What moves as it was a delay ago, as symbols of its own; what the drive does is steady and has none."""
+        return now if delay == 0 else {n: s if s is V_LP else self._late(s, sp.sympify(delay)) for n, s in now.items()}
+
+    def _late(self, symbol: sp.Symbol, delay: sp.Expr) -> sp.Symbol:
+        for late, meant in self.late.items():
+            if meant == (symbol, delay):
+                return late
+        others = sum(base is symbol for base, _ in self.late.values())
+        late = sp.Symbol(f"{symbol}_late{others + 1 if others else ''}", real=True)
+        self.late[late] = (symbol, delay)
+        return late
+
+    def _steady_pull(self, name: str, elements: list[Element]) -> sp.Expr:
+        """Their force in steady sliding, dashpots that move left out: they are in `_pull`."""
+        total = sp.Add(
+            *(-one.acts.get(name, 0) * self._tension(one, self.statics.displacement, {}) for one in elements)
+        )
+        return self._known(total - self._integrated(name, self.statics.integral))
+
+    def _integrated(self, name: str, integral: sp.Expr) -> sp.Expr:
+        acting = self.mechanism.integral
+        if acting is None or (self.imposed and integral is INTEGRAL):
+            return sp.Integer(0)
+        return acting.acts.get(name, 0) * acting.gain * integral
+
+    # -- definitions
+
+    def _define(self) -> None:
+        """Velocities of slip, then T, τ and σ of the contacts."""
+        for place in self.places:
+            if place.velocity not in self.v.values():
+                self.definitions[place.velocity] = row_of(place.touch.slip, self.moving)
+        self.motions = [self._seen(place) for place in self.places]
+        self.normal = [
+            sp.sympify(p.touch.contact.normal_stress(m)) + p.press
+            for p, m in zip(self.places, self.motions, strict=True)
+        ]
+        self.inertial = {
+            one.name: one.inertia != 0 or any(law.has(self.a[one.name]) for law in self.normal)
+            for one in self.mechanism.coordinates
+        }
+        if self.single:
+            self.definitions[self.places[0].tau] = self._friction_of_balance()
+        self.definitions |= {place.sigma: law for place, law in zip(self.places, self.normal, strict=True)}
+
+    def _seen(self, place: Place) -> Motion:
+        """What a contact law sees; defines T, the pull at the body as a stress of the contact."""
+        touch, body = place.touch, next(name for name in place.touch.slip if name != LOAD_POINT)
+        belt = LOAD_POINT in touch.slip  # the drive is what it slides on, and links to the ground hold it against that
+        elements = self.mechanism.elements
+        pulling = [one for one in elements if not (LOAD_POINT in one.senses if belt else one.grounded)]
+        if touch.loaded_by:
+            pulling = [one for one in self.mechanism.elements if one.name == touch.loaded_by]
+            body = next(name for name in touch.slip if name in pulling[0].acts)
+        lever = touch.slip[body] * touch.area
+        steady = self._single_pull() if self.single else self._steady_pull(body, pulling) / lever
+        moving = sp.Add(*(-one.acts.get(body, 0) * self._tension(one, {}, self.speeds) for one in pulling)) / lever
+        self.definitions[place.spring] = steady + self._pull(body, pulling) / lever
+        behind = (
+            pulling
+            if touch.loaded_by
+            else [one for one in pulling if (one.grounded if belt else LOAD_POINT in one.senses)]
+        )
+        stiffness = sp.Add(*(sp.sympify(e.acts.get(body, 0) * e.stiffness * e.senses.get(body, 0)) for e in behind))
+        distance = self._known(row_of(touch.separation, self.statics.displacement)) if touch.separation else 0
+        apart = distance + row_of(touch.separation, self.x)
+        return self._motion(place, steady + moving, stiffness / (lever * touch.slip[body]), apart, distance)
+
+    def _single_pull(self) -> sp.Expr:
+        """The pull at a block in steady sliding, which no statics are needed for: friction, and what holds it back."""
+        (place,), (body,) = self.places, self.mechanism.coordinates
+        held = sp.Add(*(self._tension(one, {}, self.speeds) for one in self._held()))
+        return place.tau_ss + (held - body.force) / place.touch.area
+
+    def _held(self) -> list[Element]:
+        return [one for one in self.mechanism.elements if one.grounded]
+
+    def _friction_of_balance(self) -> sp.Expr:
+        """τ of a single block."""
+        (place,), (body,) = self.places, self.mechanism.coordinates
+        held = -sp.Add(*(self._tension(one, self.x, self.moving) for one in self._held()))
+        found = place.spring + (held + body.force - body.inertia * self.a[body.name]) / place.touch.area
+        return found + self.push[body.name] / place.touch.area
+
+    def _balance(self, name: str, inertia: Any) -> sp.Expr | None:
+        """Inertia less forces of a coordinate, those that are the same in steady sliding left out on both sides."""
+        if self.single:
+            return None
+        total = inertia * self.a[name] - self._pull(name, list(self.mechanism.elements)) - self.push[name]
+        for one in self.mechanism.elements:  # what a dashpot that moves steadily carries, springs carry the other way
+            total -= one.acts.get(name, 0) * self._tension(one, {}, self.speeds)
+        for place in self.places:
+            area = place.touch.area
+            total += place.touch.slip.get(name, 0) * area * (place.tau - place.tau_ss)
+            total -= place.touch.separation.get(name, 0) * area * (place.sigma - place.sigma_ss)
+        return total
+
+
+def _present(element: Element) -> bool:
+    """Whether an element carries anything at all."""
+    return not (element.stiffness == 0 and element.damping == 0)

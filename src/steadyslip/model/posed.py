@@ -1,0 +1,115 @@
+"""Whether motion follows from the equations, and whether rounding leaves it its digits, near steady sliding."""
+
+from __future__ import annotations
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.expressions import ArrayFunction, derivative
+from steadyslip.core.questions import question
+from steadyslip.model.equations import Model
+from steadyslip.model.kinematics import kinematics
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.weights import arrays_of, slip_rates, weights
+
+MOST_NOISE = 1e-2  # in ln v, from which on rounding decides how a block moves
+
+
+@question
+def posed(point: OperatingPoint) -> np.ndarray:
+    """Whether the balances of forces rise with their unknowns (velocities, or accelerations) in steady sliding.
+
+    If not, the least lag or mass that was left out decides the motion. Of several balances the eigenvalues must be
+    positive.
+    """
+    if point.model.is_single:
+        return np.atleast_1d(weights(point).by_unknown > 0)
+    function, size = _rising(point.model)
+    entries = [np.broadcast_to(np.asarray(e, dtype=float), point.shape or (1,)) for e in function(*arrays_of(point))]
+    matrix = np.moveaxis(np.array(entries).reshape(size, size, -1), -1, 0)
+    good = np.isfinite(matrix).all(axis=(1, 2))
+    rises = np.ones(len(matrix), dtype=bool)
+    if size:
+        rises = np.linalg.eigvals(np.where(good[:, None, None], matrix, 0.0)).real.min(axis=1) > 0
+    return np.asarray(rises & good)
+
+
+def rising(model: Model) -> list[list[sp.Expr]]:
+    """Derivatives of the balances of coordinates in accelerations, or without inertia in velocities of contacts."""
+    moving = kinematics(model)
+    places = [one for one in model.coordinates if one.inertial or moving.contact_at(one) is not None]
+    slopes = {}
+    for contact in model.contacts:  # friction follows what moves
+        balance = model.inlined(contact.balance)
+        slopes[contact.friction] = {
+            s: -derivative(balance, s) / derivative(balance, contact.friction)
+            for one in places
+            for s in (one.acceleration, one.velocity)
+        }
+    rows = []
+    for one in places:
+        balance = model.inlined(sp.Integer(0) if one.balance is None else one.balance)
+        entries = []
+        for other in places:
+            symbol = other.acceleration if other.inertial else other.velocity
+            total = derivative(balance, symbol)
+            for friction, slope in slopes.items():
+                total += derivative(balance, friction) * slope[symbol]
+            entries.append(model.at_steady(total.doit()))
+        rows.append(entries)
+    return rows
+
+
+@question
+def _rising(model: Model) -> tuple[ArrayFunction, int]:
+    rows = rising(model)
+    return model.function(e for row in rows for e in row), len(rows)
+
+
+@question
+def _force_function(model: Model, index: int) -> ArrayFunction:
+    """Forces that keep each other in balance in steady sliding, at a contact.
+
+    The force of a dashpot per change of ln v; what pull and friction do to the normal stress; then what adds up to
+    nothing: pull and friction, and the shares of normal stress and memory in it.
+    """
+    contact = model.contacts[index]
+    inner = [contact.normal, *(item.symbol for item in contact.memory)]
+    shares = [model.at_steady(symbol * derivative(contact.balance, symbol)) for symbol in inner]
+    dashpot = model.at_steady(contact.velocity * derivative(model.definitions[contact.spring], contact.velocity))
+    pressing = [
+        model.at_steady(symbol * derivative(model.definitions[contact.normal], symbol))
+        for symbol in (contact.spring, contact.friction)
+    ]
+    return model.function([dashpot, *pressing, model.steady[contact.spring], model.steady[contact.friction], *shares])
+
+
+@question
+def resolved(point: OperatingPoint) -> np.ndarray:
+    """Whether rounding of the forces leaves the velocity of steady sliding its digits.
+
+    What rounding adds to the balance changes ln v by that over the slope of the balance in ln v; with inertia over the
+    direct effect and over what it takes to change velocity while the block slips a natural length. The rounding of
+    velocity changes the force of a dashpot, and that of forces the normal stress, by little beside what there is. Where
+    motion is ill-posed, that is the matter instead.
+    """
+    apart = np.ones(1, dtype=bool)
+    for index in range(len(point.model.contacts)):
+        apart = apart & _resolved(point, index)
+    return np.asarray(apart | ~posed(point))
+
+
+def _resolved(point: OperatingPoint, index: int) -> np.ndarray:
+    found, drive = weights(point, index), slip_rates(point)[index]
+    place = kinematics(point.model).coordinates[index]
+    dashpot, pull, friction, *forces = point.evaluate(_force_function(point.model, index))
+    with np.errstate(all="ignore"):
+        held = np.abs(np.asarray(drive, dtype=float) * found.by_unknown)
+        if place is None or place.inertial:
+            rates = [found.by_slip * drive / found.direct, *found.decay]
+            held = np.abs(found.direct) + held * np.maximum.reduce(np.broadcast_arrays(*map(np.abs, rates)))
+        largest = np.maximum.reduce(np.broadcast_arrays(*map(np.abs, forces)))
+        least = MOST_NOISE / np.finfo(float).eps
+        hidden = (largest > least * held) | (np.abs(dashpot) > least * largest)
+        hidden |= np.maximum(np.abs(pull), np.abs(friction)) > least * np.atleast_1d(point.sigmas[index])
+        return np.asarray(~hidden)

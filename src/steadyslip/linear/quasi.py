@@ -4,10 +4,10 @@ Coefficients are (..., m, n+1), lowest power first, delays (..., m) with h_0 = 0
 approximated by rational functions. With one delay roots are counted from where they are without it: they cross the
 imaginary axis only at the few ω with |p(iω)| = |q(iω)|, at delays (φ + 2πk)/ω, to the right at the highest of these ω
 and then by turns (Cooke & van den Driessche 1986; Walton & Marshall 1987). With several delays the argument principle
-is applied along the axis, in steps so short that the function cannot wind around zero unseen.
+is applied along the axis (`argument`).
 
 `INFINITE` is the count where the delayed terms have as many derivatives as the undelayed and outweigh them: there are
-infinitely many roots to the right, the faster growing the shorter the delay.
+infinitely many roots to the right, the faster growing the shorter the delay; `UNKNOWN` where counting takes too long.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.linear.argument import UNKNOWN, Axis, bound_on_axis, count_by_argument
 from steadyslip.linear.polynomials import (
     Array,
     ComplexArray,
@@ -32,10 +33,9 @@ from steadyslip.linear.polynomials import (
 
 INFINITE = 2**62
 _HALVINGS = 60  # of a bracket of a real part
-_MOST = 400_000  # places along the axis at which a function is evaluated
+_TOGETHER = 40  # rigs with several delays whose roots are counted at a time
 _TURNS = 5000  # of the fastest crossing, after which delays are not looked at any more
 _LOST = 1e10  # turns of the fastest crossing during one delay, of which rounding leaves no angle to rely on
-_NEAR = 1e-13  # relative length of a step along the axis that is not cut any more: a root is on it
 
 
 def value(c: Array, h: Array, s: Any) -> Any:
@@ -79,9 +79,26 @@ def in_own_time(c: Array, h: Array) -> tuple[Array, Array, Array]:
     return np.where(c == 0, 0.0, np.sign(c) * np.exp(logs)), h * rate[..., None], rate
 
 
-@quietly
 def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
-    """How many roots have a real part above `shift`, (...); −1 where coefficients are no numbers."""
+    """How many roots have a real part above `shift`, (...); −1 where coefficients are no numbers.
+
+    Raises
+    ------
+    NotAvailable
+        If there are several delays, so long that roots cannot be counted.
+    """
+    found = counted_right(c, h, shift)
+    if np.any(found == UNKNOWN):
+        with np.errstate(all="ignore"):
+            scaled, own, _ = in_own_time(c, h)
+        fast = [bound_on_axis(one) for one in scaled.reshape(-1, *scaled.shape[-2:])]
+        raise _too_long(float(np.nanmax(fast) * np.max(own)) / (2 * np.pi))
+    return found
+
+
+@quietly
+def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
+    """The same, `UNKNOWN` where roots cannot be counted."""
     lead = np.broadcast_shapes(c.shape[:-2], np.shape(shift))
     c, h, rate = in_own_time(c, h)
     if np.any(shift):
@@ -90,24 +107,29 @@ def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]
     h = np.broadcast_to(h, (*lead, h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full(len(c), -1, dtype=np.int64)
     good = np.all(np.isfinite(c), axis=(-2, -1)) & np.all(np.isfinite(h), axis=-1)
-    ahead = good & outweighed(c) & np.any(h[:, 1:] > 0, axis=-1)
+    ahead = good & without_end(c, h)
     found[ahead] = INFINITE
     rows = np.flatnonzero(good & ~ahead)
     if c.shape[-2] <= 2 and rows.size:
         q = c[rows, 1] if c.shape[-2] == 2 else np.zeros_like(c[rows, 0])
         found[rows] = _count_by_crossings(c[rows, 0], q, h[rows, -1])
     else:
-        for row in rows:
-            found[row] = _count_by_argument(c[row], h[row])
+        for some in np.array_split(rows, -(-len(rows) // _TOGETHER)):
+            found[some] = count_by_argument(c[some], h[some])
     return found.reshape(lead)
+
+
+def without_end(c: Array, h: Array) -> NDArray[np.bool_]:
+    """Whether infinitely many roots lie to the right, (...)."""
+    return np.asarray(outweighed(c) & np.any(h[..., 1:] > 0, axis=-1))
 
 
 def outweighed(c: Array) -> NDArray[np.bool_]:
     """Whether the highest derivative is delayed as much as it is not, or more."""
     present = np.any(c != 0, axis=-2)
     top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
-    highest = np.abs(np.take_along_axis(c, top[:, None, None], axis=-1)[..., 0])
-    return np.asarray(np.sum(highest[:, 1:], axis=-1) >= highest[:, 0])
+    highest = np.abs(np.take_along_axis(c, top[..., None, None], axis=-1)[..., 0])
+    return np.asarray(np.sum(highest[..., 1:], axis=-1) >= highest[..., 0])
 
 
 def crossings(p: Array, q: Array) -> tuple[Array, Array, Array]:
@@ -141,63 +163,11 @@ def _count_by_crossings(p: Array, q: Array, h: Array) -> NDArray[np.int64]:
     return np.asarray(start + crossed, dtype=np.int64)
 
 
-def bound_on_axis(c: Array) -> float:
-    """A size that no root to the right of the imaginary axis has (Fujiwara), delayed terms at their largest."""
-    size = np.abs(c)
-    top = int(np.flatnonzero(np.any(size > 0, axis=0))[-1])
-    if top == 0:
-        return 1.0
-    left = size[0, top] - np.sum(size[1:, top])
-    total = np.sum(size[:, :top], axis=0)
-    powers = 1.0 / (top - np.arange(top))
-    return 2.0 * float(np.max((total / left) ** powers)) or 1.0
-
-
-def _along(c: Array, h: Array, most: float) -> tuple[Array, ComplexArray]:
-    """Places ω from 0 to `most` and the values at iω, so dense that between two the function cannot wind around zero.
-
-    Its length between two places is at most their distance times the largest slope; where that is less than the sum of
-    the sizes at both, the chord and the function go around zero on the same side.
-
-    Raises
-    ------
-    NotAvailable
-        If there are too many.
-    """
-    sizes, powers = np.abs(c), np.arange(c.shape[-1])
-    slopes = np.sum(sizes[:, 1:] * powers[1:], axis=0), np.sum(sizes * h[:, None], axis=0)
-    omega = np.concatenate([[0.0], most * np.geomspace(1e-9, 1.0, 200)])
-    found = value(c, h, 1j * omega)
-    while len(omega) < _MOST:
-        low, high = omega[:-1], omega[1:]
-        steepest = evaluate(slopes[0], high) + evaluate(slopes[1], high)
-        coarse = steepest * (high - low) >= 0.99 * (np.abs(found[:-1]) + np.abs(found[1:]))
-        at = np.flatnonzero(coarse & (high - low > _NEAR * high))
-        if not at.size:
-            break
-        middle = 0.5 * (low[at] + high[at])
-        omega = np.insert(omega, at + 1, middle)
-        found = np.insert(found, at + 1, value(c, h, 1j * middle))
-    else:
-        turns = most * float(np.max(h)) / (2 * np.pi)
-        raise _too_long(turns)
-    return omega, found
-
-
 def _too_long(turns: float) -> NotAvailable:
     return NotAvailable(
         f"the delays are so long beside the oscillations of this rig, up to {turns:.2g} turns, that its growing roots "
         "cannot be counted; shorten them"
     )
-
-
-def _count_by_argument(c: Array, h: Array) -> int:
-    """Roots to the right by the argument principle: n/2 less the turns of the function along the positive axis."""
-    top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
-    _, found = _along(c, h, bound_on_axis(c))
-    turned = float(np.sum(np.angle(found[1:] / found[:-1])))
-    turned += float(np.angle(1j**top * c[0, top] / found[-1]))  # beyond, the highest power leads by less than π/2
-    return round(top / 2 - turned / np.pi)
 
 
 @quietly
@@ -248,6 +218,13 @@ def _rightmost_of_one(c: Array, h: Array, count: int) -> ComplexArray:
     return np.array(found)
 
 
+@quietly
+def nearest_to_axis(c: Array, h: Array) -> complex:
+    """The root of one rig nearest to the imaginary axis, with imaginary part zero or positive."""
+    (scaled,), (own,), (rate,) = in_own_time(c[None], h[None])
+    return complex(rate * _root_on(scaled, own, 0.0))
+
+
 def _root_on(c: Array, h: Array, real: float) -> complex:
     """The root with imaginary part zero or positive that lies on a line, found again by Newton's method."""
     moved = shifted(c, h, np.asarray(real))
@@ -272,10 +249,12 @@ def _near_axis(c: Array, h: Array) -> Iterator[float]:
     if len(c) == 2:
         yield from (float(one) for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one))
         return
-    omega, found = _along(c, h, bound_on_axis(c))
-    size = np.abs(found) / _size(c, h, 1j * omega)
-    dips = np.flatnonzero((size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])) + 1
-    yield from omega[dips[np.argsort(size[dips])[:20]]]
+    own = [pieces.omega[0][leader < 0] for pieces, leader in Axis(c[None], h[None]).settled()]
+    omega = np.sort(np.concatenate(own))
+    size = np.abs(value(c, h, 1j * omega)) / _size(c, h, 1j * omega)
+    around = np.concatenate([[np.inf], size, [np.inf]])
+    dips = np.flatnonzero((size <= around[:-2]) & (size <= around[2:]))
+    yield from (float(one) for one in omega[dips[np.argsort(size[dips])[:20]]])
 
 
 @quietly

@@ -22,7 +22,14 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.telling import shown
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.polynomials import Array, StableSet
-from steadyslip.linear.spectrum import is_ill_posed, nearness, spectrum, static_sum
+from steadyslip.linear.spectrum import (
+    can_be_counted,
+    crossing_frequency,
+    is_ill_posed,
+    nearness,
+    static_sum,
+    unstable_roots,
+)
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
 from steadyslip.linear.stiffness import STIFFNESS, set_of_one
 from steadyslip.machine.machine import Machine
@@ -38,6 +45,7 @@ _ROUNDING = 64  # units of the last place within which two conditions are one, a
 _WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
 _FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a level stretch, which hides no zero
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
+_FEW = 8  # growing roots of rigs with delay, of which a dip between two samples may be a window; of more none is
 _SCARCE = 6  # times fewer samples where roots have to be counted one rig after the other: with several delays
 
 
@@ -163,11 +171,9 @@ class Search:
             exact = self._exact()
             if exact is not None:
                 return self._of_set(exact, grid[0], grid[-1])
-            grid = self._with_hidden_windows(grid)
-            grid = grid[~on_edge(self.values(grid))]  # a status that rounding decides is none
+            grid, status = self._judged(grid)
             if len(grid) < 2:
                 return ()
-            status = self.status(grid)
             known = (status[1:] != UNKNOWN) & (status[:-1] != UNKNOWN)
             at = np.flatnonzero((status[1:] != status[:-1]) & known)
             low, high = self._narrowed(grid[at], grid[at + 1], status[at])
@@ -176,11 +182,28 @@ class Search:
                 low, high = low[inside], high[inside]
             return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
 
-    def _with_hidden_windows(self, grid: Array) -> Array:
-        """Add samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
-        status, measures = self.status(grid), self.measures(grid)
+    def _judged(self, grid: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Samples, those of hidden windows among them, and their status; without those that rounding decides."""
+        found: list[tuple[Array, NDArray[np.int64], NDArray[np.bool_]]] = []
+        extra = grid
+        while extra.size:
+            point = self.values(extra)
+            if not np.all(known := can_be_counted(point)):
+                extra, point = extra[known], self.values(extra[known])
+            found.append((extra, own := status(point), on_edge(point)))
+            extra = np.empty(0) if len(found) > 1 else self._hidden_windows(extra, own, point)
+        samples, judged, edge = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        samples, at = np.unique(samples, return_index=True)
+        certain = ~edge[at]
+        return samples[certain], judged[at][certain]
+
+    def _hidden_windows(self, grid: Array, status: NDArray[np.int64], point: OperatingPoint) -> Array:
+        """Samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
+        measures = nearness(point)
         same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & np.isin(status[1:-1], (STABLE, UNSTABLE))
-        extra = [grid]
+        if point.model.delays:
+            same &= unstable_roots(point)[1:-1] <= _FEW
+        extra = [np.empty(0)]
         for which, measure in enumerate(measures):
             size = np.abs(measure)
             dips = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
@@ -188,7 +211,7 @@ class Search:
             at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
             if at.size:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
-        return np.unique(np.concatenate(extra))
+        return np.concatenate(extra)
 
     def _descended(self, which: int, sign: Array, low: Array, high: Array) -> list[Array]:
         """Lowest points of a measure (times its sign) inside brackets, ever more closely."""
@@ -204,15 +227,14 @@ class Search:
 
     def _narrowed(self, low: Array, high: Array, low_status: NDArray[np.int64]) -> tuple[Array, Array]:
         """Brackets down to rounding, all at once; keeps the lowest change inside each."""
-        split = _SPLIT if self.share == 1 else 2
-        for _ in range(int(60 / np.log2(split))):
+        for _ in range(int(60 / np.log2(_SPLIT))):
             if not len(low):
                 break
-            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, split + 1)
+            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
             x[:, -1] = high
             status = self.status(x.ravel()).reshape(x.shape)
             first = np.argmax(status != low_status[:, None], axis=-1)
-            first = np.where(first == 0, split, first)
+            first = np.where(first == 0, _SPLIT, first)
             row = np.arange(len(low))
             low, high = x[row, first - 1], x[row, first]
         return low, high
@@ -254,11 +276,8 @@ class Search:
             return "ill-posed", 0.0
         if static[0] * static[1] <= 0:
             return "divergence", 0.0
-        found = spectrum(self.values(np.array([low])))[0]
-        found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]
-        if not found.size:
-            return "divergence", 0.0
-        return "oscillatory", float(np.abs(found[np.argmax(found.real)].imag))
+        frequency = crossing_frequency(self.values(np.array([low])))
+        return ("oscillatory" if frequency else "divergence"), frequency
 
     def _exact(self) -> StableSet | None:
         """The stable set of the stiffness of a slider, and of whatever enters linearly in a machine."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasi as sums
+from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.polynomials import Array, ComplexArray, damping_measures, is_hurwitz, roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi
@@ -25,13 +27,23 @@ def is_stable(point: OperatingPoint) -> NDArray[np.bool_]:
     """Whether all roots lie left of the axis and the equations are well posed."""
     if not point.model.delays:
         return is_hurwitz(characteristic(point))
-    c, h = quasi(point)
-    return np.asarray((sums.count_right(c, h) == 0) & (np.sum(c[..., 0], axis=-1) != 0) & ~is_ill_posed(point))
+    return np.asarray((unstable_roots(point) == 0) & (static_sum(point) != 0) & ~is_ill_posed(point))
 
 
+def can_be_counted(point: OperatingPoint) -> NDArray[np.bool_]:
+    """Where roots to the right can be counted: everywhere but under several delays of absurd length."""
+    return np.asarray(_counts(point) != UNKNOWN) if point.model.delays else np.ones(point.shape, dtype=bool)
+
+
+@question
+def _counts(point: OperatingPoint) -> NDArray[np.int64]:
+    return sums.counted_right(*quasi(point))
+
+
+@question
 def unstable_roots(point: OperatingPoint) -> NDArray[np.int64]:
     """How many roots lie right of the axis, of points with delays; `quasi.INFINITE` of them, or −1 where unknown."""
-    return sums.count_right(*quasi(point))
+    return _counts(point) if np.all(can_be_counted(point)) else sums.count_right(*quasi(point))
 
 
 def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
@@ -43,7 +55,7 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
     if not point.model.delays:
         return ill_posed(characteristic(point))
     c, h = quasi(point)
-    return np.asarray(ill_posed(c[..., 0, :]) | (sums.count_right(c, h) == sums.INFINITE))
+    return np.asarray(ill_posed(c[..., 0, :]) | sums.without_end(c, h))
 
 
 def ill_posed(c: Array) -> NDArray[np.bool_]:
@@ -56,11 +68,22 @@ def static_sum(point: OperatingPoint) -> Array:
     return characteristic(point)[..., 0] if not point.model.delays else np.sum(quasi(point)[0][..., 0], axis=-1)
 
 
+@question
 def nearness(point: OperatingPoint) -> Array:
     """Two functions of rigs, (2, ...), that pass through zero where a root crosses the axis, in pairs or alone."""
     if not point.model.delays:
         return damping_measures(spectrum(point))
     return sums.nearness(*quasi(point))
+
+
+def crossing_frequency(point: OperatingPoint) -> float:
+    """Imaginary part (rad/s) of the root nearest to the axis, of a single rig on an edge; 0 without oscillation."""
+    if point.model.delays:
+        c, h = quasi(point)
+        return sums.nearest_to_axis(c.reshape(-1, *c.shape[-2:])[0], h.reshape(-1, h.shape[-1])[0]).imag
+    found = spectrum(point).ravel()
+    found = found[np.isfinite(found) & (np.abs(found.imag) > 0)]
+    return float(np.abs(found[np.argmax(found.real)].imag)) if found.size else 0.0
 
 
 def is_near_edge(point: OperatingPoint, share: float) -> NDArray[np.bool_]:

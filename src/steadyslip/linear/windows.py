@@ -15,9 +15,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from steadyslip.linear.argument import bound_on_axis
 from steadyslip.linear.polynomials import Array, StableSet, quietly, roots
 from steadyslip.linear.quasi import (
-    bound_on_axis,
     count_right,
     crossing_delays,
     in_own_time,

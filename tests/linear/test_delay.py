@@ -279,6 +279,16 @@ def test_a_late_controller_and_late_friction_together():
     assert abs(ss.eigenvalues(machine.with_values({"drive.kp": edge.value}))[0].real) < 1e-8
 
 
+def test_a_scan_with_two_delays_goes_on_where_some_far_samples_cannot_be_counted():
+    """A lag of ten natural times, of which some samples decades off the own value oscillate millions of times."""
+    machine = replace(
+        lagging(10.0, lag=10.0), drive=ss.PositionPD(velocity=1.0, body="block", kp=2.0, kd=0.5, delay=0.2),
+        links={"spring": ss.Spring(between=("ground", "block"), damping=0.4)},
+    )  # fmt: skip
+    assert ss.boundary(machine, "friction.v_stribeck") == ()
+    assert set(ss.stability(machine, {"friction.v_stribeck": [0.1, 1.0, 10.0]}).tolist()) == {"stable"}
+
+
 def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
     """Without mass, c s + Kd s exp(−sτ): from Kd = c on there are infinitely many growing roots."""
     base = servo(1.0, 0.1)
@@ -312,9 +322,13 @@ def test_a_delay_of_absurd_length_is_refused_in_words():
 
 
 def test_roots_that_are_too_many_to_be_counted_are_refused_in_words():
-    """With several delays: beyond some hundred thousand places along the axis the count would be a guess."""
+    """With several delays, where no term outweighs the others for long; where one does, any delay is counted."""
     c = np.array([[4.0, 1.2, 1.0], [1.0, 0.1, 0.0], [0.5, 0.2, 0.0]])
-    assert quasi.count_right(c, np.array([0.0, 1e4, 0.77e4])) == 0
+    for delay in (1e4, 1e7, 1e12):
+        assert quasi.count_right(c, np.array([0.0, delay, 0.77 * delay])) == 0
+    c[1:] *= 3
+    h = np.array([0.0, 40.0, 31.0])
+    assert quasi.count_right(c, h) == winding(lambda s: np.array([[quasi.value(c, h, s)]]), 200.0)
     with pytest.raises(ss.NotAvailable, match="so long beside the oscillations"):
         quasi.count_right(c, np.array([0.0, 1e7, 0.77e7]))
 

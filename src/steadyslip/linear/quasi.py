@@ -87,7 +87,7 @@ def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]
     NotAvailable
         If there are several delays, so long that roots cannot be counted.
     """
-    found = counted_right(c, h, shift)
+    found = counted_right(c, h, shift, alone=True)
     if np.any(found == UNKNOWN):
         with np.errstate(all="ignore"):
             scaled, own, _ = in_own_time(c, h)
@@ -97,8 +97,8 @@ def count_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]
 
 
 @quietly
-def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int64]:
-    """The same, `UNKNOWN` where roots cannot be counted."""
+def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = False) -> NDArray[np.int64]:
+    """The same, `UNKNOWN` where they cannot be counted: with little effort, as in scans, or with all, each `alone`."""
     lead = np.broadcast_shapes(c.shape[:-2], np.shape(shift))
     c, h, rate = in_own_time(c, h)
     if np.any(shift):
@@ -113,9 +113,13 @@ def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0) -> NDArray[np.int6
     if c.shape[-2] <= 2 and rows.size:
         q = c[rows, 1] if c.shape[-2] == 2 else np.zeros_like(c[rows, 0])
         found[rows] = _count_by_crossings(c[rows, 0], q, h[rows, -1])
-    else:
+    elif rows.size:
         for some in np.array_split(rows, -(-len(rows) // _TOGETHER)):
             found[some] = count_by_argument(c[some], h[some])
+        for one in rows[found[rows] == UNKNOWN] if alone else ():
+            found[one] = count_by_argument(c[[one]], h[[one]])[0]
+            if found[one] == UNKNOWN:
+                break
     return found.reshape(lead)
 
 

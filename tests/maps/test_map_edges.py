@@ -155,3 +155,8 @@ def test_what_has_no_sensitivity_is_said():
     flat = {"friction.mu_ref": (0.5, 0.6), "drive.velocity": (1e-6, 2e-6)}
     with pytest.raises(ss.NotAvailable, match="does not depend on"):
         ss.sensitivity(rig(contact=ss.Constant(preload=5e6)), flat, "critical_stiffness", points=64)
+    found = ss.sensitivity(
+        rig(contact=ss.Constant(preload=5e6)), flat, ["critical_stiffness", "growth_rate"], points=64
+    )
+    assert set(found.first) == {"growth_rate"}  # what has none costs the others nothing
+    assert "no shares of critical_stiffness: critical_stiffness does not depend on friction.mu_ref" in str(found)

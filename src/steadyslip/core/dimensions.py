@@ -29,7 +29,7 @@ class Dimension(NamedTuple):
         return Dimension(*(a + power * b for a, b in zip(self, other, strict=True)))
 
 
-_PREFIX = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+_PREFIX = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 MICRO = str.maketrans({"µ": "u", "μ": "u", "·": " ", "×": " ", "−": "-"})
 """Signs of units as people write them, and as they stand in the table."""
 _PREFIXED = {

@@ -13,27 +13,23 @@ from steadyslip import units
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import PLAIN_WORDS, PREFIXABLE, Dimension, factors, unit
 
-_own: ContextVar[Mapping[Dimension, str]] = ContextVar("own units", default=MappingProxyType({}))
+_own: ContextVar[Mapping[Dimension, tuple[str, ...]]] = ContextVar("own units", default=MappingProxyType({}))
 
 
 @contextmanager
 def told_in(names: Iterable[str]) -> Iterator[None]:
-    """Tell people quantities in units of their own, such as rpm, bar or N/um, where these are one for a dimension.
+    """Tell people quantities in units of their own, such as rpm, bar, mm^2 or N/um; of several the one that reads best.
 
     Units with a prefix in front alone, such as kN or um/s, are no reason: they are told as reads best in any case.
 
     >>> with told_in(["rpm", "kN", "MPa", "bar", "N/um"]):
-    ...     shown(10.0, "rad/s"), shown(2e4, "N"), shown(2e5, "Pa"), shown(12e6, "N/m")
-    ('95.49 rpm', '20 kN', '200 kPa', '12 N/um')
+    ...     shown(10.0, "rad/s"), shown(2e4, "N"), shown(2e5, "Pa"), shown(2e7, "Pa"), shown(12e6, "N/m")
+    ('95.49 rpm', '20 kN', '2 bar', '20 MPa', '12 N/um')
     """
     found: dict[Dimension, set[str]] = {}
     for name in names:
         found.setdefault(unit(name)[1], set()).add(name)
-    alone = {dimension: own for dimension, several in found.items() for own in several if len(several) == 1}
-    own = {
-        dimension: name for dimension, name in alone.items()
-        if any(word not in PREFIXABLE or (word not in PLAIN_WORDS and power < 0) for word, power in factors(name))
-    }  # fmt: skip
+    own = {kind: tuple(sorted(several)) for kind, several in found.items() if any(map(_is_own, several))}
     before = _own.set(own)
     try:
         yield
@@ -41,7 +37,21 @@ def told_in(names: Iterable[str]) -> Iterator[None]:
         _own.reset(before)
 
 
-_SHOWN_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
+def _is_own(name: str) -> bool:
+    """Whether a unit is another than a prefix alone makes of that in which everybody would be told."""
+    return any(
+        word not in PREFIXABLE or (word not in PLAIN_WORDS and (power < 0 or power > 1))
+        for word, power in factors(name)
+    )
+
+
+def _best(value: float, names: tuple[str, ...]) -> str | None:
+    """The unit in which a value reads best: between 1 and 100, if there is one; None without any."""
+    return min(names, key=lambda name: abs(math.log10(abs(value) / unit(name)[0]) - 1), default=None) if value else None
+
+
+_SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # of a power, a prefix would be one of the base; ms/m reads as m/s
+_SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
 
 def _few(value: float, digits: int) -> str:
@@ -64,8 +74,9 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
     value = value * factor
     if si_unit == "1":
         return _few(value, digits)
-    own = _own.get().get(unit(si_unit)[1])
-    scaled = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)  # of a power, a prefix would be one of the base
+    names = _own.get().get(unit(si_unit)[1], ())
+    own = (_best(value, names) if math.isfinite(value) else None) or next(iter(names), None)
+    scaled = _SCALED.match(si_unit)
     if own is not None and (value == 0 or scaled is None or 1e-3 <= abs(value / unit(own)[0]) < 1e5):
         return f"{_few(value / unit(own)[0], digits)} {own}"
     if si_unit == "rad":
@@ -76,12 +87,12 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
         for size, name in ((units.year, "yr"), (units.day, "days"), (units.hour, "h"), (60.0, "min")):
             if abs(value) >= 2 * size:
                 return f"{_few(value / size, digits)} {name}"
-    first = re.match(r"(?:Pa|N|m|s)(?!\^)", si_unit)
-    if first is None or value == 0 or not math.isfinite(value):
+    if scaled is None or value == 0 or not math.isfinite(value):
         return f"{_few(value, digits)} {si_unit}"
     size = abs(value)
     for factor, prefix in _SHOWN_PREFIXES:
-        if size >= 0.9999 * factor and (prefix not in ("G", "M", "k") or first[0] in ("Pa", "N")):
+        long = prefix == "T" and size < 1e14  # faults are told in GN and GN/m
+        if size >= 0.9999 * factor and not long and (prefix not in ("T", "G", "M", "k") or scaled[0] in ("Pa", "N")):
             break
     if not 1e-3 <= size / factor < 1e5:
         return f"{_few(value, digits)} {si_unit}"
@@ -112,7 +123,7 @@ def shown_range(low: float, high: float, si_unit: str, area: float | None = None
     number, _, name = shown(high, si_unit).partition(" ")
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
         return f"{shown(low, si_unit)} to {shown(high, si_unit)}"
-    return f"{low * float(number) / high:.4g} to {number} {name}".rstrip()
+    return f"{_few(low * float(number) / high, 4)} to {number} {name}".rstrip()
 
 
 def percent(share: float) -> str:

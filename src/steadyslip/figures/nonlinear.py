@@ -79,7 +79,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         name = "" if point.kind in seen else point.kind
         seen.add(point.kind)
         ax.plot([point.cycle.value / factor], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
-    ax.set_yscale("log")
+    ax.set_yscale("log" if len(branch) else "linear")
     if len(branch) and np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
         ax.set_xscale("log")
     where = f" at {branch.cycles[0].contact}" if len(branch) and branch.cycles[0].contact else ""

@@ -48,6 +48,8 @@ class Sensitivity(ReadOnly):
         Sets of points used, each of d + 2 evaluations.
     interrupted : bool
         Whether Ctrl-C came before all sets were done.
+    without : dict of str to str
+        Results that have no shares, and why: they exist at too few points, or do not vary.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -60,6 +62,7 @@ class Sensitivity(ReadOnly):
     missing: dict[str, float]
     points: dict[str, int]
     interrupted: bool = False
+    without: dict[str, str] = field(default_factory=dict)
 
     def ranked(self, result: str) -> list[str]:
         """Parameters by falling total share."""
@@ -82,6 +85,7 @@ class Sensitivity(ReadOnly):
                 lines.append(
                     f"  does not exist at {100 * self.missing[result]:.3g} % of the points, which are left out"
                 )
+        lines += [f"no shares of {result}: {why}" for result, why in self.without.items()]
         if self.interrupted:
             lines.append(f"  stopped: these are the shares by {max(self.points.values())} sets of points")
         return "\n".join(lines)
@@ -102,6 +106,7 @@ class Sensitivity(ReadOnly):
                 }
                 for result in self.first
             },
+            "without": dict(self.without),
         }
 
     def plot(self, ax: Any = None) -> Any:
@@ -149,7 +154,7 @@ def sensitivity(
     ParameterError
         If anything given is wrong.
     NotAvailable
-        If a result exists at too few points, or does not vary.
+        If every result exists at too few points, or does not vary.
 
     Notes
     -----
@@ -179,27 +184,31 @@ def sensitivity(
         raise KeyboardInterrupt(f"after {points} of {asked} sets of points; {LEAST} would have been enough")
     generator = np.random.default_rng(seed)
     found: dict[str, dict[str, Any]] = {n: {} for n in ("first", "total", "low", "high", "missing", "points")}
+    without: dict[str, str] = {}
     for output in outputs:
         column = values[output.name]
         good = np.all(np.isfinite(column), axis=0)
         used = np.flatnonzero(good)[: 2 ** int(np.log2(max(good.sum(), 1)))]
         if len(used) < LEAST:
             count = f"{output.name} exists at {good.sum()} of {points} sets of points only"
-            message = f"{count}; ask for more points, or for other ranges"
-            raise NotAvailable(message)
+            without[output.name] = f"{count}; ask for more points, or for other ranges"
+            continue
         column = column[:, used]
         if np.ptp(column) == 0:
-            raise NotAvailable(f"{output.name} does not depend on {', '.join(plan.varied)}")
+            without[output.name] = f"{output.name} does not depend on {', '.join(plan.varied)}"
+            continue
         found["first"][output.name], found["total"][output.name] = _indices(column)
         again = np.stack([_indices(column[:, generator.integers(0, len(used), len(used))]) for _ in range(RESAMPLES)])
         interval = np.quantile(again, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
         found["low"][output.name], found["high"][output.name] = interval[:, 0], interval[:, 1]
         found["missing"][output.name] = float(np.mean(~np.isfinite(values[output.name])))
         found["points"][output.name] = len(used)
+    if not found["first"]:
+        raise NotAvailable("; ".join(without.values()))
     ranges = {name: (low, high, spacing) for name, low, high, spacing in plan.sampling.ranges}  # type: ignore[union-attr]
     return Sensitivity(
         plan.rig, plan.varied, ranges, found["first"], found["total"], found["low"], found["high"], found["missing"],
-        found["points"], points < asked,
+        found["points"], points < asked, without,
     )  # fmt: skip
 
 

@@ -197,11 +197,12 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
     blind = [name for name, touch in machine.contacts.items() if not touch.friction.memory()]
     if not blind:
         return found
-    which = f"contact {blind[0]} has" if len(blind) == 1 else f"contacts {', '.join(blind)} have"
+    alone = len(blind) == 1
+    which = f"law of contact {blind[0]} has" if alone else f"laws of contacts {', '.join(blind)} have"
     return (
         *found,
-        f"the friction law of {which} no memory of sliding, so that whether it judders at low speed is not predicted; "
-        "use a law with memory",
+        f"the friction {which} no memory of sliding, so that whether {'it judders' if alone else 'they judder'} at low "
+        "speed is not predicted; use a law with memory",
     )
 
 

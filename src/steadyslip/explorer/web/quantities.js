@@ -12,15 +12,15 @@ const TABLE = {
 const BASES = [["Pa", [1, -1, -2, 0]], ["N", [1, 1, -2, 0]], ["m", [0, 1, 0, 0]], ["s", [0, 0, 1, 0]], ["Hz", [0, 0, -1, 0]]];
 for (const [name, exponents] of BASES) {
   TABLE[name] = [1, exponents];
-  const prefixes = { G: 1e9, M: 1e6, k: 1e3, c: 1e-2, m: 1e-3, u: 1e-6, n: 1e-9, p: 1e-12 };
+  const prefixes = { T: 1e12, G: 1e9, M: 1e6, k: 1e3, c: 1e-2, m: 1e-3, u: 1e-6, n: 1e-9, p: 1e-12 };
   for (const [letter, factor] of Object.entries(prefixes)) TABLE[letter + name] ??= [factor, exponents];
 }
 const WORD = /\s*([/*·])?\s*([A-Za-z%°]+|1)\s*(?:\^\s*(-?\d)|(\d))?/y;
 const NUMBER = /^\s*([-+−]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+−]?\d+)?)\s*(.*?)\s*$/;
 const EITHER = /^[-+−]?[1-9]\d{0,2},\d{3}$/; // a comma that may be a decimal one or part thousands
-const PREFIXED = /^(?:[GMkcmunp]?(?:Pa|N|m|s|rad)(?:\^?\d)?[\s*/·]*)+$/, SCALED = /^(Pa|N|m|s)(?![a-z^])/;
+const PREFIXED = /^(?:[TGMkcmunp]?(?:Pa|N|m|s|rad)(?:\^?\d)?[\s*/·]*)+$/, SCALED = /^(Pa|N|m|s(?!\/))(?![a-z^])/;
 /** @type {[number, string][]} */
-const SHOWN = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+const SHOWN = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 /** @type {[number, string][]} */
 const LONG = [[31557600, "yr"], [86400, "days"], [3600, "h"], [60, "min"]];
 
@@ -92,7 +92,7 @@ export function display(value, si) {
   if (si === "s" && Number.isFinite(size)) for (const [factor, name] of LONG) if (size >= Math.max(600, 2 * factor)) return [factor, name];
   if (!first || !(size > 0) || !Number.isFinite(size)) return [1, si];
   const large = first[0] === "Pa" || first[0] === "N";
-  const [factor, letter] = SHOWN.find(([f, l]) => size >= 0.9999 * f && (f < 10 || large || l === "")) || [1e-9, "n"];
+  const [factor, letter] = SHOWN.find(([f, l]) => size >= (f < 1e12 ? 0.9999 * f : 1e14) && (f < 10 || large || l === "")) || [1e-9, "n"];
   return size / factor >= 1e-3 && size / factor < 1e5 ? [factor, letter + si] : [1, si];
 }
 

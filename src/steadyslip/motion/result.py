@@ -38,8 +38,8 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         """The status in a sentence, with what to do where the run ended early."""
         where = f" ({self.contact})" if self.contact else ""
         head = f"{self.status}{where} at {shown(self.end, 's')}"
-        machine = isinstance(self.rig, Machine)
-        advice = remedy(self.status, machine, None if machine else self.rig.area)
+        area = None if isinstance(self.rig, Machine) else self.rig.area
+        advice = remedy(self.status, isinstance(self.rig, Machine), area)
         return f"{head}: {advice}" if advice else head
 
     @property

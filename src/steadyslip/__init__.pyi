@@ -222,6 +222,7 @@ from .nonlinear import (
     threshold_map as threshold_map,
 )
 from .protocol import (
+    Creep as Creep,
     CreepRamp as CreepRamp,
     CreepStep as CreepStep,
     CreepTable as CreepTable,

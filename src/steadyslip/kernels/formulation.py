@@ -65,7 +65,8 @@ class Formulation:
     def __init__(self, reduction: Reduction, choice: Choice) -> None:
         self.reduction, self.choice = reduction, choice
         self.method: Method = METHODS[choice.method]()
-        self.size = self.counted = len(reduction.state)  # how many errors are averaged
+        self.size = len(reduction.state)
+        self.counted = self.size - len(reduction.model.held)  # how many errors are averaged
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | self._inputs
         own = (one.variable.w for one in reduction.slidings if one.variable is not None)
         variables = {*reduction.state, *reduction.continuous, *self._inputs, *own}
@@ -167,6 +168,7 @@ class Formulation:
         balances = [balance for _, balance in reduction.restarts]
         balances += [derivative(balance, w) for balance in balances for w, _ in reduction.restarts]
         self.restart = Formulas([self._fixed(e) for e in balances], known) if balances else None
+        self.letting_go = self._formulas([self._fixed(e) for e in reduction.letting_go])
         self.shift = self._formulas([self._fixed(e) for e in reduction.shifts])
         self.shares = self._formulas([self._fixed(e) for i in range(self.contacts) for e in self._shares(i)])
 

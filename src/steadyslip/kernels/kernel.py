@@ -14,10 +14,11 @@ from steadyslip.kernels.events import faster
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Out, Row
 from steadyslip.kernels.newton import eliminated
-from steadyslip.kernels.nodes import Program, Value
+from steadyslip.kernels.nodes import Program, Value, as_node, select
 from steadyslip.kernels.record import Evaluator, horner, slope_of, times
 from steadyslip.kernels.step import Step
 from steadyslip.kernels.watch import Watch
+from steadyslip.protocol.creep import FREE, SWITCH
 
 
 class Kernel(Formulation):
@@ -103,6 +104,8 @@ class Kernel(Formulation):
             record.program.store(self.layout.continuous + i, value)
         moved = record.program.load(Row.LOAD_MOVED) + record.load_advance(record.program.load(Row.TAU))
         record.program.store(Row.LOAD_MOVED, moved)
+        if self.reduction.letting_go:
+            record.program.store(Row.PULL, record.evaluated(self.letting_go, point)[0])
         return record.program
 
     def _balance_program(self) -> Program:
@@ -140,13 +143,28 @@ class Kernel(Formulation):
         return program
 
     def _shift_program(self) -> Program:
-        """A jump of the load point: everything falls behind by its own share."""
+        """A jump of the load point: all fall behind by their own shares. Before it a drive is let go or taken up."""
         record = Evaluator(self, Program("shift"))
         program = record.program
+        if self.reduction.letting_go:
+            self._let_go(record)
         for i, share in enumerate(self.shift(record.constants)):
             place = self.layout.continuous + i
             program.store(place, program.load(place) - times(program.number, share))
         return program
+
+    def _let_go(self, record: Evaluator) -> None:
+        """What is held of the drive's force so that this goes on, or is what it is told; the state is that before."""
+        program, (held,) = record.program, self.reduction.model.held
+        names = {symbol: f"in{i}" for i, symbol in enumerate(self.reduction.channels)}
+        free, switch = (names[self.reduction.channels[place]] for place in (FREE, SWITCH))
+        point = record.point(program.load(Row.TAU))
+        _, driven, steady = record.evaluated(self.letting_go, point, found=True)
+        place = self.layout.continuous + self.reduction.continuous.index(held)
+        goes_on = program.load(Row.PULL) - select(as_node(point[free]) > 0.5, 0.0, driven)
+        change = as_node(point[switch])
+        new = select(change > 1.5, -as_node(steady), select(change > 0.5, goes_on, program.load(place)))
+        program.store(place, new)
 
     def _extend_program(self) -> Program:
         """The dense output of the last step as polynomials."""

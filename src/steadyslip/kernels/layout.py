@@ -57,6 +57,8 @@ class Row(IntEnum):
     """The first unknown of the balances at the start of the last step."""
     H_OLD = 62
     """Length of the last step that was accepted."""
+    PULL = 63
+    """Force of a drive that is let go and moves on, less that of steady sliding, at the end of the last segment."""
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1

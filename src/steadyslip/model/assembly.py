@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import sympy as sp
 
 from steadyslip.core.roles import Parameter
-from steadyslip.machine.mechanism import LOAD_POINT, Mechanism
-from steadyslip.model.equations import Contact, Coordinate, Model, Variable
+from steadyslip.machine.mechanism import LOAD_POINT, Mechanism, Shares
+from steadyslip.model.equations import MOVED, Contact, Coordinate, Model, Variable
 from steadyslip.model.forces import INTEGRAL, TIME, V_LP, Forces, Letters, P, Place, Q
 from steadyslip.model.statics import row_of
 
@@ -20,7 +20,7 @@ RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q"
 
 def assemble(
     mechanism: Mechanism, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter], letter: Letters,
-    imposed: bool = False,
+    drive: str = MOVED,
 ) -> Model:  # fmt: skip
     """The Model of a mechanism in symbols.
 
@@ -33,15 +33,15 @@ def assemble(
         What is declared of them.
     letter : callable
         A letter for a dotted name that nothing else has.
-    imposed : bool
-        Whether the force of the drive is imposed, and its motion free.
+    drive : str
+        Whether it moves, pulls with a force of its own, or both by turns.
 
     Raises
     ------
     NotAvailable
         If it is open what a force of the drive does.
     """
-    return _Assembly(mechanism, letter, imposed).model(given, roles)
+    return _Assembly(mechanism, letter, drive).model(given, roles)
 
 
 class _Assembly(Forces):
@@ -65,6 +65,8 @@ class _Assembly(Forces):
         disturbances |= {f"{one.name}.pores": one.outside for one in contacts if one.outside is not None}
         if self.imposed:
             disturbances["loading"] = self.loading
+        if self.by_turns:
+            disturbances["free"] = self.free
         inputs = {"load_velocity": V_LP, **disturbances, "time": TIME}
         share = self.mechanism.axial_share
         return Model(
@@ -81,6 +83,7 @@ class _Assembly(Forces):
             steady=self._steady(coordinates),
             observables=self._observables(),
             late=self.late,
+            letting_go=self.letting_go,
         )
 
     def _contact(self, i: int) -> Contact:
@@ -151,8 +154,21 @@ class _Assembly(Forces):
             what = "time integral of x (controller)" if self.single else "time integral of the controller's error"
             unit = next(one.unit for one in self.mechanism.coordinates if one.name in integral.acts)
             variables.append(Variable("integral", INTEGRAL, f"{unit} s", what, "integral"))
-            rates.append(row_of(integral.senses, self.x))
+            rates.append(self._sensed(integral.senses))
+        if self.by_turns:
+            what = "force of the drive that its motion does not make"
+            variables.append(Variable("held", self.held, "Pa" if self.bare else "N", what, "held"))
+            rates.append(sp.Integer(0))
         return tuple(variables), tuple(rates)
+
+    def _sensed(self, senses: Shares) -> sp.Expr:
+        """What a controller integrates: nothing while its drive is let go, and then from where the drive goes on."""
+        found = row_of(senses, self.x)
+        if not self.by_turns:
+            return found
+        behind = sp.Add(*(share * self.speeds[n] for n, share in senses.items() if n != LOAD_POINT))
+        ahead = 0 if self.letting_go is None else self.letting_go.ahead
+        return (1 - self.free) * (found - behind / self.mechanism.velocity * ahead)
 
     def _steady(self, coordinates: tuple[Coordinate, ...]) -> dict[sp.Symbol, sp.Expr]:
         zero = sp.Integer(0)
@@ -169,7 +185,8 @@ class _Assembly(Forces):
             found |= dict(zip(place.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
         without = (*self.push.values(), *(one for place in self.places for one in (place.press, place.outside)))
-        none = dict.fromkeys((*without, *([self.loading] if self.imposed else [])), zero)
+        own = [self.loading] * self.imposed + ([self.free, self.held] if self.by_turns else [])
+        none = dict.fromkeys((*without, *own), zero)
         return found | {V_LP: sp.sympify(self.mechanism.velocity)} | none
 
     def _observables(self) -> dict[str, tuple[sp.Expr, str]]:
@@ -201,7 +218,6 @@ class _Assembly(Forces):
                 twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
                 force = -resting - self._tension(element, self.x, self.moving)
                 if self.imposed and LOAD_POINT in element.senses:
-                    force = -resting - self._tension(element, {}, self.speeds)
-                    force -= self.loading / element.acts[LOAD_POINT]
+                    force = -resting - self._tension(element, {}, self.speeds) + self._beyond(element)
                 found[f"{element.name}.force"] = (force, "N m" if twisted else "N")
         return found

@@ -15,7 +15,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.assembly import RESERVED, assemble
-from steadyslip.model.equations import Model
+from steadyslip.model.equations import MOVED, Model
 
 _LETTERS = {
     "slider.stiffness": "k",
@@ -41,18 +41,18 @@ def build_model(rig: Slider | Machine, present: Iterable[str] = ()) -> Model:
     return model_of(rig, present)
 
 
-def model_of(rig: Rig, present: Iterable[str] = (), imposed: bool = False) -> Model:
-    """`build_model` without its checks; with the force of the drive `imposed`, not its motion, where asked for."""
+def model_of(rig: Rig, present: Iterable[str] = (), drive: str = MOVED) -> Model:
+    """`build_model` without its checks, of a drive that moves, that pulls with a force of its own, or both by turns."""
     kept = frozenset(present)
-    key = (shape_of(rig), kept, imposed)
-    return _build_cached(_Structure(key, rig, kept, imposed))
+    key = (shape_of(rig), kept, drive)
+    return _build_cached(_Structure(key, rig, kept, drive))
 
 
 class _Structure:
     """A rig that compares equal to every other of the same structure."""
 
-    def __init__(self, key: Any, rig: Rig, present: frozenset[str], imposed: bool) -> None:
-        self.key, self.rig, self.present, self.imposed = key, rig, present, imposed
+    def __init__(self, key: Any, rig: Rig, present: frozenset[str], drive: str) -> None:
+        self.key, self.rig, self.present, self.drive = key, rig, present, drive
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -71,7 +71,7 @@ def _build_cached(structure: _Structure) -> Model:
     roles = {name: address.role for name, address in rig.parameters().items()}
     taken = set(RESERVED) | {str(symbol) for symbol in given.values()}
     mechanism = twin(rig, symbols).mechanism()
-    return assemble(mechanism, given, roles, lambda name: _unused_letter(name, taken), structure.imposed)
+    return assemble(mechanism, given, roles, lambda name: _unused_letter(name, taken), structure.drive)
 
 
 def _parameter_symbols(rig: Rig, present: frozenset[str]) -> dict[str, Any]:

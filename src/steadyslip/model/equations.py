@@ -132,6 +132,44 @@ class Contact:
         return self.unknown is self.acceleration
 
 
+MOVED, PULLED, EITHER = "moved", "pulled", "either"
+"""What a drive does in the course of a run: it moves, it pulls with a force of its own, or both by turns."""
+
+
+@dataclass(frozen=True, eq=False)
+class LettingGo:
+    """What there is to know of a drive that is moved and let go by turns.
+
+    Attributes
+    ----------
+    free : sympy.Symbol
+        Input, 1 while the drive pulls with a force of its own, else 0.
+    held : sympy.Symbol
+        Variable: by how much the force of the drive exceeds what its motion since the start would make of it, or while
+        it is free, the force itself less that of steady sliding and less ``loading``. It changes where drives are let
+        go or taken up, so that the force goes on.
+    force, driven, steady : sympy.Expr
+        Force of the drive less that of steady sliding; what its motion alone would make of it; that of steady sliding.
+        Of a slider stresses.
+    stiffness : sympy.Expr
+        Of what carries the force of the drive.
+    ahead, speed : sympy.Expr
+        How far the load point is ahead of where steady motion since the start would have it, and how fast that grows.
+    loading_rate : sympy.Symbol
+        Rate of ``loading``.
+    """
+
+    free: sp.Symbol
+    held: sp.Symbol
+    force: sp.Expr
+    driven: sp.Expr
+    steady: sp.Expr
+    stiffness: sp.Expr
+    ahead: sp.Expr
+    speed: sp.Expr
+    loading_rate: sp.Symbol
+
+
 @dataclass(frozen=True, eq=False)
 class Model(Keeper, Displayed):
     """A rig's equations.
@@ -175,6 +213,8 @@ class Model(Keeper, Displayed):
         Named results and their SI units.
     late : dict of sympy.Symbol to (sympy.Symbol, sympy.Expr)
         Symbols for what a displacement, velocity or integral was some time ago, and how long ago (s).
+    letting_go : LettingGo or None
+        Where the drive moves and pulls by turns.
     """
 
     variables: tuple[Variable, ...]
@@ -190,6 +230,7 @@ class Model(Keeper, Displayed):
     steady: dict[sp.Symbol, sp.Expr]
     observables: dict[str, tuple[sp.Expr, str]]
     late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = field(default_factory=dict)
+    letting_go: LettingGo | None = None
 
     # -- questions
 
@@ -253,6 +294,11 @@ class Model(Keeper, Displayed):
     def integrals(self) -> tuple[Variable, ...]:
         """What controllers integrate."""
         return tuple(item for item in self.variables if item.kind == "integral")
+
+    @property
+    def held(self) -> tuple[sp.Symbol, ...]:
+        """The variable that keeps the force of a drive which is let go; none of others."""
+        return () if self.letting_go is None else (self.letting_go.held,)
 
     @property
     def arguments(self) -> tuple[sp.Symbol, ...]:

@@ -18,6 +18,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.laws.contact import Motion
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Touch
+from steadyslip.model.equations import EITHER, MOVED, LettingGo
 from steadyslip.model.statics import Statics, row_of, statics
 
 V_LP, Q, P, TIME = (sp.Symbol(name, real=True) for name in ("v_lp", "q", "p", "t"))
@@ -52,10 +53,12 @@ class Place:
 class Forces:
     """Symbols of a mechanism, and what its contacts and links do in them."""
 
-    def __init__(self, mechanism: Mechanism, letter: Letters, imposed: bool) -> None:
-        self.mechanism, self.letter, self.imposed = mechanism, letter, imposed
-        self.loading = sp.Symbol(letter("drive.loading"), real=True) if imposed else sp.Integer(0)
-        if imposed:
+    def __init__(self, mechanism: Mechanism, letter: Letters, drive: str) -> None:
+        self.mechanism, self.letter, self.imposed, self.by_turns = mechanism, letter, drive != MOVED, drive == EITHER
+        self.loading = sp.Symbol(letter("drive.loading"), real=True) if self.imposed else sp.Integer(0)
+        if self.by_turns:
+            self.free, self.held = (sp.Symbol(letter(f"drive.{name}"), real=True) for name in ("free", "held"))
+        if self.imposed:
             self._check_loading()
         names = [one.name for one in mechanism.coordinates]
         self.single = len(names) == 1 and [dict(touch.slip) for touch in mechanism.touches] == [{names[0]: 1}]
@@ -75,7 +78,7 @@ class Forces:
 
     def _check_loading(self) -> None:
         """One link, or a controller, must carry the force of the drive."""
-        acting = [dict(one.acts) for one in self.mechanism.elements if LOAD_POINT in one.senses and _present(one)]
+        acting = [dict(one.acts) for one in self.driven]
         if not acting or any(acts != acting[0] for acts in acting):
             names = ", ".join(one.name for one in self.mechanism.elements if LOAD_POINT in one.senses and one.name)
             raise NotAvailable(
@@ -172,7 +175,7 @@ class Forces:
         """Force of elements on a coordinate, besides that of steady displacements."""
         total, acting = sp.Integer(0), [one for one in elements if name in one.acts]
         if self.imposed:
-            driven = [one for one in acting if LOAD_POINT in one.senses and _present(one)]
+            driven = [one for one in acting if one in self.driven]
             acting = [one for one in acting if LOAD_POINT not in one.senses]
             total -= sp.Add(*(one.acts[name] * self._tension(one, {}, self.speeds) for one in driven))
             total += self._loaded(driven[0], name) * self._per_area() if driven else 0
@@ -185,7 +188,65 @@ class Forces:
     def _loaded(self, element: Element, name: str) -> sp.Expr:
         """What the imposed force does through its element: as much at the drive's end as is imposed there."""
         at_drive = element.acts.get(LOAD_POINT, -1)
-        return -sp.sympify(element.acts[name]) / at_drive * self.loading
+        return -sp.sympify(element.acts[name]) / at_drive * self.force
+
+    @cached_property
+    def force(self) -> sp.Expr:
+        """Force of a drive that pulls, less that of steady sliding."""
+        if not self.by_turns:
+            return sp.sympify(self.loading)
+        return self.held + self.loading + (1 - self.free) * self._of_drive(self.x, self.moving, INTEGRAL)
+
+    @cached_property
+    def driven(self) -> list[Element]:
+        """What carries the force of the drive."""
+        return [one for one in self.mechanism.elements if LOAD_POINT in one.senses and _present(one)]
+
+    def _of_drive(self, displacement: Mapping[str, Any], speed: Mapping[str, Any], integral: Any) -> sp.Expr:
+        """Force that the motion of the drive makes, less that of steady sliding; the integral's share too."""
+        steady, acting = (self.speeds if speed else {}), self.mechanism.integral
+        pull = sp.Add(
+            *(self._tension(one, displacement, speed) - self._tension(one, {}, steady) for one in self.driven)
+        )
+        if acting is not None:
+            pull += acting.gain * integral
+        return self._at_drive() * pull / self._per_area()
+
+    def _at_drive(self) -> sp.Expr:
+        return sp.sympify(self.driven[0].acts.get(LOAD_POINT, -1))
+
+    @cached_property
+    def letting_go(self) -> LettingGo | None:
+        """Of a drive that moves and pulls by turns."""
+        if not self.by_turns:
+            return None
+        stiffness = self._at_drive() * sp.Add(*(e.stiffness * e.senses[LOAD_POINT] for e in self.driven))
+        stiffness = stiffness / self._per_area()
+        velocity = self.mechanism.velocity
+        rates = {n: self.v[n] - self.speeds[n] / velocity * V_LP for n in self.x}
+        changing = sp.Symbol(self.letter("drive.loading_rate"), real=True)
+        own = self._of_drive(self.x, {}, INTEGRAL)
+        return LettingGo(
+            free=self.free,
+            held=self.held,
+            force=self.force,
+            driven=self._of_drive(self.x, self.moving, INTEGRAL),
+            steady=self._steady_force(),
+            stiffness=stiffness,
+            ahead=(self.held + self.free * (self.loading - own)) / stiffness,
+            speed=self.free * (changing - self._of_drive(rates, {}, sp.Integer(0))) / stiffness,
+            loading_rate=changing,
+        )
+
+    def _steady_force(self) -> sp.Expr:
+        """Force of the drive in steady sliding."""
+        if self.single:
+            return self.motions[0].steady_spring * self.places[0].touch.area / self._per_area()
+        pull = sp.Add(*(self._known(self._tension(one, self.statics.displacement, {})) for one in self.driven))
+        pull += sp.Add(*(self._tension(one, {}, self.speeds) for one in self.driven))
+        if self.mechanism.integral is not None:
+            pull += self.mechanism.integral.gain * self._known(self.statics.integral)
+        return self._at_drive() * pull / self._per_area()
 
     def _per_area(self) -> Any:
         """What a unit of the force of the drive is: of a slider a stress."""
@@ -288,6 +349,14 @@ class Forces:
             total += place.touch.slip.get(name, 0) * area * (place.tau - place.tau_ss)
             total -= place.touch.separation.get(name, 0) * area * (place.sigma - place.sigma_ss)
         return total
+
+    def _beyond(self, element: Element) -> sp.Expr:
+        """Force in a link of a drive that pulls, beyond that of steady sliding; the first has what is imposed."""
+        if not self.by_turns:
+            return -self.loading / element.acts[LOAD_POINT]
+        moved = self._tension(element, self.x, self.moving) - self._tension(element, {}, self.speeds)
+        held = (self.held + self.loading) / element.acts[LOAD_POINT] if element is self.driven[0] else 0
+        return -(1 - self.free) * moved - held
 
 
 def _present(element: Element) -> bool:

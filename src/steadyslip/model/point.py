@@ -20,7 +20,7 @@ from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.rig import Rig
 from steadyslip.model.build import model_of
-from steadyslip.model.equations import Model
+from steadyslip.model.equations import MOVED, Model
 from steadyslip.model.steady import steady_roots, steady_stresses
 
 Vary = Mapping[str, Any]
@@ -155,7 +155,7 @@ class OperatingPoint(Keeper):
 
 def operating_point(
     rig: Rig, vary: Vary | None = None, present: Iterable[str] = (), branch: int = 0, scan: bool = False,
-    imposed: bool = False,
+    drive: str = MOVED,
 ) -> OperatingPoint:  # fmt: skip
     """The model of a rig and its parameters' values.
 
@@ -172,8 +172,8 @@ def operating_point(
     scan : bool, optional
         Whether values are steps of a search, which goes beyond the conditions that numbers obey together (a rod
         shorter than its crank): these are marked in `OperatingPoint.valid` instead of refused.
-    imposed : bool, optional
-        Whether the force of the drive is imposed, and its motion free.
+    drive : str, optional
+        What it does: `steadyslip.model.equations.MOVED`, ``PULLED`` or ``EITHER``.
 
     Raises
     ------
@@ -181,12 +181,12 @@ def operating_point(
         If names are unknown, values are outside their domain or break a condition with others, or shapes do not
         broadcast; all problems are listed.
     """
-    if not (vary or present or scan or imposed):
+    if not (vary or present or scan or drive != MOVED):
         return _own_point(rig, branch)
     together = _varied(rig, vary or {})
     varied = together.values
     structural = [name for name in varied if rig.parameters()[name].role.structural and rig.value(name) == 0]
-    return _placed(model_of(rig, [*structural, *present], imposed), rig, together, branch, scan)
+    return _placed(model_of(rig, [*structural, *present], drive), rig, together, branch, scan)
 
 
 @lru_cache(maxsize=256)

@@ -36,6 +36,9 @@ Replacements = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
 EVERYWHERE = "*"
 """In place of a name: disturbances act on every coordinate, or at every contact, by a share that is a constant."""
+FREE, SWITCH = f"{LOAD_POINT}.free", f"{LOAD_POINT}.switch"
+"""In place of the name of what is pushed: whether the drive pulls with a force of its own, 1 or 0; and, where a segment
+begins with a change of that, 1 if its force goes on, 2 if it is told what to be."""
 PORES = ".pores"
 """Behind the name of a contact: what would press there changes the pressure of the fluid around it."""
 STANDSTILL = -200
@@ -145,6 +148,7 @@ class _Reducing:
         for one in places:
             balance = self.inlined(self._force_balance(one))
             equations.append((balance, one.velocity if balance.has(one.velocity) else one.displacement))
+        self._check_let_go(equations)
         found, left = solved_in_turn(equations)
         if left or any(e.has(*(c.acceleration for c in self.model.coordinates)) for e in found.values()):
             names = ", ".join(one.name for one in places)
@@ -155,6 +159,13 @@ class _Reducing:
         for one in followed:
             found[one.velocity] = self._followed(one, found)
         self.found = found
+
+    def _check_let_go(self, equations: Equations) -> None:
+        """Whether what a drive alone holds is held by nothing while the drive is let go."""
+        free = self.given.get(self.model.inputs["free"]) if "free" in self.model.inputs else None
+        for balance, symbol in equations if free is not None else ():
+            if derivative(balance, symbol).xreplace({free: sp.Integer(1)}) == 0:
+                self._refuse("the drive alone says how a body without mass moves, and is let go in this run")
 
     def _followed(self, one: Coordinate, found: Replacements) -> sp.Expr:
         """Velocity of a coordinate whose displacement follows from those of others."""
@@ -176,8 +187,8 @@ class _Reducing:
         speeds = tuple(self._speed_of(one) for one in heavy)
         own = tuple(w for _, w in self.light) if self.victims else ()
         memory = tuple(symbol for symbol in self.memory if symbol not in self.victims)
-        state = (*places, *own, *speeds, *memory, *self.integrals)
-        continuous = (*places, *speeds, *self.memory, *self.integrals)
+        state = (*places, *own, *speeds, *memory, *self.integrals, *model.held)
+        continuous = (*places, *speeds, *self.memory, *self.integrals, *model.held)
         self._raw_rates(heavy)
         rates = {symbol: self._written(self.raw[symbol]) for symbol in state}
         for i, variable in enumerate(self.moving.variables):
@@ -198,6 +209,7 @@ class _Reducing:
             shifts=tuple(one.speed / self._drive for one in self._free()),
             further=self._further(),
             channels=self.channels,
+            letting_go=self._letting_go(),
         )
 
     def _find(self, heavy: list[Coordinate], light: list[int], eliminate: tuple[int | None, ...]) -> None:
@@ -279,7 +291,7 @@ class _Reducing:
     def _raw_rates(self, heavy: list[Coordinate]) -> None:
         """Rates of everything that moves, memory variables that follow from a balance and their w included."""
         self.raw: Replacements = {}
-        for symbol in (*(one.displacement for one in self._free()), *self.memory, *self.integrals):
+        for symbol in (*(one.displacement for one in self._free()), *self.memory, *self.integrals, *self.model.held):
             self.raw[symbol] = replaced(self.inlined(self.rates[symbol]), self.pushed)
         for one in heavy:
             if self.moving.contact_at(one) is None:
@@ -355,6 +367,12 @@ class _Reducing:
                 found[f"{one.name}.x"] = self._written(one.displacement)
         return found
 
+    def _letting_go(self) -> tuple[sp.Expr, ...]:
+        """Of a drive that is let go and moves on."""
+        own = self.model.letting_go
+        forces = () if own is None else (own.force, own.driven, own.steady)
+        return tuple(self._written(self._variables(force, None)) for force in forces)
+
     def _names_of(self, state: tuple[sp.Symbol, ...]) -> tuple[str, ...]:
         names = {item.symbol: item.name for item in self.model.variables}
         for variable, contact in zip(self.moving.variables, self.model.contacts, strict=True):
@@ -377,6 +395,8 @@ def _inputs(
         pressing = pressing or {model.contacts[0].name: first_press}
     if LOAD_POINT in acting:
         given[model.inputs["loading"]] = acting[LOAD_POINT]
+    if FREE in acting:
+        given[model.inputs["free"]] = acting[FREE]
     for one in model.coordinates:
         given[one.push] = acting.get(one.name, sp.Integer(0))
         if EVERYWHERE in acting:

@@ -90,6 +90,9 @@ class Reduction(Keeper):
         What else is observed: velocity, acceleration and displacement of the coordinates of machines.
     channels : tuple of sympy.Symbol
         What is done to the rig: velocity of the load point, pushes and normal stresses; see `channels_for`.
+    letting_go : tuple of sympy.Expr
+        Of a drive that is let go and moves on: its force, what its motion alone would make of it (both less those of
+        steady sliding), and that of steady sliding; see `steadyslip.model.equations.LettingGo`.
     directions : tuple of tuple of sympy.Symbol
         State variables (see `steadyslip.model.variational`) that answer to changes of the constants, one tuple
         for each independent change; the kernel adds that to their `rates`, in the order of the first variables
@@ -111,6 +114,7 @@ class Reduction(Keeper):
     further: Mapping[str, sp.Expr] = field(default_factory=dict)
     directions: tuple[tuple[sp.Symbol, ...], ...] = ()
     channels: tuple[sp.Symbol, ...] = (V_LP, Q, P)
+    letting_go: tuple[sp.Expr, ...] = ()
 
     @property
     def velocity(self) -> str:

@@ -138,6 +138,7 @@ def joined_sizes(
         scales |= {item.name: choose(direct > 0, direct, abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
         scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.w": found["w"]}
+    scales |= {item.name: force for item in model.variables if item.kind == "held"}
     for item, rate in zip(model.variables, model.rates, strict=True):
         if item.kind == "integral":
             sensed = [scales[f"{one.name}.x"] for one in model.coordinates if rate.has(one.displacement)]
@@ -195,6 +196,9 @@ def sizes(
         scales[item.name] = choose((own > 0) & (most < scale), most, scale)
     scales |= {item.name: choose(direct > 0, direct, by_slip * x) for item in contact.own_states}
     scales |= {item.name: x * x / drive for item in reduction.model.integrals}
+    scales |= {
+        item.name: choose(direct > 0, direct, by_slip * x) for item in reduction.model.variables if item.kind == "held"
+    }
     if reduction.model.is_single and reduction.restarts:
         return scales, scales["w"]
     force = choose(direct > by_slip * x, direct, by_slip * x) / found.by_unknown

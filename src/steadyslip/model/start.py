@@ -72,6 +72,15 @@ def _steady_speeds(model: Model) -> ArrayFunction:
 
 
 @question
+def _driven(model: Model) -> ArrayFunction:
+    """Force that the motion of the drive makes, less that of steady sliding, before the protocol begins."""
+    own, moves = model.letting_go, model.inputs["load_velocity"]
+    force = sp.Integer(0) if own is None else own.driven.xreplace({moves: model.steady[moves]})
+    given = (*(one.displacement for one in model.coordinates), *(one.velocity for one in model.coordinates))
+    return model.function([force], *given, *(item.symbol for item in model.integrals))
+
+
+@question
 def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
     """The balance of a massless model before the protocol begins, its slope in one memory variable; whether that
     is the same wherever that variable is.
@@ -89,12 +98,17 @@ def _balance(reduction: Reduction, index: int) -> tuple[ArrayFunction, bool]:
 
 
 def initial_values(
-    reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any]
+    reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any], free: Any = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Continuous variables at the start and the velocity there.
 
     Steady sliding, unless a variable is given. Without mass, a given velocity needs a memory that goes with
     it: the first memory variable that is not given itself follows from the balance of forces.
+
+    Parameters
+    ----------
+    free : float or ndarray, optional
+        1 where the motion begins with a drive that is let go, which pulls then as it did before; else 0.
 
     Raises
     ------
@@ -102,7 +116,7 @@ def initial_values(
         Listing what is given and cannot be.
     """
     if given:
-        return _initial_values(reduction, point, given)
+        return _initial_values(reduction, point, given, free)
     columns, velocity = _steady_start(point, reduction)
     return columns.copy(), velocity.copy()
 
@@ -114,7 +128,7 @@ def _steady_start(point: OperatingPoint, reduction: Reduction) -> tuple[np.ndarr
 
 
 def _initial_values(
-    reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any]
+    reduction: Reduction, point: OperatingPoint, given: Mapping[str, Any], free: Any = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     model = reduction.model
     names = [item.name for item in model.memory]
@@ -145,6 +159,9 @@ def _initial_values(
     values |= {item.name: start.get(item.name, 0.0) for item in model.integrals}
     for item, value in zip(model.states, point.evaluate(_steady_states(model)), strict=True):
         values[item.name] = _number(start.get(item.name, value))
+    if model.letting_go is not None:
+        integrals = (values[item.name] for item in model.integrals)
+        values["held"] = free * point.evaluate(_driven(model), *places, *speeds, *integrals)[0]
     order = _continuous_names(reduction)
     for i in range(len(slips)):
         if f"w {i}" in order:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import INTEGRATION
 from steadyslip.core.questions import question
 from steadyslip.core.records import twin
@@ -20,6 +21,7 @@ from steadyslip.machine.doing import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
+from steadyslip.model.equations import EITHER, PULLED, Model
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.posed import posed, resolved
 from steadyslip.model.range import in_range, require_range
@@ -30,6 +32,7 @@ from steadyslip.model.start import guesses, initial_values
 from steadyslip.model.weights import eliminable, slip_rates
 from steadyslip.motion.targets import NOTHING, Targets, targets
 from steadyslip.protocol import Protocol, Segments, pack
+from steadyslip.protocol.creep import FREE
 
 METHOD_WORDS = {"auto": "", "explicit": "tsit5", "rosenbrock": "rodas4"} | {name: name for name in TABLEAUS}
 TIGHT = 1e-5  # rtol up to which the explicit pair of order 8 is chosen
@@ -38,6 +41,10 @@ BLOW_UP = np.exp(200.0)  # bounded orbits reach e^14 and more (theory 7); this f
 APART = (
     "the forces on the block are so much larger than what its velocity makes of them that rounding decides how it "
     "moves; look for a parameter that is too small or too large by orders of magnitude (a, a damping, a friction level)"
+)
+NO_PLACE = (
+    "creep as a part of a run needs a stiffness between drive and body: a dashpot alone has no place from which the "
+    "drive could go on; give it one, or let creep last for the whole run (creep-step without creep)"
 )
 CONTACT_SHARE = 1e-9  # of the steady normal stress: below, contact is lost
 
@@ -95,6 +102,10 @@ class Jobs:
         The memory variable that follows from the balance.
     options : Options
     size : int
+    targets : Targets
+        What the protocol acts on.
+    let_go : OperatingPoint, optional
+        Of all rigs while the drive pulls with a force of its own, if it does so for some time.
     """
 
     point: OperatingPoint
@@ -107,6 +118,7 @@ class Jobs:
     size: int
     targets: Targets = NOTHING
     near: np.ndarray | None = None
+    let_go: OperatingPoint | None = None
 
     @property
     def exists(self) -> np.ndarray:
@@ -116,7 +128,8 @@ class Jobs:
     @property
     def posed(self) -> np.ndarray:
         """Whether the equations determine the motion near steady sliding; see `steadyslip.model.posed.posed`."""
-        return posed(self.point)
+        found = posed(self.point)
+        return found if self.let_go is None else found & posed(self.let_go)
 
     @property
     def in_range(self) -> np.ndarray:
@@ -230,7 +243,7 @@ def prepare(
     if branch and isinstance(rig, Machine):
         raise ParameterError([Problem("branch", f"got {branch}; allowed: 0, the one steady sliding of a machine")])
     acting = targets(rig, plan)
-    point = operating_point(rig, own, branch=branch, imposed=LOAD_POINT in acting.pushes)
+    point = operating_point(rig, own, branch=branch, drive=acting.drive)
     _refuse_singular(rig, point, bool(own))
     if not own:
         require_range(point)
@@ -248,9 +261,19 @@ def prepare(
     eliminate = eliminable(point)
     reduction = reduce_model(point.model, eliminate, acting.pushes, acting.presses)
     _refuse_endless(reduction, options.method)
-    start, velocity = initial_values(reduction, point, initial)
+    if acting.drive == EITHER and not np.all(np.asarray(point.evaluate(_taken_up_by(point.model))) > 0):
+        raise NotAvailable(NO_PLACE)
+    free = segments.value[:, 0, FREE] if acting.drive == EITHER else 0.0
+    start, velocity = initial_values(reduction, point, initial, free)
+    let_go = operating_point(rig, own, branch=branch, drive=PULLED) if acting.drive == EITHER else None
     size = max(*map(np.size, point.sigmas), len(segments.start), len(start), point.size, 1)
-    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, acting)
+    return Jobs(point, segments, start, velocity, reduction, eliminate, options, size, acting, let_go=let_go)
+
+
+@question
+def _taken_up_by(model: Model) -> ArrayFunction:
+    """Stiffness of what carries the force of a drive that is let go."""
+    return model.function([] if model.letting_go is None else [model.letting_go.stiffness])
 
 
 def _refuse_endless(reduction: Reduction, method: str) -> None:

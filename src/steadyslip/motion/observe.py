@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
 from steadyslip.kernels.runner import Runner
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model import Model, OperatingPoint
+from steadyslip.model.reducing import FREE
 from steadyslip.motion.jobs import Jobs
 from steadyslip.motion.targets import Targets
-from steadyslip.protocol.inputs import inputs_at
+from steadyslip.protocol import creep, protocol as channels
+from steadyslip.protocol.inputs import inputs_at, rates_at
 
 Array = np.ndarray
 Tables = tuple[np.ndarray, ...]
@@ -28,9 +31,13 @@ def observable_units(model: Model, acting: Targets) -> dict[str, str]:
     """Names and SI units of everything that a run can show, in which a protocol acts so."""
     if model.contacts[0].name:
         return _machine_units(model, acting)
-    units = {"x": "m", "v": "m/s"} | EXTRA_UNITS | dict.fromkeys(acting.named(), "Pa")
+    units = (
+        {"x": "m", "v": "m/s"}
+        | EXTRA_UNITS
+        | {name: "1" if kind == "share" else "Pa" for name, (_, kind, _) in acting.named().items()}
+    )
     units |= {name: unit for name, (_, unit) in model.observables.items()}
-    return units | {m.name: m.unit for m in model.variables}
+    return units | {m.name: m.unit for m in model.variables if m.kind != "held"}
 
 
 def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
@@ -51,9 +58,10 @@ def _machine_units(model: Model, acting: Targets) -> dict[str, str]:
     ways = {LOAD_POINT: unit} | {one.name: one.unit for one in model.coordinates}
     units |= {"load_displacement": unit, "load_velocity": f"{unit}/s"}
     for name, (_, kind, on) in acting.named().items():
-        units[name] = "N m" if kind == "push" and ways.get(on, turning) == "rad" else "N"
+        turns = kind == "push" and ways.get(on, turning) == "rad"
+        units[name] = "1" if kind == "share" else "N m" if turns else "N"
     units |= {name: unit for name, (_, unit) in model.observables.items() if name not in units}
-    return units | {m.name: m.unit for m in model.variables if m.name not in units}
+    return units | {m.name: m.unit for m in model.variables if m.name not in units and m.kind != "held"}
 
 
 def out_of_range(found: dict[str, Array]) -> Array:
@@ -65,9 +73,8 @@ def out_of_range(found: dict[str, Array]) -> Array:
     return ~good
 
 
-@question
-def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
-    """Observables that follow from others: their names, and the names and the function of what they follow from."""
+def _given(model: Model) -> dict[sp.Symbol, str]:
+    """What observables follow from."""
     given: dict[sp.Symbol, str] = {}
     for one in model.coordinates:
         own = f"{one.name}." if model.contacts[0].name else ""
@@ -81,7 +88,16 @@ def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
     if "loading" in model.inputs:
         given[model.inputs["loading"]] = LOADING
     given |= {item.symbol: item.name for item in (*model.memory, *model.states, *model.integrals)}
+    if model.letting_go is not None:
+        given |= {model.letting_go.free: FREE, model.letting_go.held: "held"}
     given[model.inputs["load_velocity"]] = "load_velocity"
+    return given
+
+
+@question
+def _function(model: Model) -> tuple[list[str], list[str], ArrayFunction]:
+    """Observables that follow from others: their names, and the names and the function of what they follow from."""
+    given = _given(model)
     known = set(given.values())
     names = [n for n in model.observables if n not in known]
     return names, list(given.values()), model.function((model.observables[n][0] for n in names), *given)
@@ -122,19 +138,46 @@ def observe(
     found |= {item.name: continuous[item.symbol] for item in own}
     found |= dict(zip(reduction.further, kept[len(reduction.continuous) :], strict=True))
     inputs = inputs_at(jobs.segments, first + lane, segment, time)
-    for name, (channel, _, on) in jobs.targets.named().items():
+    for name, (channel, _, _) in jobs.targets.named().items():
         found[name] = inputs[:, channel]
-        if on == LOAD_POINT:
-            found[LOADING] = found[name]
+    if LOAD_POINT in jobs.targets.pushes:
+        found[LOADING] = inputs[:, channels.DISTURBANCE]
     point = jobs.point.part(slice(first, last)).part(lane)
     if reduction.further:
         _of_the_drive(model, found, point)
     else:
         found["slip"] = found["x"] + found["load_displacement"]
+    if model.letting_go is not None:
+        found[FREE] = inputs[:, creep.FREE]
+        rate = rates_at(jobs.segments, first + lane, segment, time)[:, creep.LOADING]
+        ahead = point.evaluate(_ahead(model), *(found[name] for name in _function(model)[1]), rate)
     names, given, function = _function(model)
     for name, value in zip(names, point.evaluate(function, *(found[n] for n in given)), strict=True):
         found[name] = value if np.shape(value) == time.shape else np.full(time.shape, value, dtype=float)
+    if model.letting_go is not None:
+        _from_load_point(model, found, point, *ahead)
     return found
+
+
+@question
+def _ahead(model: Model) -> ArrayFunction:
+    """How far the load point of a drive that was let go is ahead of steady motion, and how fast that grows."""
+    own = model.letting_go
+    if own is None:
+        raise InternalError("the drive is never let go")
+    given = _function(model)[1]
+    names = {name: symbol for symbol, name in _given(model).items()}
+    return model.function([own.ahead, own.speed], *(names[name] for name in given), own.loading_rate)
+
+
+def _from_load_point(model: Model, found: dict[str, Array], point: OperatingPoint, ahead: Array, speed: Array) -> None:
+    """Let displacements count from where the load point is, which it is not driven to while it is let go."""
+    found["load_displacement"] = found["load_displacement"] + ahead
+    found["load_velocity"] = found["load_velocity"] + speed
+    shares = point.evaluate(_shares(model))[len(model.contacts) :]
+    for one, share in zip(model.coordinates, shares, strict=True):
+        name = f"{one.name}.x" if model.contacts[0].name else "x"
+        found[name] = found[name] - share * ahead
 
 
 def _at_contacts(model: Model, values: Array) -> dict[str, Array]:

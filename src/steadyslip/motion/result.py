@@ -79,6 +79,8 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         lines = []
         if self.protocol.frees_load_point:
             lines.append("drive           pulls with a force of its own; its motion does not hold anything back")
+        if self.protocol.lets_go:
+            lines.append("drive           is let go for some time, and pulls then with a force of its own (creep = 1)")
         if self.undisturbed:
             lines.append("disturbance     none: steady sliding goes on, were it unstable too; analyze tells")
         return lines

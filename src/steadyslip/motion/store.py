@@ -109,7 +109,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
         If the file is not one of ours, is damaged, or cannot be read.
     """
     from steadyslip.files.specifications import protocol_from_text, rig_from_text
-    from steadyslip.model import build_model
+    from steadyslip.model.build import model_of
     from steadyslip.protocol import Protocol
 
     table = ExpectedTable(path, RUN, _ATTRIBUTES)
@@ -118,7 +118,8 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
     try:
         rig = rig_from_text(attributes["rig"], str(path))
         protocol = protocol_from_text(attributes["rig"], str(path)) or Protocol()
-        units = {"t": "s"} | observable_units(build_model(rig), targets(rig, protocol))
+        acting = targets(rig, protocol)
+        units = {"t": "s"} | observable_units(model_of(rig, (), acting.drive), acting)
     except SteadyslipError as error:
         raise table.fault(f"its rig is refused: {error}") from error
     columns = {"time" if name == "t" else name: ColumnRule(("time",), unit) for name, unit in units.items()}

@@ -10,7 +10,8 @@ from steadyslip.laws.contact import ContactLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
-from steadyslip.model.reducing import PORES
+from steadyslip.model.equations import EITHER, MOVED, PULLED
+from steadyslip.model.reducing import FREE, PORES, SWITCH
 from steadyslip.protocol import Protocol, protocol as channels
 from steadyslip.protocol.protocol import Piece, channel_of
 from steadyslip.protocol.stress import OnBlock, OnDrive, OnNormalStress, OnPores
@@ -35,15 +36,25 @@ class Targets:
     presses: tuple[str, ...] = ()
     channels: tuple[int, ...] = ()
 
+    @property
+    def drive(self) -> str:
+        """What the drive does in the run."""
+        return EITHER if FREE in self.pushes else PULLED if LOAD_POINT in self.pushes else MOVED
+
     def named(self) -> dict[str, tuple[int, str, str]]:
         """What a result calls the forces and stresses that act: channel, kind of target and its name, by that.
 
         The only push of a run is its ``disturbance``, of several each has the name of what it pushes before it; so it
-        is with ``normal_disturbance`` and ``injection``. A push is there even where nothing is pushed.
+        is with ``normal_disturbance`` and ``injection``. A push is there even where nothing is pushed. Where the drive
+        is let go for some time, ``creep`` is 1 then.
         """
         found = {}
-        for number, name in enumerate(self.pushes or ("",)):
-            own = f"{name}." if name and len(self.pushes) > 1 else ""
+        by_turns = self.drive == EITHER
+        bodies = self.pushes[len(LET_GO) :] if by_turns else self.pushes
+        if by_turns:
+            found["creep"] = (channel_of(channels.DISTURBANCE, 1, len(self.pushes)), "share", FREE)
+        for number, name in enumerate(bodies or (() if by_turns else ("",)), start=len(self.pushes) - len(bodies)):
+            own = f"{name}." if name and len(bodies) > 1 else ""
             place = channel_of(channels.DISTURBANCE, number, len(self.pushes))
             found[f"{own}disturbance"] = (place, "push", name)
         for number, name in enumerate(self.presses):
@@ -56,6 +67,8 @@ class Targets:
 
 
 NOTHING = Targets()
+LET_GO = (LOAD_POINT, FREE, SWITCH)
+"""What is pushed first where a drive is let go and moves on."""
 
 
 def targets(rig: Slider | Machine, plan: Protocol) -> Targets:
@@ -90,6 +103,9 @@ class _Targets:
             raise ParameterError(self.problems)
         acting = {kind: self._in_order(kind, own) for kind in (channels.DISTURBANCE, channels.NORMAL_STRESS)}
         pushes, presses = acting.values()
+        if self.plan.lets_go:
+            pushes = (*LET_GO, *(name for name in pushes if name != LOAD_POINT))
+            acting[channels.DISTURBANCE] = pushes
         places = tuple(
             channels.LOAD_POINT if name is None else channel_of(kind, acting[kind].index(name), len(pushes))
             for kind, name in zip((piece.channel for piece in self.plan.pieces), own, strict=True)

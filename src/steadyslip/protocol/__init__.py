@@ -6,6 +6,7 @@ channels, whatever it is done to.
 
 from steadyslip.protocol.inputs import evaluate
 from steadyslip.protocol.load_point import (
+    Creep,
     DisplacementStep,
     Hold,
     LoadPointTable,
@@ -37,6 +38,7 @@ from steadyslip.protocol.stress import (
 )
 
 __all__ = [
+    "Creep",
     "CreepRamp",
     "CreepStep",
     "CreepTable",

@@ -94,6 +94,12 @@ def inputs_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array
     return found
 
 
+def rates_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
+    """How fast they change, per s; see `inputs_at`."""
+    where, _, slope, waves = _parts(segments, lane, segment)
+    return np.asarray(slope_at((time - segments.start[where])[..., None], slope, waves, np.cos))
+
+
 def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
     """Load-point velocity (m/s), disturbance stress (Pa) and added normal stress (Pa) of the first lane at times `t`.
 

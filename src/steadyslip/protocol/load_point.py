@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import parameter, samples
 from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
 from steadyslip.protocol.protocol import Piece
-from steadyslip.protocol.shapes import Harmonic, table_problems
+from steadyslip.protocol.shapes import FORCES, Harmonic, table_problems
 
 
 class VelocityStep(Piece, name="velocity-step"):
@@ -78,6 +78,30 @@ class SlideHoldSlide(Piece, name="slide-hold-slide"):
             starts = column(self.at) + np.insert(later, 0, 0.0, axis=1)
             times: Array = np.stack([starts, starts + length], axis=-1).reshape(len(starts), -1)
         return times
+
+
+class Creep(Piece, name="creep"):
+    """The drive is let go for some time and pulls with a stress of its own, whatever the block does.
+
+    That is its pull at that moment, or what it is told, and as much more as steps, ramps and tables of creep say that
+    begin in this time. Then it goes on with its former velocity from where it carries the same stress.
+    """
+
+    frees_load_point: ClassVar[bool] = True
+    lets_go: ClassVar[bool] = True
+
+    at: float = parameter("s", nonnegative, "time at which the drive is let go")
+    duration: float | None = parameter(
+        "s", positive, "duration; without it until the next piece that sets the velocity, or to the end", default=None
+    )
+    to: float | None = parameter(
+        "Pa", real, "stress with which it pulls; without it as at that moment", default=None, elsewhere=FORCES
+    )
+
+    def curve(self, before: Any) -> Curve:
+        if self.duration is None:
+            return knots((self.at, before, before))
+        return knots((self.at, before, before), (self.at + self.duration, before, before))
 
 
 class DisplacementStep(Piece, name="displacement-step"):

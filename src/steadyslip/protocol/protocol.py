@@ -12,12 +12,12 @@ from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.records import FrozenRecord, parameter, parameters, parts, twin
 from steadyslip.core.telling import shown
+from steadyslip.protocol.creep import ROUNDING, spans_of
 from steadyslip.protocol.curves import Curve, Jump, Wave
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
 CHANNELS = 3
 """That are always there: load point, first disturbance, first normal stress."""
-ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
 
 
 def channel_of(kind: int, number: int, disturbances: int) -> int:
@@ -48,7 +48,9 @@ class Piece(FrozenRecord, family="protocol piece"):
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", None)
     channel: ClassVar[int] = LOAD_POINT
     frees_load_point: ClassVar[bool] = False
-    """Whether the drive pulls with a force of its own throughout, however the load point moves."""
+    """Whether it tells a force of the drive's own, by which this pulls however the load point moves."""
+    lets_go: ClassVar[bool] = False
+    """Whether the drive does that for the time of the piece, and moves before and after it."""
 
     def curve(self, before: Any) -> Curve | None:
         """The part that is linear between knots.
@@ -109,8 +111,13 @@ class Protocol(FrozenRecord):
 
     @property
     def frees_load_point(self) -> bool:
-        """Whether the force of the drive is imposed in place of its motion: creep."""
-        return any(piece.frees_load_point for piece in self.pieces)
+        """Whether the force of the drive is imposed in place of its motion throughout: creep."""
+        return any(piece.frees_load_point for piece in self.pieces) and not self.lets_go
+
+    @property
+    def lets_go(self) -> bool:
+        """Whether the drive is let go for some time: creep as a part of a run."""
+        return any(piece.lets_go for piece in self.pieces)
 
     def varied(self, changes: Mapping[str, Any]) -> Protocol:
         """The protocol with arrays in place of some of its numbers, for many lanes at once.
@@ -146,6 +153,13 @@ class Protocol(FrozenRecord):
         return _joined(self, other)
 
     def inconsistencies(self) -> Iterator[Problem]:
+        yield from self._order()
+        if self.lets_go:
+            own = (piece.curve(0.0) for piece in self.pieces if piece.channel == LOAD_POINT)
+            yield from spans_of(self.pieces, [curve for curve in own if curve is not None])[1]
+
+    def _order(self) -> Iterator[Problem]:
+        """Pieces that set the velocity must follow each other."""
         earlier, last_end = "", -np.inf
         for number, piece in enumerate(self.pieces, start=1):
             curve = piece.curve(0.0) if piece.channel == LOAD_POINT else None

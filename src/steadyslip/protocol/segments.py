@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.results import read_only
+from steadyslip.protocol.creep import ROUNDING, SWITCH, Release, spans_of
 from steadyslip.protocol.curves import Array, Curve, Jump, Wave, chain, column, knots, side_by_side
-from steadyslip.protocol.protocol import CHANNELS, LOAD_POINT, ROUNDING, Protocol
+from steadyslip.protocol.protocol import CHANNELS, LOAD_POINT, Protocol
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class _Terms:
     curves: list[tuple[int, Curve]] = field(default_factory=list)
     waves: list[tuple[int, Wave]] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
+    spans: list[Release] = field(default_factory=list)
 
     def breakpoints(self) -> Iterator[Array]:
         for _, curve in self.curves:
@@ -91,6 +93,8 @@ class _Terms:
             yield from (wave.start, wave.stop)
         for jump in self.jumps:
             yield jump.time
+        for span in self.spans:
+            yield from span.breakpoints()
 
     def lanes(self, *others: Array) -> int:
         """Number of lanes that all arrays agree on."""
@@ -98,6 +102,7 @@ class _Terms:
         lengths |= {len(part) for _, curve in self.curves for part in (curve.left, curve.right)}
         lengths |= {len(part) for _, w in self.waves for part in (w.amplitude, w.angular_frequency, w.phase)}
         lengths |= {len(jump.by) for jump in self.jumps}
+        lengths |= {len(part) for span in self.spans for part in span.numbers()}
         if len(lengths - {1}) > 1:
             raise ParameterError([Problem("protocol", f"arrays of different lengths {sorted(lengths - {1})}")])
         return max(lengths)
@@ -142,7 +147,7 @@ def _packed(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, 
     lanes = terms.lanes(final, column(velocity))
     start, end = _grid([*terms.breakpoints()], final)
     shape = (lanes, start.shape[1])
-    count = max((*own, CHANNELS - 1)) + 1
+    count = max((*own, CHANNELS - 1, SWITCH if terms.spans else 0)) + 1
     jump, value, slope = np.zeros(shape), np.zeros((*shape, count)), np.zeros((*shape, count))
     for step in terms.jumps:
         jump += np.where((start == step.time) & (start < end), step.by, 0.0)
@@ -150,6 +155,8 @@ def _packed(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, 
         level, rate = curve.on(start)
         value[:, :, channel] += level
         slope[:, :, channel] += rate
+    for span in terms.spans:
+        span.tell(start, value, slope)
     waves = _waves(terms.waves, start, end, (*shape, count))
     return Segments(_full(start, shape), _full(end, shape), jump, value, slope, *waves)
 
@@ -170,7 +177,7 @@ def _terms(protocol: Protocol, velocity: Any, channels: tuple[int, ...]) -> _Ter
             if piece.channel == LOAD_POINT:
                 drive.append(curve)
                 present = curve.right[:, -1]
-            else:
+            elif not (protocol.lets_go and piece.frees_load_point):  # which is told where the drive is let go
                 terms.curves.append((channel, curve))
         if (wave := piece.wave()) is not None:
             terms.waves.append((channel, wave))
@@ -181,6 +188,10 @@ def _terms(protocol: Protocol, velocity: Any, channels: tuple[int, ...]) -> _Ter
         if np.any(first < last - ROUNDING * np.abs(last)):
             message = "the pieces that set the velocity overlap, or are not in the order of time, in some lanes"
             raise ParameterError([Problem("protocol.pieces", message)])
+    if protocol.lets_go:
+        terms.spans, problems = spans_of(protocol.pieces, drive)
+        if problems:
+            raise ParameterError([problem.under("protocol") for problem in problems])
     terms.curves.append((LOAD_POINT, chain(drive) if drive else knots((0, velocity, velocity))))
     return terms
 

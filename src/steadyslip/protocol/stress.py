@@ -35,8 +35,9 @@ class OnPores(Piece):
 
 
 class OnDrive(Piece):
-    """Base of loading at imposed stress, creep: throughout the run the drive pulls as it does in steady sliding, and as
-    much more as the piece says, whatever the block does; nothing holds its motion back.
+    """Base of loading at imposed stress, creep: the drive pulls as much more as the piece says, whatever the block
+    does; nothing holds its motion back. Beside pieces that let the drive go this lasts until it moves on, and is beyond
+    the force with which it was let go; without them it is throughout the run, and beyond that of steady sliding.
     """
 
     channel: ClassVar[int] = DISTURBANCE

@@ -89,10 +89,12 @@ class TableReader:
 
     def _twists(self, law: type[FrozenRecord], table: Table) -> bool:
         """Whether a piece of a protocol acts on what turns."""
-        if self.machine is None or not issubclass(law, Piece) or law.channel != DISTURBANCE:
+        if self.machine is None or not issubclass(law, Piece):
             return False
         if law.frees_load_point:
             return self.machine.drive.turns
+        if law.channel != DISTURBANCE:
+            return False
         on = table.get("on")
         return turns_on(self.machine, on if isinstance(on, str) else None)
 

@@ -5,20 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from steadyslip.core.errors import Problem
-from steadyslip.protocol.curves import Array, Curve, column
-
-if TYPE_CHECKING:
-    from steadyslip.protocol.protocol import Piece
+from steadyslip.protocol.curves import Array, Curve, Jump, Wave, column
 
 LOADING, FREE, SWITCH = 1, 3, 4
 """Channels of a run in which a drive is let go, the first disturbances: the force of the drive, whether it is free, and
 at the start of a segment where that changes, 1 if its force goes on, 2 if it is told."""
 ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
+
+
+class Done(Protocol):
+    """What pieces of a protocol say of themselves here; see `steadyslip.protocol.Piece`."""
+
+    name: ClassVar[str]
+    channel: ClassVar[int]
+    frees_load_point: ClassVar[bool]
+    lets_go: ClassVar[bool]
+
+    def curve(self, before: Any) -> Curve | None: ...
+    def wave(self) -> Wave | None: ...
+    def jump(self) -> Jump | None: ...
 
 
 @dataclass(frozen=True)
@@ -70,7 +80,7 @@ class Release:
             slope[:, :, LOADING] += within * rate
 
 
-def spans_of(pieces: Sequence[Piece], drive: Sequence[Curve]) -> tuple[list[Release], list[Problem]]:
+def spans_of(pieces: Sequence[Done], drive: Sequence[Curve]) -> tuple[list[Release], list[Problem]]:
     """When a drive is let go, in the order of time, and what pieces do then that they cannot.
 
     Parameters
@@ -98,7 +108,7 @@ def spans_of(pieces: Sequence[Piece], drive: Sequence[Curve]) -> tuple[list[Rele
     return [Release(one.begin, one.end, one.to, tuple(own)) for one, own in zip(spans, added, strict=True)], problems
 
 
-def _spans(pieces: Sequence[Piece], drive: Sequence[Curve]) -> list[Release]:
+def _spans(pieces: Sequence[Done], drive: Sequence[Curve]) -> list[Release]:
     found, place = [], count()
     for piece in pieces:
         if piece.channel != 0 or piece.curve(0.0) is None:
@@ -116,7 +126,7 @@ def _spans(pieces: Sequence[Piece], drive: Sequence[Curve]) -> list[Release]:
     return found
 
 
-def _moves_within(piece: Piece, spans: Sequence[Release]) -> bool:
+def _moves_within(piece: Done, spans: Sequence[Release]) -> bool:
     """Whether a wave or a jump of the load point meets a time in which it is free, in any lane."""
     wave, jump = piece.wave(), piece.jump()
     if wave is not None:

@@ -27,7 +27,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.build import build_model
 from steadyslip.model.equations import Model
-from steadyslip.model.linearisation import characteristic_coefficients, stiffness_split
+from steadyslip.model.linearisation import characteristic_coefficients, is_written_out, stiffness_split
 from steadyslip.model.sliding import observed_in_steady_sliding
 from steadyslip.model.steady import GRID, SOLVED, joint_equation
 
@@ -58,9 +58,14 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
     Raises
     ------
     NotAvailable
-        If an equation contains what cannot be printed, or acts with a delay.
+        If an equation contains what cannot be printed, or acts with a delay, or is too long.
     """
     model = model_of(rig)
+    if model.carried is not None or not is_written_out(model):
+        raise NotAvailable(
+            "a page has its equations written out, and those of this machine, whose bodies hold each other in so many "
+            "ways, would be too long for one; steadyslip analyze, simulate and report take it"
+        )
     if model.delays:
         raise NotAvailable(
             "the page judges by a polynomial, and the characteristic equation of a rig with delay is none; "

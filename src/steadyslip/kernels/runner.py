@@ -56,7 +56,7 @@ class Runner:
         return _constants(point, self).copy() if point.size == 1 else self._table(point)
 
     def _table(self, point: OperatingPoint) -> np.ndarray:
-        found = self._constants(*map(np.asarray, point.arguments), *map(np.atleast_1d, point.sigmas))
+        found = self._constants(*map(np.asarray, point.arguments), *map(np.atleast_1d, point.steady))
         size = max([1, *(np.size(value) for value in found)])
         table = np.empty((size, len(found)))
         for column, value in enumerate(found):

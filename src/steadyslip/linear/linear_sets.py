@@ -9,9 +9,9 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.crossing import APART, linear_split
 from steadyslip.linear.polynomials import Array, StableSet, columns, most_intervals, quietly, stable_set
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
-from steadyslip.model.linearisation import characteristic_terms
+from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.range import quasi
+from steadyslip.model.range import characteristic, quasi
 
 _WINDOWS = 8  # of a rig with delay that arrays of them have room for
 
@@ -34,9 +34,7 @@ def too_late(name: str) -> NotAvailable:
 
 def most_values(point: OperatingPoint) -> int:
     """How many intervals `sets_of` has room for."""
-    return (
-        _WINDOWS if point.model.delays else most_intervals(len(characteristic_terms(point.model)[0].coefficients) - 1)
-    )
+    return _WINDOWS if point.model.delays else most_intervals(characteristic(point).shape[-1] - 1)
 
 
 def sets_of(point: OperatingPoint, name: str, size: Array | None = None) -> Array:
@@ -132,14 +130,14 @@ def linear_set(point: OperatingPoint, name: str, size: float | None = None) -> S
 
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:
     """That of a delay that no term has twice; None elsewhere."""
-    terms = characteristic_terms(point.model)
+    delays = delays_of_terms(point.model)
     c, h = quasi(point)
     if not np.all(np.isfinite(c)):
         return None
-    if [term.delay for term in terms] == [0, symbol]:
+    if list(delays) == [0, symbol]:
         return delay_set(c[0], c[1])
-    late = np.array([sp.sympify(term.delay).has(symbol) for term in terms])
-    if any(sp.diff(term.delay, symbol) != 1 for term, own in zip(terms, late, strict=True) if own):
+    late = np.array([sp.sympify(delay).has(symbol) for delay in delays])
+    if any(sp.diff(delay, symbol) != 1 for delay, own in zip(delays, late, strict=True) if own):
         return None
     others = h - late * float(point.named()[name_of(point, symbol)])
     return delay_set_among(c, np.where(np.abs(others) < 1e-12 * np.max(h), 0.0, others), late)

@@ -309,6 +309,6 @@ class Search:
 def _decay_rate(point: OperatingPoint) -> float:
     """Fastest decay rate of the memory (1/s), zero without memory."""
     model, linear = point.model, linearise(point.model)
-    numbers = dict(zip(model.arguments, (*point.arguments, *point.sigmas), strict=True))
+    numbers = dict(zip(model.arguments, (*point.arguments, *point.steady), strict=True))
     own = [linear.rows[item.symbol][item.symbol].xreplace(numbers) for item in model.memory]
     return max((abs(float(rate)) for rate in own if rate.is_number), default=0.0)

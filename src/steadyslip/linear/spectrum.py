@@ -9,6 +9,8 @@ from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasi as sums
 from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.polynomials import Array, ComplexArray, damping_measures, is_hurwitz, roots
+from steadyslip.model.eigenvalues import eigenvalues_of
+from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi
 
@@ -18,7 +20,7 @@ _ONE_CROSSING = 2  # roots that lie right of the axis just beyond an edge, at mo
 def spectrum(point: OperatingPoint) -> ComplexArray:
     """Eigenvalues (1/s), (..., n), by falling real part, NaN padded; with delays the n rightmost, n that without."""
     if not point.model.delays:
-        return roots(characteristic(point))
+        return roots(characteristic(point)) if is_written_out(point.model) else eigenvalues_of(point)
     c, h = quasi(point)
     return sums.rightmost(c, h, c.shape[-1] - 1)
 

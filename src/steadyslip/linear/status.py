@@ -18,7 +18,7 @@ from steadyslip.linear.stiffness import interval_ends, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
-from steadyslip.model.linearisation import characteristic_terms
+from steadyslip.model.linearisation import characteristic_terms, is_written_out
 from steadyslip.model.point import OperatingPoint, Vary, operating_point
 from steadyslip.model.range import in_range
 
@@ -93,7 +93,9 @@ def decided_by_rounding(point: OperatingPoint) -> bool:
 
 @question
 def _static_terms(model: Model) -> ArrayFunction:
-    """What adds up to the static stiffness of a machine, a0."""
+    """What adds up to the static stiffness of a machine, a0; nothing where that is not written out."""
+    if not is_written_out(model):
+        return model.function([])
     parts = (sp.Add.make_args(term.coefficients[0]) for term in characteristic_terms(model))
     return model.function(part for own in parts for part in own)
 
@@ -111,6 +113,7 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
             terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]
         elif point.model.delays or not point.model.is_slider:
             terms = [np.broadcast_to(term, point.shape) for term in point.evaluate(_static_terms(point.model))]
+            terms = terms or [static_sum(point)]
         else:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]

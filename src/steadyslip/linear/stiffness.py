@@ -28,8 +28,8 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.linearisation import stiffness_split
-from steadyslip.model.point import OperatingPoint, Vary, operating_point
-from steadyslip.model.range import in_range, quasi, require_range, stacked, surely_in_range, warn_of_range
+from steadyslip.model.point import OperatingPoint, Vary, operating_point, stacked
+from steadyslip.model.range import in_range, quasi, require_range, surely_in_range, warn_of_range
 from steadyslip.model.steady import steady_equation
 
 STIFFNESS = "slider.stiffness"

@@ -84,6 +84,7 @@ class _Assembly(Forces):
             observables=self._observables(),
             late=self.late,
             letting_go=self.letting_go,
+            carried=None if self.single else self.statics.carried,
         )
 
     def _contact(self, i: int) -> Contact:
@@ -214,7 +215,7 @@ class _Assembly(Forces):
             found |= {f"{own}{name}": (symbol, unit) for name, symbol, unit in held}
         for element in self.mechanism.elements:
             if element.name:
-                resting = self._known(self._tension(element, self.statics.displacement, {}))
+                resting = self._known(self.statics.tension(element))
                 twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
                 force = -resting - self._tension(element, self.x, self.moving)
                 if self.imposed and LOAD_POINT in element.senses:

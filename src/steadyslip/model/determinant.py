@@ -15,7 +15,7 @@ from sympy.polys.domains import ZZ
 
 from steadyslip.core.errors import InternalError
 from steadyslip.model.equations import Model
-from steadyslip.model.statics import StandIns
+from steadyslip.model.stand_ins import StandIns
 
 Powers = tuple[int, ...]
 """Of s, then of exp(−s delay) of each delay."""
@@ -23,12 +23,25 @@ Polynomial = dict[Powers, sp.Expr]
 """Coefficients; what is zero is not in it."""
 Rows = Mapping[sp.Symbol, list[Polynomial]]
 Terms = list[tuple[Powers, Any]]
+LONGEST = 4000
+"""Terms of a minor beyond which writing the determinant of a machine out takes longer than its answers."""
 
 
-def determinant(matrix: list[list[Polynomial]]) -> tuple[list[sp.Symbol], dict[Powers, Terms]]:
+class TooLong(Exception):
+    """A determinant with more terms than are of use."""
+
+
+def determinant(
+    matrix: list[list[Polynomial]], longest: int | None = None
+) -> tuple[list[sp.Symbol], dict[Powers, Terms]]:
     """Symbols, and by powers the coefficients of a determinant as polynomials in them: powers of each, and numbers.
 
     Exact: by rows, each minor of the rows below once. Entries are polynomials in symbols with whole coefficients.
+
+    Raises
+    ------
+    TooLong
+        If there are more than so many terms.
     """
     names = sorted({n for row in matrix for entry in row for e in entry.values() for n in e.free_symbols}, key=str)
     width = max((len(powers) for row in matrix for entry in row for powers in entry), default=1)
@@ -46,6 +59,8 @@ def determinant(matrix: list[list[Polynomial]]) -> tuple[list[sp.Symbol], dict[P
                     total += sign * row[column] * minor(columns - {column})
                 sign = -sign
             known[columns] = total
+            if longest is not None and len(total) > longest:
+                raise TooLong
         return known[columns]
 
     parts: dict[Powers, Terms] = {}
@@ -65,7 +80,13 @@ def _in_ring(entry: Polynomial, ring: Any) -> Any:
 
 
 def machine_determinant(model: Model, rows: Rows) -> Polynomial:
-    """The determinant of the characteristic matrix of a machine."""
+    """The determinant of the characteristic matrix of a machine.
+
+    Raises
+    ------
+    TooLong
+        If a minor has more than `LONGEST` terms.
+    """
     columns = {name: place for place, name in enumerate(rows)}
     blocks = [_Block(rows, columns, i, model) for i in range(len(model.contacts))]
     inside = {place for block in blocks for place in block.own}
@@ -86,7 +107,7 @@ def machine_determinant(model: Model, rows: Rows) -> Polynomial:
         own = [block.symbols.get(place) for place in core]
         own += [block.whole if other is block else block.symbols.get(other.own[-1]) for other in blocks]
         matrix.append([{} if symbol is None else {nothing: symbol} for symbol in own])
-    names, found = determinant(matrix)
+    names, found = determinant(matrix, LONGEST)
     meant = {symbol: value for block in blocks for symbol, value in block.meant.items()}
     factors = [stand_ins.back(name) for name in names]
     levels = [[i for i, name in enumerate(names) if name in block.meant] for block in blocks]

@@ -170,6 +170,32 @@ class LettingGo:
     loading_rate: sp.Symbol
 
 
+Entries = dict[tuple[int, int], sp.Expr]
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Linear equations of what is displaced and carried in steady sliding: M z = r + F τ + G σ.
+
+    Attributes
+    ----------
+    symbols : tuple of sympy.Symbol
+        z: displacements, the integral of the controller, forces in elements.
+    matrix : dict of (int, int) to sympy.Expr
+        M, what is not zero of it.
+    rest : tuple of sympy.Expr
+        r.
+    friction, normal : dict of (int, int) to sympy.Expr
+        F and G, what is not zero of them; columns are contacts.
+    """
+
+    symbols: tuple[sp.Symbol, ...]
+    matrix: Entries
+    rest: tuple[sp.Expr, ...]
+    friction: Entries
+    normal: Entries
+
+
 @dataclass(frozen=True, eq=False)
 class Model(Keeper, Displayed):
     """A rig's equations.
@@ -215,6 +241,8 @@ class Model(Keeper, Displayed):
         Symbols for what a displacement, velocity or integral was some time ago, and how long ago (s).
     letting_go : LettingGo or None
         Where the drive moves and pulls by turns.
+    carried : Carried or None
+        Symbols for what links carry in steady sliding, where formulas of that would be too long.
     """
 
     variables: tuple[Variable, ...]
@@ -231,6 +259,7 @@ class Model(Keeper, Displayed):
     observables: dict[str, tuple[sp.Expr, str]]
     late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = field(default_factory=dict)
     letting_go: LettingGo | None = None
+    carried: Carried | None = None
 
     # -- questions
 
@@ -302,8 +331,9 @@ class Model(Keeper, Displayed):
 
     @property
     def arguments(self) -> tuple[sp.Symbol, ...]:
-        """What numbers stand for at an operating point: the parameters, then σss of every contact."""
-        return (*self.parameters.values(), *(contact.sigma_ss for contact in self.contacts))
+        """What numbers stand for at an operating point: the parameters, then σss of every contact, then `carried`."""
+        carried = () if self.carried is None else self.carried.symbols
+        return (*self.parameters.values(), *(contact.sigma_ss for contact in self.contacts), *carried)
 
     def function(self, expressions: Iterable[sp.Expr], *further: sp.Symbol) -> ArrayFunction:
         """Expressions as an array function of `arguments` and of further symbols; an operating point calls it."""

@@ -19,7 +19,7 @@ from steadyslip.core.expressions import derivative
 from steadyslip.laws.contact import Motion
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Touch
 from steadyslip.model.equations import EITHER, MOVED, LettingGo
-from steadyslip.model.statics import Statics, row_of, statics
+from steadyslip.model.statics import Press, Statics, row_of, statics
 
 V_LP, Q, P, TIME = (sp.Symbol(name, real=True) for name in ("v_lp", "q", "p", "t"))
 INTEGRAL = sp.Symbol("I_x", real=True)
@@ -132,15 +132,17 @@ class Forces:
         for place, held in zip(self.places, self.friction, strict=True):
             touch = place.touch
             friction[touch.name] = held
-            normal[touch.name] = (place.sigma_ss, sp.Integer(0))
+            normal[touch.name] = Press(place.sigma_ss, sp.Integer(0))
             if touch.separation and touch.contact.is_compliant():
                 still = replace(self._motion(place, sp.nan, sp.nan, distance, distance), separation_rate=0)
                 pressed = sp.sympify(touch.contact.normal_stress(still))
-                normal[touch.name] = (pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance))
-        return statics(self.mechanism, friction, normal)
+                normal[touch.name] = Press(pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance))
+        return statics(self.mechanism, friction, normal, self.letter)
 
     def _known(self, expression: sp.Expr) -> sp.Expr:
         """A result of the statics in lowest terms, so that a stiffness which does not matter is not in it."""
+        if self.statics.carried is not None:
+            return expression.xreplace(self.friction)
         return sp.cancel(sp.together(expression)).xreplace(self.friction)
 
     def _motion(self, place: Place, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any) -> Motion:
@@ -242,7 +244,7 @@ class Forces:
         """Force of the drive in steady sliding."""
         if self.single:
             return self.motions[0].steady_spring * self.places[0].touch.area / self._per_area()
-        pull = sp.Add(*(self._known(self._tension(one, self.statics.displacement, {})) for one in self.driven))
+        pull = sp.Add(*(self._known(self.statics.tension(one)) for one in self.driven))
         pull += sp.Add(*(self._tension(one, {}, self.speeds) for one in self.driven))
         if self.mechanism.integral is not None:
             pull += self.mechanism.integral.gain * self._known(self.statics.integral)
@@ -267,9 +269,7 @@ class Forces:
 
     def _steady_pull(self, name: str, elements: list[Element]) -> sp.Expr:
         """Their force in steady sliding, dashpots that move left out: they are in `_pull`."""
-        total = sp.Add(
-            *(-one.acts.get(name, 0) * self._tension(one, self.statics.displacement, {}) for one in elements)
-        )
+        total = sp.Add(*(-one.acts.get(name, 0) * self.statics.tension(one) for one in elements))
         return self._known(total - self._integrated(name, self.statics.integral))
 
     def _integrated(self, name: str, integral: sp.Expr) -> sp.Expr:

@@ -9,15 +9,16 @@ of several, its split p(s) + k q(s), and state-space matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.questions import question
-from steadyslip.model.determinant import Polynomial, determinant, expanded, machine_determinant
+from steadyslip.model.determinant import Polynomial, TooLong, determinant, expanded, machine_determinant
 from steadyslip.model.equations import Model
-from steadyslip.model.statics import StandIns
+from steadyslip.model.stand_ins import StandIns
 
 Gradient = dict[sp.Symbol, sp.Expr]
 
@@ -95,7 +96,7 @@ def characteristic_coefficients(model: Model) -> tuple[sp.Expr, ...]:
     Raises
     ------
     NotAvailable
-        If there are delays: then it is none, but a sum of `characteristic_terms`.
+        If there are delays: then it is none, but a sum of `characteristic_terms`; or if it is not `is_written_out`.
     """
     if model.delays:
         raise NotAvailable("this is not offered with a delay, whose characteristic equation is no polynomial")
@@ -107,8 +108,18 @@ def characteristic_terms(model: Model) -> tuple[Term, ...]:
     """The characteristic equation as a sum of polynomials in s times exp(−s delay), that without delay first.
 
     Each delay enters once as a factor at most, for what a controller or a contact does is one force.
+
+    Raises
+    ------
+    NotAvailable
+        If it is not `is_written_out`.
     """
-    found = _single_determinant(model) if model.is_single else machine_determinant(model, characteristic_rows(model))
+    found = _determinant(model)
+    if found is None:
+        raise NotAvailable(
+            f"this is not offered for a machine of {len(model.coordinates)} coordinates that hold each other in so "
+            "many ways: its characteristic polynomial would fill pages"
+        )
     highest = max((powers[0] for powers in found), default=0)
     nothing = (0,) * len(model.delays)
     lates = sorted({powers[1:] for powers in found} | {nothing}, key=lambda late: (sum(late), late))
@@ -119,6 +130,34 @@ def characteristic_terms(model: Model) -> tuple[Term, ...]:
         )
         for late in lates
     )
+
+
+@question
+def _determinant(model: Model) -> Polynomial | None:
+    """The characteristic determinant; None where it would fill pages."""
+    if model.is_single:
+        return _single_determinant(model)
+    try:
+        return machine_determinant(model, characteristic_rows(model))
+    except TooLong:
+        return None
+
+
+def is_written_out(model: Model) -> bool:
+    """Whether there are `characteristic_terms`; of large machines only numbers (`steadyslip.model.eigenvalues`)."""
+    return _determinant(model) is not None
+
+
+def delays_of_terms(model: Model) -> tuple[sp.Expr, ...]:
+    """The delay of each of the `characteristic_terms`, zero first."""
+    if is_written_out(model):
+        return tuple(term.delay for term in characteristic_terms(model))
+    return tuple(sp.Add(*late) for late in sets_of_delays(model))
+
+
+def sets_of_delays(model: Model) -> list[tuple[sp.Expr, ...]]:
+    """All sets of delays that may act together, none first."""
+    return [late for count in range(len(model.delays) + 1) for late in combinations(model.delays, count)]
 
 
 def _single_determinant(model: Model) -> Polynomial:

@@ -21,7 +21,7 @@ from steadyslip.core.questions import Keeper, question
 from steadyslip.machine.rig import Rig
 from steadyslip.model.build import model_of
 from steadyslip.model.equations import MOVED, Model
-from steadyslip.model.steady import steady_roots, steady_stresses
+from steadyslip.model.steady import carried_forces, steady_roots, steady_stresses
 
 Vary = Mapping[str, Any]
 
@@ -74,6 +74,11 @@ class OperatingPoint(Keeper):
         """
         return steady_stresses(self.model, self.arguments, self.branch)
 
+    @cached_property
+    def steady(self) -> tuple[Any, ...]:
+        """What steady sliding makes of the parameters: `sigmas`, and what links carry where that is no formula."""
+        return (*self.sigmas, *carried_forces(self.model, self.arguments, self.sigmas))
+
     @property
     def exists(self) -> Any:
         """Whether steady sliding does, over the varied parameters."""
@@ -113,8 +118,8 @@ class OperatingPoint(Keeper):
 
     @cached_property
     def _numbers(self) -> tuple[Any, ...]:
-        """`arguments` and `sigma` as NumPy's numbers and arrays."""
-        return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, *self.sigmas))
+        """`arguments` and `steady` as NumPy's numbers and arrays."""
+        return tuple(np.asarray(value, dtype=float)[()] for value in (*self.arguments, *self.steady))
 
     def evaluate(self, function: ArrayFunction, *further: Any) -> list[Any]:
         """Numbers of a ``model.function`` at this point; what leaves the range of floating point is inf or NaN."""
@@ -142,15 +147,25 @@ class OperatingPoint(Keeper):
         """Some rigs of a flat point; single numbers are for all of them."""
         if self.single:
             return self
-        cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, *self.sigmas)]
-        count = len(self.arguments)
+        cut = [a[rows] if np.ndim(a) and len(a) > 1 else a for a in (*self.arguments, *self.steady)]
+        count, many = len(self.arguments), len(self.sigmas)
         found = self.with_arguments(cut[:count], np.broadcast_shapes(*map(np.shape, cut)))
-        found.__dict__["sigmas"] = tuple(cut[count:])
+        found.__dict__["sigmas"], found.__dict__["steady"] = tuple(cut[count : count + many]), tuple(cut[count:])
         return found
 
     def with_arguments(self, arguments: Iterable[Any], shape: tuple[int, ...] | None = None) -> OperatingPoint:
         """The same model with other numbers, which are not checked."""
         return replace(self, arguments=tuple(arguments), shape=self.shape if shape is None else shape)
+
+
+def stacked(parts: list[Any], point: OperatingPoint) -> np.ndarray:
+    """Numbers of each rig along a last axis; NaN without steady sliding."""
+    out = np.empty((*point.shape, len(parts)))
+    for i, part in enumerate(parts):
+        out[..., i] = part
+    if not np.all(exists := point.exists):
+        out[np.broadcast_to(~exists, point.shape)] = np.nan
+    return out
 
 
 def operating_point(

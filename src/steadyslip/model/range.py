@@ -17,9 +17,16 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, OutOfRangeWarning
 from steadyslip.core.expressions import ArrayFunction, occurrences
 from steadyslip.core.questions import question
+from steadyslip.model.eigenvalues import by_eigenvalues
 from steadyslip.model.equations import Model
-from steadyslip.model.linearisation import characteristic_coefficients, characteristic_terms
-from steadyslip.model.point import OperatingPoint
+from steadyslip.model.linearisation import (
+    characteristic_coefficients,
+    characteristic_rows,
+    characteristic_terms,
+    delays_of_terms,
+    is_written_out,
+)
+from steadyslip.model.point import OperatingPoint, stacked
 from steadyslip.model.steady import beyond_floats
 
 ORDINARY = 1e20
@@ -31,6 +38,8 @@ _NEARER = (0.75, 0.5, 0.25, 0.0)
 @question
 def characteristic(point: OperatingPoint) -> Array:
     """Coefficients of the characteristic polynomial, (..., n+1), lowest first; NaN without steady sliding."""
+    if not is_written_out(point.model):
+        return by_eigenvalues(point)[0]
     return stacked(point.evaluate(_coefficient_function(point.model)), point)
 
 
@@ -47,9 +56,12 @@ def quasi(point: OperatingPoint) -> tuple[Array, Array]:
     """
     if not point.model.delays:
         return characteristic(point)[..., None, :], np.zeros((*point.shape, 1))
-    width, function, late = _term_functions(point.model)
+    late = point.evaluate(point.model.function(delays_of_terms(point.model)))
+    delays = np.stack([np.broadcast_to(one, point.shape) for one in late], axis=-1)
+    if not is_written_out(point.model):
+        return np.stack(by_eigenvalues(point), axis=-2), np.asarray(delays, dtype=float)
+    width, function = _term_functions(point.model)
     c = stacked(point.evaluate(function), point)
-    delays = np.stack([np.broadcast_to(one, point.shape) for one in point.evaluate(late)], axis=-1)
     return c.reshape(*c.shape[:-1], -1, width), np.asarray(delays, dtype=float)
 
 
@@ -62,20 +74,9 @@ def delays_of(point: OperatingPoint) -> Array:
 
 
 @question
-def _term_functions(model: Model) -> tuple[int, ArrayFunction, ArrayFunction]:
+def _term_functions(model: Model) -> tuple[int, ArrayFunction]:
     terms = characteristic_terms(model)
-    flat = [c for term in terms for c in term.coefficients]
-    return len(terms[0].coefficients), model.function(flat), model.function([term.delay for term in terms])
-
-
-def stacked(parts: list[Any], point: OperatingPoint) -> Array:
-    """Numbers of each rig along a last axis; NaN without steady sliding."""
-    out = np.empty((*point.shape, len(parts)))
-    for i, part in enumerate(parts):
-        out[..., i] = part
-    if not np.all(exists := point.exists):
-        out[np.broadcast_to(~exists, point.shape)] = np.nan
-    return out
+    return len(terms[0].coefficients), model.function([c for term in terms for c in term.coefficients])
 
 
 @question
@@ -125,7 +126,7 @@ def surely_in_range(point: OperatingPoint, complete: bool) -> bool:
 @question
 def _is_rational(model: Model) -> bool:
     """Whether the slopes are made of sums, products and whole powers only."""
-    nodes = occurrences(c for term in characteristic_terms(model) for c in term.coefficients)
+    nodes = occurrences(e for row in characteristic_rows(model).values() for entry in row for e in entry.values())
     return all(node.is_Atom or node.is_Add or node.is_Mul or (node.is_Pow and node.exp.is_Integer) for node in nodes)
 
 

@@ -3,12 +3,16 @@
 Friction and normal stresses are taken as known; the balance of forces of every coordinate, with everything moving at
 its steady speed, is then linear in the displacements. It is solved exactly, so that what the structure alone decides
 (the pull on a single block, the force in a chain of links) has no stiffness left in it.
+
+Where bodies are held in several ways at once, as in the plane, the exact solution soon fills pages. Forces and
+displacements are symbols of their own then, `Carried`, and their equations are solved in numbers at every operating
+point.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import sympy as sp
@@ -18,48 +22,34 @@ from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
-from steadyslip.machine.mechanism import LOAD_POINT, Mechanism, Shares
+from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
+from steadyslip.model.determinant import TooLong, determinant
+from steadyslip.model.equations import Carried, Entries
+from steadyslip.model.stand_ins import StandIns
+
+LONGEST = 8
+"""Terms that the determinant of a balance of forces may have for its exact solution to be worth having."""
+UNHELD = "nothing holds some body of this machine in its place; give every body a link"
+Letter = Callable[[str], str]
 
 
 @dataclass(frozen=True)
 class Statics:
-    """Displacements from where springs are slack, and the integral of the controller, in steady sliding."""
+    """Displacements from where springs are slack, and the integral of the controller, in steady sliding.
+
+    `tensions` are forces of springs by the `id` of their element, where they are symbols of their own, with `carried`.
+    """
 
     displacement: Mapping[str, sp.Expr]
     integral: sp.Expr
+    tensions: Mapping[int, sp.Expr] = field(default_factory=dict)
+    carried: Carried | None = None
 
-
-class StandIns:
-    """Symbols in place of whatever is no polynomial, so that exact arithmetic can be done with what is left."""
-
-    def __init__(self) -> None:
-        self.names: dict[sp.Symbol, sp.Expr] = {}
-        self._known: dict[sp.Expr, sp.Symbol] = {}
-
-    def whole(self, expression: sp.Expr) -> sp.Expr:
-        """A symbol for an expression; numbers stay."""
-        if expression.is_Number:
-            return expression
-        symbol = sp.Symbol(f"e{len(self.names)}")
-        self.names[symbol] = expression
-        return symbol
-
-    def polynomial(self, expression: sp.Expr) -> sp.Expr:
-        """A polynomial in parameters and in symbols for its other parts, the same for the same."""
-        e = sp.sympify(expression)
-        if e.is_Symbol or e.is_Rational:
-            return e
-        if e.is_Add or e.is_Mul:
-            return e.func(*(self.polynomial(part) for part in e.args))
-        if e.is_Pow and e.exp.is_Integer and e.exp.is_positive:
-            return self.polynomial(e.base) ** e.exp
-        if e not in self._known:
-            self._known[e] = self.whole(e)
-        return self._known[e]
-
-    def back(self, expression: sp.Expr) -> sp.Expr:
-        """The expression that a result stands for."""
-        return expression.xreplace(self.names)
+    def tension(self, element: Element) -> sp.Expr:
+        """Force of the spring of an element."""
+        if id(element) in self.tensions:
+            return self.tensions[id(element)]
+        return element.stiffness * row_of(element.senses, self.displacement)
 
 
 def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
@@ -67,50 +57,110 @@ def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
     return sp.Add(*(sp.sympify(coefficient) * values[name] for name, coefficient in row.items() if name in values))
 
 
+@dataclass(frozen=True)
+class Press:
+    """Normal stress of a contact: `at_touch` where surfaces just touch, and its `slope` in their distance."""
+
+    at_touch: sp.Expr
+    slope: sp.Expr
+
+
 def statics(
-    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, tuple[sp.Expr, sp.Expr]]
+    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], letter: Letter
 ) -> Statics:
     """Solve the balance of forces.
 
     Parameters
     ----------
     mechanism : Mechanism
-    friction : dict of str to sympy.Expr
+    friction : dict of str to sympy.Symbol
         Steady friction stress of every contact.
-    normal : dict of str to (sympy.Expr, sympy.Expr)
-        Normal stress where surfaces just touch, and its slope in their distance.
+    normal : dict of str to Press
+    letter : callable
+        An unused letter for a dotted name.
     """
     names = [one.name for one in mechanism.coordinates]
-    speeds = {one.name: sp.sympify(one.speed) for one in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
     places = {name: sp.Symbol(f"place_{i}") for i, name in enumerate(names)}
     held = sp.Symbol("held_back")
     integral = mechanism.integral
     unknowns = [*places.values(), *([held] if integral is not None else [])]
+    stretched = {id(one): one.stiffness * row_of(one.senses, places) for one in mechanism.elements}
+    equations = _balances(mechanism, friction, normal, places, held, stretched)
+    found = _solved(equations, unknowns)
+    if found is None:
+        return _carried(mechanism, friction, normal, letter)
+    return Statics(dict(zip(names, found, strict=False)), found[-1] if integral is not None else sp.Integer(0))
+
+
+def _balances(
+    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press],
+    places: Mapping[str, sp.Expr], held: sp.Expr, tensions: Mapping[int, sp.Expr],
+) -> list[sp.Expr]:  # fmt: skip
+    """What has to vanish: the error of the controller, where it is integrated, and the forces on every coordinate."""
+    integral = mechanism.integral
+    speeds = {one.name: sp.sympify(one.speed) for one in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
     equations = [] if integral is None else [row_of(integral.senses, places)]
     for one in mechanism.coordinates:
         total = sp.sympify(one.force)
         for element in mechanism.elements:
             share = element.acts.get(one.name, 0)
-            stretched = element.stiffness * row_of(element.senses, places)
-            total -= share * (stretched + element.damping * row_of(element.senses, speeds))
+            total -= share * (tensions[id(element)] + element.damping * row_of(element.senses, speeds))
         if integral is not None:
             total -= integral.acts.get(one.name, 0) * integral.gain * held
         for touch in mechanism.touches:
-            at_touch, slope = normal[touch.name]
+            own = normal[touch.name]
             total -= touch.slip.get(one.name, 0) * touch.area * friction[touch.name]
-            pressed = at_touch + slope * row_of(touch.separation, places)
+            pressed = own.at_touch + own.slope * row_of(touch.separation, places)
             total += touch.separation.get(one.name, 0) * touch.area * pressed
         equations.append(total)
-    found = _solved(equations, unknowns)
-    return Statics(dict(zip(names, found, strict=False)), found[-1] if integral is not None else sp.Integer(0))
+    return equations
 
 
-def _solved(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr]:
-    """The solution of linear equations, in lowest terms."""
+def _carried(
+    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], letter: Letter
+) -> Statics:
+    """The same, with symbols for what is displaced and carried.
+
+    The force of a stiff spring would be lost in the difference of the places of its ends, so that it is an unknown.
+    """
+
+    def symbol(name: str) -> sp.Symbol:
+        return sp.Symbol(letter(name), real=True)
+
+    places = {one.name: symbol(f"{one.name}.place") for one in mechanism.coordinates}
+    springs = [one for one in mechanism.elements if one.stiffness != 0]
+    tensions = {id(one): symbol(f"{one.name or 'controller'}.carried") for one in springs}
+    held = symbol("controller.integral")
+    every = {id(one): sp.Integer(0) for one in mechanism.elements} | tensions
+    equations = _balances(mechanism, friction, normal, places, held, every)
+    equations += [row_of(one.senses, places) - tensions[id(one)] / one.stiffness for one in springs]
+    unknowns = [*places.values(), *([held] if mechanism.integral is not None else []), *tensions.values()]
+    frictions = [*friction.values()]
+    stresses = [own.at_touch if own.slope == 0 else None for own in normal.values()]
+    nothing = dict.fromkeys((*unknowns, *frictions, *filter(None, stresses)), sp.Integer(0))
+
+    def slopes(along: Sequence[sp.Symbol | None], sign: int) -> Entries:
+        both = ((i, j, e, s) for i, e in enumerate(equations) for j, s in enumerate(along))
+        known = {(i, j): sign * derivative(e, s) for i, j, e, s in both if s is not None and e.has(s)}
+        return {place: e for place, e in known.items() if e != 0}
+
+    carried = Carried(
+        tuple(unknowns), slopes([*unknowns], 1), tuple(-e.xreplace(nothing) for e in equations),
+        slopes(frictions, -1), slopes(stresses, -1),
+    )  # fmt: skip
+    return Statics(places, held if mechanism.integral is not None else sp.Integer(0), every, carried)
+
+
+def _solved(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr] | None:
+    """The solution of linear equations, in lowest terms; None where it is too long to be written."""
     stand_ins = StandIns()
     nothing = dict.fromkeys(unknowns, sp.Integer(0))
     matrix = [[stand_ins.polynomial(derivative(sp.expand(e), u)) for u in unknowns] for e in equations]
     right = [[stand_ins.polynomial(-e.xreplace(nothing))] for e in equations]
+    try:
+        determinant([[{(0,): one} if one != 0 else {} for one in row] for row in matrix], LONGEST)
+    except TooLong:
+        return None
     symbols = sorted(_symbols(entry for row in (*matrix, *right) for entry in row), key=str)
     field = QQ.frac_field(*symbols) if symbols else QQ
     try:
@@ -120,7 +170,7 @@ def _solved(equations: list[sp.Expr], unknowns: list[sp.Symbol]) -> list[sp.Expr
         )
         found = table.lu_solve(known).to_Matrix()
     except (DMNonInvertibleMatrixError, ZeroDivisionError):
-        raise NotAvailable("nothing holds some body of this machine in its place; give every body a link") from None
+        raise NotAvailable(UNHELD) from None
     return [stand_ins.back(found[i, 0]) for i in range(len(unknowns))]
 
 

@@ -7,7 +7,7 @@ steady sliding: g1 >= 1 is lock-up (friction grows faster than the spring can pu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
-from steadyslip.model.equations import Model
+from steadyslip.model.equations import Carried, Entries, Model
 
 Arguments = tuple[Any, ...]
 GRID = np.geomspace(1e-12, 1e18, 6001)  # stresses between whose neighbours a root is looked for, Pa
@@ -89,10 +89,9 @@ class JointEquation:
 
     def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
         """A (..., n, n) and b (..., n)."""
-        found = np.broadcast_arrays(*(np.asarray(e, dtype=float) for e in self.parts(*arguments)))
         count = self.size**2
-        matrix = np.stack(found[:count], axis=-1)
-        return matrix.reshape(*matrix.shape[:-1], self.size, self.size), np.stack(found[count:], axis=-1)
+        found = numbers_of(self.parts, arguments)
+        return found[..., :count].reshape(*found.shape[:-1], self.size, self.size), found[..., count:]
 
     def solve(self, arguments: Arguments) -> tuple[Array, Array]:
         """σ (..., n), and the largest real eigenvalue of A, −inf where none is real: at one and above it is lock-up."""
@@ -101,11 +100,80 @@ class JointEquation:
         matrix = np.where(good[..., None, None], matrix, 0.0)
         gains = np.linalg.eigvals(matrix)
         largest = np.max(np.where(np.abs(gains.imag) <= _NEARLY_REAL * np.abs(gains), gains.real, -np.inf), axis=-1)
-        left = np.eye(self.size) - matrix
-        left = np.where((np.linalg.det(left) == 0)[..., None, None], np.nan, left)
-        with np.errstate(all="ignore"):
-            sigma = np.linalg.solve(left, np.where(good[..., None], right, np.nan)[..., None])[..., 0]
-        return sigma, largest
+        return solved(np.eye(self.size) - matrix, np.where(good[..., None], right, np.nan)), largest
+
+
+@dataclass(frozen=True)
+class CarriedEquation(JointEquation):
+    """The same where what links carry is no formula: with M z = r + F τ + G σ, and laws linear in z, τ and σ.
+
+    ``parts(*arguments)`` gives what is not zero of M, r, F, G, of stresses by z and by σ, of friction by σ, and of both
+    the rest; `places` says where it belongs.
+    """
+
+    places: tuple[tuple[tuple[int, int], ...], ...] = ()
+    count: int = 0
+
+    def _blocks(self, arguments: Arguments) -> list[Array]:
+        found, start = numbers_of(self.parts, arguments), 0
+        many, few = self.count, self.size
+        shapes = [(many, many), (many, 1), (many, few), (many, few), (few, many), (few, few), (few, few), (few, 1),
+                  (few, 1)]  # fmt: skip
+        blocks = []
+        for shape, places in zip(shapes, self.places, strict=True):
+            block = np.zeros((*found.shape[:-1], *shape))
+            for i, (row, column) in enumerate(places, start=start):
+                block[..., row, column] = found[..., i]
+            start += len(places)
+            blocks.append(block)
+        return blocks
+
+    def _by_stress(self, blocks: list[Array]) -> tuple[Array, Array]:
+        """z = Z σ + z0: both."""
+        matrix, rest, by_friction, by_normal, _, _, friction, _, offset = blocks
+        right = np.concatenate([by_friction @ friction + by_normal, rest + by_friction @ offset], axis=-1)
+        z = solved_all(matrix, right)
+        return z[..., :-1], z[..., -1:]
+
+    def arrays(self, arguments: Arguments) -> tuple[Array, Array]:
+        blocks = self._blocks(arguments)
+        by_stress, alone = self._by_stress(blocks)
+        by_carried, direct, load = blocks[4], blocks[5], blocks[7]
+        return direct + by_carried @ by_stress, (load + by_carried @ alone)[..., 0]
+
+    def carried(self, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
+        """z at these normal stresses."""
+        by_stress, alone = self._by_stress(self._blocks(arguments))
+        sigma = np.stack(np.broadcast_arrays(*(np.asarray(one, dtype=float) for one in sigmas)), axis=-1)
+        found = (by_stress @ sigma[..., None] + alone)[..., 0]
+        return tuple(found[..., i][()] for i in range(self.count))
+
+
+def numbers_of(function: Callable[..., Any], arguments: Arguments) -> Array:
+    """What an array function gives, along a last axis."""
+    with np.errstate(all="ignore"):
+        return np.stack(np.broadcast_arrays(*(np.asarray(e, dtype=float) for e in function(*arguments))), axis=-1)
+
+
+def solved(matrix: Array, right: Array) -> Array:
+    """The solution of linear equations (..., n), NaN where there is none."""
+    return solved_all(matrix, right[..., None])[..., 0]
+
+
+def solved_all(matrix: Array, right: Array) -> Array:
+    """Solutions for several right sides (..., n, m), NaN where there are none."""
+    with np.errstate(all="ignore"):
+        rows = np.max(np.abs(matrix), axis=-1, keepdims=True)
+        even = matrix / np.where(rows > 0, rows, 1.0)
+        columns = np.max(np.abs(even), axis=-2, keepdims=True)
+        columns = np.where(columns > 0, columns, 1.0)
+        even = even / columns
+        bad = ~np.all(np.isfinite(even), axis=(-2, -1)) | ~np.all(np.isfinite(right), axis=(-2, -1))
+        even = np.where(bad[..., None, None], np.eye(matrix.shape[-1]), even)
+        bad |= np.linalg.det(even) == 0
+        even = np.where(bad[..., None, None], np.eye(matrix.shape[-1]), even)
+        found = np.linalg.solve(even, right / np.where(rows > 0, rows, 1.0)) / np.swapaxes(columns, -1, -2)
+        return np.asarray(np.where(bad[..., None, None], np.nan, found))
 
 
 @question
@@ -120,14 +188,47 @@ def joint_equation(model: Model) -> JointEquation | None:
     sigmas = [contact.sigma_ss for contact in model.contacts]
     slopes = tuple(tuple(derivative(contact.steady_stress, one) for one in sigmas) for contact in model.contacts)
     size = len(sigmas)
-    if all(slopes[i][j] == 0 for i in range(size) for j in range(size) if i != j):
+    if model.carried is None and all(slopes[i][j] == 0 for i in range(size) for j in range(size) if i != j):
         return None
     if any(slope.free_symbols & set(sigmas) for row in slopes for slope in row):
         raise NotAvailable("contacts that press on each other must be linear in the stresses; these are not")
     nothing = dict.fromkeys(sigmas, sp.Integer(0))
+    if model.carried is not None:
+        return _carried_equation(model, model.carried, nothing)
     rest = tuple(contact.steady_stress.xreplace(nothing) for contact in model.contacts)
     parts = ArrayFunction(list(model.parameters.values()), [*(slope for row in slopes for slope in row), *rest])
     return JointEquation(size, parts, slopes, rest)
+
+
+def _carried_equation(model: Model, carried: Carried, nothing: dict[sp.Symbol, sp.Expr]) -> CarriedEquation:
+    sigmas, symbols = list(nothing), carried.symbols
+    none = nothing | dict.fromkeys(symbols, sp.Integer(0))
+    laws = [contact.steady_stress for contact in model.contacts]
+    frictions = [model.steady[contact.friction] for contact in model.contacts]
+
+    def slopes(expressions: list[sp.Expr], along: Sequence[sp.Symbol]) -> Entries:
+        return {(i, j): derivative(e, s) for i, e in enumerate(expressions) for j, s in enumerate(along) if e.has(s)}
+
+    def column(expressions: Iterable[sp.Expr]) -> Entries:
+        return {(i, 0): e for i, e in enumerate(expressions) if e != 0}
+
+    groups = [
+        carried.matrix, column(carried.rest), carried.friction, carried.normal, slopes(laws, symbols),
+        slopes(laws, sigmas), slopes(frictions, sigmas), column(e.xreplace(none) for e in laws),
+        column(e.xreplace(none) for e in frictions),
+    ]  # fmt: skip
+    flat = [e for group in groups for e in group.values()]
+    if any(e.free_symbols & none.keys() for e in flat):
+        raise NotAvailable("friction and contacts of a machine held in many ways must be linear in the stresses")
+    parts = ArrayFunction(list(model.parameters.values()), flat)
+    places = tuple(tuple(group) for group in groups)
+    return CarriedEquation(len(laws), parts, (), (), places, len(symbols))
+
+
+def carried_forces(model: Model, arguments: Arguments, sigmas: Sequence[Any]) -> tuple[Any, ...]:
+    """Numbers of what links carry in steady sliding, where these are symbols of the model; none elsewhere."""
+    joint = joint_equation(model) if model.carried is not None else None
+    return joint.carried(arguments, sigmas) if isinstance(joint, CarriedEquation) else ()
 
 
 def steady_stresses(model: Model, arguments: Arguments, branch: int) -> tuple[Any, ...]:

@@ -133,7 +133,7 @@ def _arrangements(i: int, j: int, k: int) -> tuple[Index, ...]:
 def taylor(point: OperatingPoint) -> Taylor:
     """Derivatives of every rig of an operating point (flat arrays) in its steady sliding."""
     found = system(point.model)
-    stresses = [np.atleast_1d(np.asarray(sigma, dtype=float)) for sigma in point.sigmas]
+    stresses = [np.atleast_1d(np.asarray(one, dtype=float)) for one in point.steady]
     numbers = found.function(*map(np.asarray, point.arguments), *stresses)
     size = max([1, *(np.size(x) for x in numbers)])
     columns = [np.broadcast_to(np.asarray(x, dtype=float), (size,)) for x in numbers]

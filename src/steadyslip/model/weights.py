@@ -95,7 +95,7 @@ def weights(point: OperatingPoint, index: int = 0) -> Weights:
 
 def arrays_of(point: OperatingPoint) -> list[np.ndarray]:
     """Parameters and normal stresses of a point, as arrays."""
-    return [*map(np.asarray, point.arguments), *map(np.atleast_1d, point.sigmas)]
+    return [*map(np.asarray, point.arguments), *map(np.atleast_1d, point.steady)]
 
 
 @question

@@ -60,7 +60,8 @@ class Rest:
 
     def given(self) -> tuple[Any, ...]:
         """What functions of `field_of` take before the state."""
-        return (*self.point.arguments, *self.sigmas, self.velocity, self.force, self.pressure)
+        own = (np.broadcast_to(np.asarray(one, dtype=float), self.velocity.shape) for one in self.point.steady)
+        return (*self.point.arguments, *own, self.velocity, self.force, self.pressure)
 
     @property
     def is_machine(self) -> bool:

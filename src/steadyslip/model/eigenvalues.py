@@ -1,0 +1,127 @@
+"""The characteristic polynomial in numbers, where its coefficients are too long to be written out: from eigenvalues.
+
+The eigenvalues are those of the state matrix; the factor before the highest power follows from the determinant of the
+characteristic matrix at one place. What cancels for structural reasons has not cancelled exactly here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from steadyslip.core.arrays import Array
+from steadyslip.core.errors import NotAvailable
+from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.questions import question
+from steadyslip.model.descriptor import blocks_of, described
+from steadyslip.model.equations import Model
+from steadyslip.model.linearisation import characteristic_rows, sets_of_delays
+from steadyslip.model.point import OperatingPoint, stacked
+
+Delays = tuple[sp.Expr, ...]
+
+
+@question
+def by_eigenvalues(point: OperatingPoint) -> list[Array]:
+    """Coefficients of the polynomial of every term of the characteristic equation, (..., n+1), lowest power first.
+
+    Terms are as `steadyslip.model.linearisation.sets_of_delays` has them. The determinant is linear in each
+    exp(−s delay): from what it is with and without each follow the terms.
+    """
+    sets = sets_of_delays(point.model)
+    whole = {late: _polynomial(point, late) for late in sets}
+    width = max(c.shape[-1] for c in whole.values())
+    whole = {late: np.pad(c, [(0, 0)] * (c.ndim - 1) + [(0, width - c.shape[-1])]) for late, c in whole.items()}
+    found = []
+    for late in sets:
+        inside = [own for own in sets if set(own) <= set(late)]
+        found.append(np.sum([(-1) ** (len(late) - len(own)) * whole[own] for own in inside], axis=0))
+    return found
+
+
+@question
+def eigenvalues_of(point: OperatingPoint, late: Delays = ()) -> NDArray[np.complex128]:
+    """Eigenvalues (1/s), (..., n), by falling real part, with these delays acting at once, the others not at all.
+
+    NaN without steady sliding, and behind them where bodies without mass leave fewer states.
+    """
+    with np.errstate(all="ignore"):
+        found = _eigenvalues(point, late)
+        order = np.lexsort((-found.imag, -found.real), axis=-1)
+        return np.take_along_axis(found, order, axis=-1)
+
+
+def _polynomial(point: OperatingPoint, late: Delays) -> Array:
+    """With these delays acting at once, the others not at all."""
+    with np.errstate(all="ignore"):
+        roots = eigenvalues_of(point, late)
+        size = np.abs(roots)
+        some = np.where(size > 0, size, 1.0)
+        place = np.exp(np.mean(np.log(some), axis=-1)) if roots.shape[-1] else np.ones(point.shape)
+        sign, logarithm = np.linalg.slogdet(_matrix(point, late, place))
+        apart = place[..., None] - roots
+        logarithm = logarithm - np.sum(np.log(np.abs(apart)), axis=-1)
+        sign = sign * np.prod(np.where(roots.imag == 0, np.sign(apart.real), 1.0), axis=-1)
+        c = np.ones((*roots.shape[:-1], 1), dtype=complex)
+        for i in range(roots.shape[-1]):
+            up = np.concatenate([np.zeros_like(c[..., :1]), c], axis=-1)
+            up[..., :-1] -= roots[..., i, None] * c
+            c = up
+        return np.asarray(c.real * (sign * np.exp(logarithm))[..., None])
+
+
+def _eigenvalues(point: OperatingPoint, late: Delays) -> NDArray[np.complex128]:
+    """Of the state matrix, in any order."""
+    blocks = blocks_of(point, (), (), late)
+    rate_x, rate_z, balance_x, balance_z = (blocks[i] for i in (0, 2, 6, 8))
+    good = np.all([np.all(np.isfinite(one), axis=(-2, -1)) for one in (rate_x, rate_z, balance_x, balance_z)], axis=0)
+    if all(one.inertial for one in point.model.coordinates):
+        whole = np.where(good[..., None, None], balance_z, np.eye(balance_z.shape[-1]))
+        good = good & (np.linalg.det(whole) != 0)
+        whole = np.where(good[..., None, None], whole, np.eye(balance_z.shape[-1]))
+        state = rate_x - rate_z @ np.linalg.solve(whole, np.where(good[..., None, None], balance_x, 0.0))
+        good = good & np.all(np.isfinite(state), axis=(-2, -1))
+        found = np.linalg.eigvals(np.where(good[..., None, None], state, 0.0)).astype(complex)
+        return np.where(good[..., None], found, np.nan)
+    flat = [block.reshape(good.size, *block.shape[-2:]) for block in blocks]
+    rows = [_alone(point.model, [block[i] for block in flat]) if ok else None for i, ok in enumerate(good.ravel())]
+    width = max((len(row) for row in rows if row is not None), default=0)
+    table = np.full((len(rows), width), np.nan, dtype=complex)
+    for i, row in enumerate(rows):
+        if row is not None and len(row) == width:
+            table[i] = row
+    return table.reshape(*good.shape, width)
+
+
+def _alone(model: Model, blocks: list[Array]) -> NDArray[np.complex128] | None:
+    """Eigenvalues of a single rig; None where the balances do not determine the motion."""
+    try:
+        return np.asarray(np.linalg.eigvals(described(model, (), blocks).solved((), ()).a), dtype=complex)
+    except NotAvailable:
+        return None
+
+
+def _matrix(point: OperatingPoint, late: Delays, place: Array) -> Array:
+    """The characteristic matrix at a real place (...), 1/s."""
+    function, entries = _entries(point.model, late)
+    numbers = stacked(point.evaluate(function), point)
+    n = 1 + max(row for row, _, _ in entries)
+    found = np.zeros((*point.shape, n, n))
+    for i, (row, column, power) in enumerate(entries):
+        found[..., row, column] += numbers[..., i] * place**power
+    good = np.all(np.isfinite(found), axis=(-2, -1))
+    return np.where(good[..., None, None], found, np.nan)
+
+
+@question
+def _entries(model: Model, late: Delays) -> tuple[ArrayFunction, list[tuple[int, int, int]]]:
+    """What is not zero of the characteristic matrix, and its row, column and power of s."""
+    wanted, places = [], []
+    for i, row in enumerate(characteristic_rows(model).values()):
+        for j, entry in enumerate(row):
+            for powers, e in entry.items():
+                if all(delay in late for delay, power in zip(model.delays, powers[1:], strict=True) if power):
+                    wanted.append(e)
+                    places.append((i, j, powers[0]))
+    return model.function(wanted), places

@@ -107,6 +107,10 @@ def test_answers_come_in_the_units_of_the_file(tmp_path):
 
 def test_formula_schema_version():
     assert "k_cr = " in run("analyze", EXAMPLE, "--formula").stdout
+    of_mass = run("analyze", EXAMPLE, "--along", "mass", "--set", "mass=1e9 kg/m^2").stdout
+    assert "Edge in slider.mass\n  m_cr = " in of_mass
+    wrong = run("analyze", EXAMPLE, "--along", "nonsense")
+    assert (wrong.returncode, "unknown parameter 'nonsense'" in wrong.stderr) == (2, True)
     without = run("analyze", EXAMPLE, "--formula", "--set", "friction.normal_memory.law=prakash-clifton")
     assert "unknown key 'alpha'" in without.stderr
     two = run("analyze", EXAMPLE.with_name("two-states.toml"), "--formula")

@@ -54,6 +54,9 @@ def analyze(
         bool, typer.Option("--require-stable", help="exit with status 1 unless sliding is stable beyond rounding")
     ] = False,
     formula: Annotated[bool, typer.Option("--formula", help="also print the critical stiffness as a formula")] = False,
+    along: Annotated[
+        str | None, typer.Option("--along", help="parameter whose edge --formula writes instead, where that is short")
+    ] = None,
     branch: Branch = 0,
     kick: Annotated[
         list[str] | None,
@@ -67,14 +70,18 @@ def analyze(
     from steadyslip.files.specifications import read_rig
     from steadyslip.verdict import analyze as run
 
+    formula = formula or along is not None
     if fitted is not None:
-        _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, branch)
+        _predicted(rig, changes or (), fitted, kick or (), as_json, require_stable, formula, along, branch)
         return
-    result = run(read_rig(rig, changes or ()), branch=branch, kick=kick or ())
+    read = read_rig(rig, changes or ())
+    if along is not None:
+        along = read.resolve(along)
+    result = run(read, branch=branch, kick=kick or ())
     if as_json:
         data = result.to_dict()
         if formula:
-            data |= _formula(result)
+            data |= _formula(result, along)
         say_json(data)
     else:
         head, _, rest = str(result).partition("\n")
@@ -82,30 +89,30 @@ def analyze(
         say(typer.style(head, bold=True, fg=colour))
         say(rest)
         if formula:
-            _echo_formula(result)
+            _echo_formula(result, along)
     if any(one.interrupted for one in getattr(result, "kicks", ())):
         raise typer.Exit(130)
     if require_stable and (not result.stable or result.on_edge):
         raise typer.Exit(1)
 
 
-def _formula(result: Any) -> dict[str, str | None]:
+def _formula(result: Any, along: str | None) -> dict[str, str | None]:
     from steadyslip.core.errors import NotAvailable
 
     try:
-        return {"formula": str(result.formula().rhs)}
+        return {"formula": str(result.formula(along).rhs)}
     except NotAvailable:
         return {"formula": None}
 
 
-def _echo_formula(result: Any) -> None:
+def _echo_formula(result: Any, along: str | None) -> None:
     from steadyslip.core.errors import NotAvailable
     from steadyslip.core.progress import progress_text
 
     try:
         with progress_text("simplifying the formula"):
-            equation = result.formula()
-        say(f"\nCritical stiffness\n  {equation.lhs} = {equation.rhs}")
+            equation = result.formula(along)
+        say(f"\n{f'Edge in {along}' if along else 'Critical stiffness'}\n  {equation.lhs} = {equation.rhs}")
     except NotAvailable as reason:
         say(f"\nNo formula: {reason}")
 
@@ -118,6 +125,7 @@ def _predicted(
     as_json: bool,
     require_stable: bool,
     formula: bool,
+    along: str | None,
     branch: int,
 ) -> None:
     """The verdict with the friction of a fit: that of the best values, and its probability."""
@@ -126,15 +134,17 @@ def _predicted(
     from steadyslip.verdict import analyze as run
 
     refuse_branch(fitted, branch)
-    found = predict(read_slider(rig, changes), load_fit(fitted), kick=kick)
+    slider = read_slider(rig, changes)
+    along = along if along is None else slider.resolve(along)
+    found = predict(slider, load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
-        data = best.to_dict() | {"prediction": found.to_dict()} | (_formula(best) if formula else {})
+        data = best.to_dict() | {"prediction": found.to_dict()} | (_formula(best, along) if formula else {})
         say_json(data)
     else:
         say(f"{found}\n\nWith the best values\n{best}")
         if formula:
-            _echo_formula(best)
+            _echo_formula(best, along)
     if found.left_out:
         raise typer.Exit(130)
     if require_stable and not found.probability_stable >= 0.95:

@@ -32,6 +32,7 @@ from steadyslip.model.sliding import ABSENT
 from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
+from steadyslip.verdict.words import REMOTE
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "edges", "banner",
@@ -161,6 +162,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "speed": "drive.velocity",
         "toml": file.pieces,
         **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else {"stiffness": _stiffness(rig, names)}),
+        "remote": REMOTE,
         "checks": _checks(rig, names, branch),
     }
 

@@ -50,7 +50,7 @@ class _Pieces:
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
+class SumsOnAxis:
     """Sums (rows, m, n+1) with delays (rows, m) on the positive imaginary axis, from zero to where no root can be.
 
     The axis is cut until on each piece either one term is larger than all others together, so that the sum turns as
@@ -130,7 +130,7 @@ def count_by_argument(c: Array, h: Array) -> NDArray[np.int64]:
 
     `UNKNOWN` where these are too many.
     """
-    axis = Axis(c, h)
+    axis = SumsOnAxis(c, h)
     present = np.any(c != 0, axis=1)
     top = c.shape[-1] - 1 - np.argmax(present[:, ::-1], axis=-1)
     end = np.array([[bound_on_axis(one)] for one in c])

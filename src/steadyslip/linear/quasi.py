@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.linear.argument import UNKNOWN, Axis, bound_on_axis, count_by_argument
+from steadyslip.linear.argument import UNKNOWN, SumsOnAxis, bound_on_axis, count_by_argument
 from steadyslip.linear.polynomials import (
     Array,
     ComplexArray,
@@ -253,7 +253,7 @@ def _near_axis(c: Array, h: Array) -> Iterator[float]:
     if len(c) == 2:
         yield from (float(one) for one in crossings(c[:1], c[1:])[0][0] if np.isfinite(one))
         return
-    own = [pieces.omega[0][leader < 0] for pieces, leader in Axis(c[None], h[None]).settled()]
+    own = [pieces.omega[0][leader < 0] for pieces, leader in SumsOnAxis(c[None], h[None]).settled()]
     omega = np.sort(np.concatenate(own))
     size = np.abs(value(c, h, 1j * omega)) / _size(c, h, 1j * omega)
     around = np.concatenate([[np.inf], size, [np.inf]])

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 class Analysis(Findings):  # noqa: D101 -- its base has it
     __doc__ = Findings.__doc__
 
-    def formula(self) -> sp.Eq:
-        """Critical stiffness of this kind of rig as a SymPy equation; see `steadyslip.formula`."""
-        return linear_formula(self.rig)
+    def formula(self, along: str | None = None) -> sp.Eq:
+        """Critical stiffness, or the edge in another parameter, as a SymPy equation; see `steadyslip.formula`."""
+        return linear_formula(self.rig, along)
 
     def plot(self, ax: Any = None) -> Any:
         """Root locus in the stiffness; see `steadyslip.figures.root_locus`."""

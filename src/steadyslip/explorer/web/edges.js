@@ -3,7 +3,6 @@ import { ABSENT, STABLE, UNKNOWN } from "./linear.js";
 import { inside } from "./rig.js";
 
 export const BESIDE = 1e-3; // how far from an edge one lands that goes there, of its value
-export const REMOTE = 100; // times a value, beyond which an edge is of little use
 
 /**
  * The nearest change of every parameter inside its range, the most urgent first: where, what is behind it, whether it is
@@ -12,6 +11,7 @@ export const REMOTE = 100; // times a value, beyond which an edge is of little u
  * @param {import("./page.js").Page} page
  */
 export function edgesOf(page) {
+  const { remote } = page.rig.data; // times a value, beyond which an edge is of little use
   const found = /** @type {{i: number, at: number, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
   page.rig.data.parameters.forEach((one, i) => {
     const first = page.scale(i).at(0), value = page.rig.values[i], parts = page.tracks[i];
@@ -22,7 +22,7 @@ export function edgesOf(page) {
       const [here, beyond] = away ? [part.status, other] : [other, part.status];
       const distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
       if (best !== null && distance >= best.distance && (value || at >= best.at)) return;
-      const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < REMOTE && times > 1 / REMOTE);
+      const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < remote && times > 1 / remote);
       const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // whether that side is behind the edge
       const room = away === across ? parts[n + 1].at - at : (n ? parts[n - 1].at : first) - at;
       const ahead = away ? parts[n + 1].at - at : (n ? parts[n - 1].at : first) - at;

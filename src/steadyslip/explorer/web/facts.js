@@ -1,6 +1,6 @@
 // Steady sliding in numbers, eigenvalues with their locus, and the list of nearest edges.
 import { make, put, svg, tell } from "./dom.js";
-import { BESIDE, REMOTE } from "./edges.js";
+import { BESIDE } from "./edges.js";
 import { ABSENT, UNKNOWN } from "./linear.js";
 import { Locus } from "./locus.js";
 import { words } from "./modes.js";
@@ -77,7 +77,7 @@ export class Facts {
     this.near.replaceChildren(...rows(found.filter((edge) => !edge.far)));
     this.far.hidden = !far.length;
     if (far.length === found.length) this.far.open = true;
-    tell(this.far.firstChild, `${far.length} further off than a factor of ${REMOTE}`);
+    tell(this.far.firstChild, `${far.length} further off than a factor of ${page.rig.data.remote}`);
     this.far.lastChild.replaceChildren(...rows(far));
   }
 }

@@ -1,5 +1,7 @@
 """Slip events and what a run tells of itself: by their definition, whatever the steps, for laws that stick."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,9 @@ from rigs_of_theory import CONTACTS, ONE_MEMORY, rig
 from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
+
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def excursions(run):
@@ -188,3 +193,25 @@ def test_the_range_of_velocity_is_that_of_the_run_not_of_its_samples():
     assert whole.velocities[0] <= whole["v"].min()
     assert whole.velocities[1] >= whole["v"].max()
     assert str(few).splitlines()[1].split(", at")[0] == str(whole).splitlines()[1].split(", at")[0]
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
+@pytest.mark.parametrize("until", [0.3, 2.0, 30.0])
+def test_steady_sliding_has_no_events_however_long_the_steps(rtol, until):
+    """Two surfaces in a stiff frame: forces of 40 kN round velocity by more than a short step shows."""
+    machine = ss.read_rig(EXAMPLES / "machines" / "two-surfaces.toml")
+    assert ss.simulate(machine, until=until, rtol=rtol).events == ()
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_ringing_has_every_peak_and_trough_down_to_the_error_allowed(rtol):
+    """None is left out or told twice, and none is told of what the integration may have made itself."""
+    run = ss.simulate(unit_rig("aging", 0.5, 0.51), ss.VelocityStep(at=5, to=1.03), until=8000.0, rtol=rtol)
+    turns = [event for event in run.events if event.kind.startswith("velocity")]
+    kinds = [event.kind for event in turns]
+    assert kinds == (["velocity peak", "velocity trough"] * len(turns))[: len(turns)]
+    size = np.abs([np.log(event.velocity / 1.03) for event in turns])
+    assert 0.1 * rtol < size[-1] < 3 * rtol
+    times = np.array([event.time for event in turns])[size > 3 * rtol]
+    apart = np.diff(times)
+    assert 0.7 * np.median(apart) < apart.min() <= apart.max() < 1.3 * np.median(apart)

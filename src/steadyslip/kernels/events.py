@@ -15,6 +15,8 @@ from steadyslip.kernels.layout import Row
 from steadyslip.kernels.nodes import larger
 
 FASTER = 1.000001  # than the load point, beyond rounding: slipping
+ROUNDED = 64 * 2.0**-52
+"""Rounding of a sum of stresses as a share of aσ, by which friction answers velocity: stresses are some dozens of it."""
 
 
 class Observed(Protocol):
@@ -56,6 +58,14 @@ class Observed(Protocol):
     def h(self) -> Any:
         """Length of the step, s."""
 
+    @property
+    def error(self) -> Any:
+        """Error of the velocity that the integration allows in a step, m/s."""
+
+    @property
+    def rounding(self) -> Any:
+        """Size up to which the acceleration may be rounding, m/s²."""
+
 
 @dataclass(frozen=True)
 class Watched:
@@ -70,8 +80,9 @@ class Watched:
         What it is called when the function becomes negative, or positive; empty if nobody wants to know.
     falls_counted, rises_counted : str
         Column of an ensemble's tally that counts it; empty for none.
-    rounding : callable, optional
-        Size up to which the function is as good as zero at the begin of a step.
+    uncertain : callable, optional
+        Size up to which its sign says nothing: what the integration does not tell from zero, or rounding. A sign counts
+        from the first step on at whose end the function is larger, and until it is as clearly another.
     """
 
     name: str
@@ -80,7 +91,7 @@ class Watched:
     rises: str = ""
     falls_counted: str = ""
     rises_counted: str = ""
-    rounding: Callable[[Observed], Any] | None = None
+    uncertain: Callable[[Observed], Any] | None = None
 
 
 def faster(at: Observed) -> Any:
@@ -89,11 +100,13 @@ def faster(at: Observed) -> Any:
 
 
 EVENTS = (
-    Watched("slip", lambda at: at.v - faster(at), falls="slip ends", rises="slip begins"),
+    Watched("slip", lambda at: at.v - faster(at), falls="slip ends", rises="slip begins",
+            uncertain=lambda at: at.error),
     Watched("turn", lambda at: at.acceleration, falls="velocity peak", rises="velocity trough",
-            falls_counted="velocity_peaks", rounding=lambda at: 1e-10 * abs(at.v) / at.h),
+            falls_counted="velocity_peaks", uncertain=lambda at: at.error / at.h + at.rounding),
     Watched("contact", lambda at: at.sigma - at.sigma_low, falls="contact lost"),
-    Watched("motion", lambda at: abs(at.v) - at.v_low, falls="arrest", rises="restart", falls_counted="arrests"),
+    Watched("motion", lambda at: abs(at.v) - at.v_low, falls="arrest", rises="restart", falls_counted="arrests",
+            uncertain=lambda at: at.error),
 )  # fmt: skip
 """All events; the driver knows the first three by their place (`steadyslip.kernels.layout.Kind`)."""
 LOG_KINDS = ("", *(word for event in EVENTS for word in (event.falls, event.rises)), "blow-up")

@@ -70,6 +70,8 @@ class Moment:
     v_low: Any
     sigma_low: Any
     h: Any
+    error: Any = 0.0
+    rounding: Any = 0.0
 
     @property
     def tau(self) -> Any:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from steadyslip.kernels.driver.places import earlier_at, guess_at
-from steadyslip.kernels.events import COUNTED, EVENTS
+from steadyslip.kernels.events import COUNTED, EVENTS, ROUNDED
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import MOST_FAILURES, EventPlace, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, exp, larger, primitive, select, smaller, weighted
-from steadyslip.kernels.record import Evaluator, Values, total
+from steadyslip.kernels.record import Evaluator, Moment, Values, times, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
@@ -24,6 +25,7 @@ PROPORTIONAL, EARLIER = (
 )  # weights of the errors of the last two steps: without the second, steps that stability
 # limits swing about the limit, and every sixth is refused
 LITTLE = -3.0  # errors below that aimed at by this in ln e² say nothing about where errors are going
+BEGUN = 1e-3  # of the error allowed: what a run or segment begins with counts from here on
 AGAIN = math.log(0.8)  # the share after a step that was refused
 
 
@@ -42,6 +44,7 @@ class Step(Evaluator):
         self.last = self.proposed >= rest * 0.99999999
         self.h: Value = select(self.last, rest, self.proposed)
         self.new: Sequence[Value] = ()
+        self.fastest: Value = 0.0  # rate at which a variable answers to itself, 1/s; explicit steps are no longer than that
         self.steady = None if kernel.timed else self.inputs(self.tau)
 
     def advance(self) -> None:
@@ -125,6 +128,9 @@ class Step(Evaluator):
         point = beginning | {f"y{i}": value for i, value in enumerate(self.old)}
         entries = self.evaluated(kernel.jacobian, point, found=True)
         jacobian = dict(zip(sorted(kernel.pattern), entries, strict=False))
+        if kernel.choice.dense:
+            for i in range(n):
+                self.fastest = larger(abs(as_node(jacobian.get((i, i), 0.0))), self.fastest)
         in_time = entries[len(jacobian) :]
         inverse = 1.0 / h
         matrix = factorised(n, jacobian, inverse * (1 / method.gamma))
@@ -208,31 +214,48 @@ class Step(Evaluator):
         """Which functions of events changed sign; returns how many, where that is watched."""
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
         here = self.here | {f"y{i}": value for i, value in enumerate(self.new)}
-        moments = self.moments(here, self.outputs, self.h)
+        moments = [self._with_errors(moment) for moment in self.moments(here, self.outputs, self.h)]
         count = as_node(0.0)
         for e, value in enumerate(self.marks(moments)):
             event, at = EVENTS[e % len(EVENTS)], moments[e // len(EVENTS)]
             before = load(layout.mark + e)
-            small = event.rounding(at) if event.rounding is not None else 0.0
+            known, least, small = self.good, as_node(0.0), 0.0
+            if event.uncertain is not None:
+                least = event.uncertain(at)
+                small = event.uncertain(replace(at, error=BEGUN * at.error))
+                known = known & (abs(value) > least)
             change = as_node(0.0)
             if event.falls:
                 change = select((before > small) & (value <= 0.0), -1.0, change)
             if event.rises:
                 change = select((before <= -small) & (value > 0.0), 1.0, change)
-            change = select(self.good, change, 0.0)
+            change = select(known, change, 0.0)
             change = change * load(Row.WATCH)
             store(layout.happened + e, change)
             for kind, own in ((2 * e, change < 0.0), (2 * e + 1, change > 0.0)):
                 if COUNTED[kind % len(COUNTED)]:
                     place = layout.counted + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
-            store(layout.mark + e, select(self.good, value, before))
+            store(layout.mark + e, select(known, value, before))
             if e % len(EVENTS) not in tuple(EventPlace):  # its count is all there is to the tally
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)
         store(Row.HAPPENED, happened)
         return happened
+
+    def _with_errors(self, moment: Moment) -> Moment:
+        """What cannot be told of velocity and acceleration at a contact at the end of the step.
+
+        Velocity is known to the error allowed of its variable: of a logarithm a share of the velocity itself, else one
+        of the drive's too. Acceleration is rounded like velocity, times how fast the fastest variable answers.
+        """
+        one, load = self.kernel.reduction.slidings[moment.contact], self.program.load
+        size = abs(as_node(moment.v))
+        rounding = ROUNDED * size * (self.fastest + 1.0 / as_node(self.h))
+        if one.variable is None or one.variable.kind != "logarithm":
+            size = size + times(abs(load(Row.V_DRIVE)), self.shares(moment.contact)[0])
+        return replace(moment, error=self.rtol * size, rounding=rounding)
 
     def keep_state(self) -> None:
         """The new state and its rates, if the step is good."""

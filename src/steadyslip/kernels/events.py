@@ -16,7 +16,7 @@ from steadyslip.kernels.nodes import larger
 
 FASTER = 1.000001  # than the load point, beyond rounding: slipping
 ROUNDED = 64 * 2.0**-52
-"""Rounding of a sum of stresses as a share of aσ, by which friction answers velocity: stresses are some dozens of it."""
+"""Rounding of a sum of stresses as a share of aσ, by which friction answers velocity; stresses are dozens of it."""
 
 
 class Observed(Protocol):

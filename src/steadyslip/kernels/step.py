@@ -44,7 +44,7 @@ class Step(Evaluator):
         self.last = self.proposed >= rest * 0.99999999
         self.h: Value = select(self.last, rest, self.proposed)
         self.new: Sequence[Value] = ()
-        self.fastest: Value = 0.0  # rate at which a variable answers to itself, 1/s; explicit steps are no longer than that
+        self.fastest: Value = 0.0  # rate at which a variable answers to itself, 1/s; explicit steps are no longer
         self.steady = None if kernel.timed else self.inputs(self.tau)
 
     def advance(self) -> None:

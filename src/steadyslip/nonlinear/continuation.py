@@ -26,12 +26,16 @@ class Failure(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A solution on the curve, the unit tangent there, and the length of curve since the start."""
+    """A solution on the curve, the unit tangent there, and the length of curve since the start.
+
+    `rounding` is how much the last unknown, the parameter, is blurred by rounding in the equations, where that shows.
+    """
 
     u: Array
     tangent: Array
     length: float
     iterations: int
+    rounding: float = 0.0
 
 
 class Track:
@@ -46,12 +50,16 @@ class Track:
         Largest angle (cosine) between tangents of neighbouring points.
     weights : ndarray (n+1,), optional
         Of the unknowns' squares in lengths and angles; one unless given.
+    rounding : float, optional
+        Size of Newton steps that counts as converged where they no longer shrink: rounding in the equations.
     """
 
     def __init__(
-        self, equations: Equations, tolerance: float = 1e-9, most_turn: float = 0.94, weights: Array | None = None
-    ) -> None:
+        self, equations: Equations, tolerance: float = 1e-9, most_turn: float = 0.94, weights: Array | None = None,
+        rounding: float = 0.0,
+    ) -> None:  # fmt: skip
         self.equations, self.tolerance, self.most_turn = equations, tolerance, most_turn
+        self.rounding = rounding
         self.weights: Any = 1.0 if weights is None else weights
         self.bend = float(np.sqrt((1 - most_turn) / (1 + most_turn)))
         """tan of half the largest turn: how far an arc that turns by so much leaves its tangent, per length."""
@@ -87,14 +95,17 @@ class Track:
                 raise Failure("not finite")
             u = u - step
             size = float(np.max(np.abs(step) / np.maximum(1.0, np.abs(u))))
-            converged = size <= self.tolerance or (size < 10 * self.tolerance and size > 0.3 * before)
+            standing = size > 0.3 * before
+            rounded = standing and iteration > 2 and size <= self.rounding
+            converged = size <= self.tolerance or (size < 10 * self.tolerance and standing) or rounded
             if self.size(u - guess) > (reach if converged else ASIDE * reach):
                 raise Failure("the equations lead elsewhere")
             if converged:
                 along = np.zeros(len(u))
                 along[-1] = 1.0
                 direction = np.linalg.solve(matrix, along)
-                return Point(u, direction / self.size(direction), length, iteration + 1)
+                blurred = abs(float(step[-1])) if size > 10 * self.tolerance else 0.0
+                return Point(u, direction / self.size(direction), length, iteration + 1, blurred)
             if size > 2.0 * max(before, NEARLY) and iteration > 2:
                 break
             before = size

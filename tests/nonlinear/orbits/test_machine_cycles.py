@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 import steadyslip as ss
 from machines import renamed, same_block, two_mass
 
+EXAMPLES = Path(__file__).parents[1] / "examples" / "machines"
 KP, LOW = "drive.kp", 1.5
 
 
@@ -124,3 +126,61 @@ def test_tables_and_words_are_in_forces(tmp_path):
     axes = found.plot()
     assert axes.get_xlabel() == "kp (N/m)"
     assert axes.get_ylabel() == "highest and lowest velocity at guide (m/s)"
+
+
+def carriages(left, velocity):
+    """Two carriages on a plate that the drive moves; springs hold the left one to the ground."""
+    return ss.Machine(
+        bodies={"left": ss.SlidingBody(mass=1.0), "right": ss.SlidingBody(mass=2.0)},
+        links={
+            "ground": ss.Spring(between=("ground", "left"), stiffness=3e3, damping=1.0),
+            "bar": ss.Spring(between=("left", "right"), stiffness=2e3),
+        },
+        contacts={
+            "one": ss.Surface(body="drive", against="left", friction=left, contact=ss.Constant(preload=10.0)),
+            "two": ss.Surface(
+                body="drive", against="right", contact=ss.Constant(preload=20.0),
+                friction=ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.5, v_stribeck=5e-3),
+            ),
+        },
+        drive=ss.Pull(velocity=velocity),
+    )  # fmt: skip
+
+
+def test_small_cycles_are_found_beside_forces_that_are_far_larger_than_theirs():
+    """Friction of 15 N, of which a cycle changes some micronewtons: rounding of the sum is much of that."""
+    bristles = ss.LuGre(
+        mu_coulomb=0.3, mu_static=0.5, v_stribeck=5e-3, bristle_stiffness=1e4, bristle_damping=20, stribeck_exponent=1
+    )
+    machine = carriages(bristles, 4e-3)
+    edge = ss.hopf(machine, "drive.velocity").value
+    found = ss.cycles(machine, "drive.velocity", between=(0.999 * edge, 1.00002 * edge), doublings=0)
+    assert found.onset.kind == "supercritical"
+    assert found.end.startswith("end of the range")
+    assert not found.special
+    assert all(one.stable for one in found.cycles)
+    for one in found.cycles:
+        assert one.amplitude == pytest.approx(float(found.onset.velocity_amplitude(one.value)), rel=0.15)
+
+
+def test_a_frame_that_rings_ten_thousand_times_a_cycle_does_not_lead_its_steps():
+    """The side blocks' frames have no dashpots, and hardly move in the cycle; its equations would ring with them."""
+    example = ss.read_rig(EXAMPLES / "two-surfaces.toml")
+    machine = example.with_values({f"links.{side}-frame.damping": 0.0 for side in ("left", "right")})
+    onset = ss.hopf(machine, "links.ram.stiffness")
+    found = ss.cycles(machine, "links.ram.stiffness", between=(0.999 * onset.value, 1.001 * onset.value), most_points=3)
+    assert len(found) == 3
+    assert all(one.stable for one in found.cycles)
+    assert found.cycles[0].period == pytest.approx(2 * np.pi / onset.angular_frequency, rel=1e-5)
+
+
+@pytest.mark.campaign
+def test_a_table_that_turns_round_in_its_cycle_is_followed_through_its_ringing():
+    """Beside the table that sticks the motor rings, and slip begins, or only just does, at any of its swings."""
+    axis = ss.read_rig(EXAMPLES / "feed-axis.toml")
+    found = ss.cycles(axis, "drive.kp", between=(0.038, 1.0), doublings=0)
+    assert found.end.startswith("end of the range")
+    assert [one.kind for one in found.special] == ["fold", "fold", "period doubling", "period doubling"]
+    late = [one for one in found.cycles if one.peak_velocity > 1e-3]
+    assert (np.diff([one.value for one in late]) < 0).all()
+    assert (np.diff([one.peak_velocity for one in late]) > 0).all()

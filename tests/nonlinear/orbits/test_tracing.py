@@ -83,7 +83,7 @@ def test_multipliers_are_not_read_where_the_parameter_stands_still(damped):
     def known(value, multiplier):
         cycle = replace(damped.cycles[-1], value=value, multipliers=(multiplier, 0.01))
         shooting = SimpleNamespace(flow=SimpleNamespace(size=3), multipliers=read)
-        return Known(Point(np.zeros(2), np.ones(2), 0.0, 1), shooting, cycle, np.zeros(2))
+        return Known(Point(np.zeros(2), np.ones(2), 0.0, 1), shooting, cycle, np.zeros(2), np.zeros(2))
 
     changes(known(1.0, -0.9), known(1.0 + 1e-13, -1.1), None, 1)
     assert not looked

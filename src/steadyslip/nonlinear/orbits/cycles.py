@@ -24,7 +24,7 @@ from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, Sheet, Tracer
 
 Array = np.ndarray
 SMALLEST = 1e-12  # amplitude that differs from none by more than rounding
-LARGER = (1e-4, 1e-3, 1e-2)  # amplitudes to begin with where smaller cycles cannot be followed
+LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes to begin with where smaller cycles cannot be followed
 
 
 @checked(

@@ -41,6 +41,7 @@ NEVER = np.empty(0)
 STIFF = "rodas5p"  # of the Rosenbrock methods the one of order 5: tolerances are tight
 MOST_STEPS = 100_000  # of one run, some tenths of a second; and where runs have been shorter,
 FAR_MORE, FEW_STEPS = 20, 5_000  # so many times those of the last that succeeded, but no fewer than these
+UNHEARD = 1e12  # by which errors allowed of sensitivities grow where they have no say in the steps
 NEIGHBOURHOOD = 0.05  # relative change of the parameter within which tolerances are kept
 KINDS_EACH = len(LOG_KINDS) - 2  # numbers of kinds of events at a contact
 DIFFERENCE = 1e-5  # change of the parameter, per unit, from which the constants' rates of change are found
@@ -130,6 +131,10 @@ class Runs:
         Natural time, s.
     steps : int
         Taken so far, with sensitivities.
+    rounding : float
+        Size of the error that rounding of forces makes in a state, in natural sizes, where it is known.
+    led : bool
+        Whether the motion alone leads the steps, whatever the errors of sensitivities.
 
     Raises
     ------
@@ -145,17 +150,18 @@ class Runs:
             raise NotAvailable("a rig whose normal stress is prescribed in time has no cycles of its own")
         self.reduction, self.size, self.contact = jobs.reduction, len(jobs.reduction.state), contact
         method = automatic_method(self.reduction)
-        stiff = method != "tsit5"
-        method = STIFF if stiff else method
-        self.options = Options(rtol=rtol or (1e-9 if stiff else 1e-10), most_steps=MOST_STEPS)
+        self.stiff = method != "tsit5"
+        method = STIFF if self.stiff else method
+        self.options = Options(rtol=rtol or (1e-9 if self.stiff else 1e-10), most_steps=MOST_STEPS)
         self.base, self.which = replace(jobs, options=self.options), which
-        self.noise = 1e-13 if stiff else 1e-16
+        self.noise = 1e-13 if self.stiff else 1e-16
         self.finest = self.noise / self.options.rtol
         self.machine = runner(
             self.reduction.model, Choice(method), jobs.eliminate, jobs.targets.pushes, jobs.targets.presses
         )
         self.sensitive = _with_sensitivities(self.reduction, method)
-        self.steps, self._usual = 0, MOST_STEPS
+        self.steps, self._usual, self.led = 0, MOST_STEPS, False
+        self.rounding = 0.0
         self._near: tuple[float, Array] = (0.0, np.empty((0, 0)))
         own = jobs.point.part(slice(which, which + 1))
         inputs = jobs.segments.value[which if len(jobs.segments.value) > 1 else 0, 0]
@@ -229,11 +235,28 @@ class Runs:
         """
         count, n = len(states), self.size
         initial = np.hstack([self._continuous(setting, states), self._unit(count)])
-        settings = self._finer(setting.varied[1], amplitude)
-        settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, FAR_MORE * self._usual))
-        final = self._advanced(setting, settings, initial, times)
+        try:
+            final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
+        except FlowFailure as failure:
+            if failure.status != "too many steps" or not self.stiff or self.led:
+                raise
+            self.led = True
+            final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return final[:, :n], matrix, final[:, n + n * n :]
+
+    def _sensitive_settings(self, setting: FlowSetting, amplitude: float) -> Array:
+        """Settings of the kernel with sensitivities.
+
+        Where the motion leads the steps, sensitivities follow with whatever error: frames that ring fast, little
+        damped and at rest in the motion itself, are in them with all their cycles. Rosenbrock methods damp what they
+        step over, and what is left is the derivative of the steps that are taken.
+        """
+        settings, n, behind = self._finer(setting.varied[1], amplitude), self.size, self.tolerances.stop
+        settings[:, SETTINGS.index("most_steps")] = min(MOST_STEPS, max(FEW_STEPS, FAR_MORE * self._usual))
+        if self.led:
+            settings[:, behind : behind + n * n + n] *= UNHEARD
+        return settings
 
     def _unit(self, count: int) -> Array:
         """S and D where a run starts."""
@@ -382,6 +405,20 @@ class Flow(Runs):
         jobs = prepare(rig, None, 1.0, {name: np.array([own])}, {}, Options(), branch)
         names = [one.name for one in jobs.point.model.contacts]
         super().__init__(jobs, rtol=rtol, contact=names.index(contact) if contact else 0)
+        self.rounding = self._rounding(own)
+
+    def _rounding(self, value: float) -> float:
+        """Size of the error that rounding of forces makes in a state, in natural sizes: in steady sliding at a value.
+
+        Forces are rounded as sums of far larger ones that balance; the state settles where what is left is zero.
+        """
+        steady = self.steady(value)
+        _, jacobian, _ = self.field(self.setting(value), steady[None])
+        rates = np.abs(jacobian[0]) @ np.abs(steady) * np.finfo(float).eps
+        try:
+            return float(np.max(np.abs(np.linalg.inv(jacobian[0])) @ rates / self.scales))
+        except np.linalg.LinAlgError:
+            return 0.0
 
     def setting(self, value: float) -> FlowSetting:
         """The rig with the free parameter at a value.
@@ -447,6 +484,18 @@ class Flow(Runs):
     def _share(self) -> float:
         """Slip rate at the contact that is watched over the velocity of the load point."""
         return self.own.speed / float(self.own.inputs[0])
+
+
+def states_between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
+    """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
+    time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
+    i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    h = (time[i + 1] - time[i])[:, None]
+    s = (at - time[i])[:, None] / h
+    rates = runs.field(setting, states[np.append(i, i + 1)])[0]
+    first, last = rates[: len(i)] * h, rates[len(i) :] * h
+    value = states[i] * (1 + 2 * s) * (1 - s) ** 2 + states[i + 1] * s**2 * (3 - 2 * s)
+    return np.asarray(value + first * s * (1 - s) ** 2 - last * s**2 * (1 - s))
 
 
 def _rows(inputs: Array, times: Array) -> Array:

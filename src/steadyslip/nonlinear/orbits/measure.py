@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from steadyslip.kernels.layout import Recorded, Sampled
+from steadyslip.motion.engine import Outcome
 from steadyslip.nonlinear.orbits.cycle import Cycle, CycleRange
-from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs
-from steadyslip.nonlinear.orbits.shooting import Shooting
+from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, states_between
+from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
 Array = np.ndarray
 PRIMES = np.array([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31])
+STEEPER = 3.0  # so many times as steep, another passage is the better beginning
 SAME = 1e-4  # distance, as a share of the cycle's size, within which a state has come back
 
 
@@ -50,11 +52,19 @@ class Measured:
         is back after so small a part of the period. 1 for a true cycle.
     half : ndarray (n,)
         How far the state is from the start after half the period, in natural sizes.
+    extent : ndarray (n,)
+        Range that each state variable goes through.
+    begin : Orbit or None
+        The same cycle, roughly, from where slip passes the load point's velocity most steeply: where that is much
+        steeper than where it begins. Where slip only just reaches that velocity, a cycle has no such beginning a little
+        further along its branch.
     """
 
     cycle: Cycle
     turns: int
     half: Array
+    extent: Array
+    begin: Orbit | None = None
 
 
 def measured(shooting: Shooting, u: Array) -> Measured:
@@ -71,11 +81,13 @@ def measured(shooting: Shooting, u: Array) -> Measured:
     starts = orbit.period * (np.cumsum(shooting.fractions) - shooting.fractions)
     parts = orbit.period / PRIMES[::-1]
     passed: list[list[tuple[Array, Array, Array]]] = []
-    back = []
+    back, visited, beginning = [], [], _Begin(shooting, orbit)
     for state, begin, share in zip(orbit.states, starts, shooting.fractions, strict=True):
         span = share * orbit.period
         times = parts[(parts >= begin) & (parts < begin + span)] - begin
         outcome = flow.watched(setting, state, span, shooting.amplitude, times)
+        beginning.look(outcome)
+        visited.append(outcome.recorded[:, Recorded.STATE : Recorded.STATE + flow.size])
         passed.append(flow.at_contacts(setting, outcome))
         back.append(outcome.samples[0, :, Sampled.STATE : Sampled.STATE + flow.size])
         if len(passed) == 1:
@@ -107,4 +119,30 @@ def measured(shooting: Shooting, u: Array) -> Measured:
         contacts=dict(zip(names, ranges, strict=True)) if names[0] else {},
         _orbit=orbit,
     )
-    return Measured(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0])
+    extent = np.asarray(np.ptp(np.vstack(visited), axis=0))
+    return Measured(cycle, int(PRIMES[same[0]]) if len(same) else 1, away[0], extent, beginning.orbit)
+
+
+class _Begin:
+    """Where a cycle passes the load point's velocity most steeply, if that is much steeper than where it begins."""
+
+    def __init__(self, shooting: Shooting, orbit: Orbit) -> None:
+        self.flow, self.now = shooting.flow, orbit
+        self.orbit: Orbit | None = None
+        self.setting = self.flow.setting(orbit.value)
+        rates, jacobian, _ = self.flow.field(self.setting, orbit.states[:1])
+        self.steepest = STEEPER * float(self.setting.slip @ jacobian[0] @ rates[0])
+
+    def look(self, outcome: Outcome) -> None:
+        """Passages in a part of it that was run through."""
+        flow, record = self.flow, outcome.recorded
+        times, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + flow.size]
+        ahead = flow.field(self.setting, states)[0] @ self.setting.slip
+        passes = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] > 0) & (np.diff(times) > 0))
+        slopes = np.diff(ahead)[passes] / np.diff(times)[passes]
+        if len(slopes) and slopes.max() > self.steepest:
+            i = int(passes[np.argmax(slopes)])
+            self.steepest = float(slopes.max())
+            at = times[i] - ahead[i] * (times[i + 1] - times[i]) / (ahead[i + 1] - ahead[i])
+            state = states_between(flow, self.setting, record, np.array([at]))
+            self.orbit = Orbit(state, self.now.period, self.now.value, ONE, self.now.scales)

@@ -10,14 +10,13 @@ import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure, turned_round
 from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.special import Known
+from steadyslip.nonlinear.orbits.special import Known, lies_between
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Sheet, Tracer
 from steadyslip.nonlinear.orbits.verify import cycle_near
 
 Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a sheet broke off to the end of the range
 PATIENCE = 12  # stretches of motion within which it has to come to a cycle
-MET = 2e-3  # difference of logarithms of period and velocities within which cycles are the same
 
 
 def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
@@ -99,24 +98,13 @@ def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) ->
 
 def _met(sheets: list[Sheet], known: Known) -> bool:
     """Whether a cycle lies between two neighbours that are known."""
-    return any(_between_neighbours(a.cycle, b.cycle, known.cycle) for sheet in sheets for a, b in pairwise(sheet.known))
-
-
-def _between_neighbours(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
-    def looks(one: Cycle) -> Array:
-        return np.array([np.log(one.period), np.log(one.peak_velocity), np.arcsinh(one.lowest_velocity / one.speed)])
-
-    if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
-        return False
-    share = (cycle.value - a.value) / (b.value - a.value) if b.value != a.value else 0.5
-    spread = MET + 0.3 * np.abs(looks(b) - looks(a)).max() ** 2
-    return bool(np.abs(looks(a) * (1 - share) + looks(b) * share - looks(cycle)).max() < spread)
+    return any(lies_between(a.cycle, b.cycle, known.cycle) for sheet in sheets for a, b in pairwise(sheet.known))
 
 
 def _cut_back(sheet: Sheet, meeting: Cycle) -> None:
     """Leave out what lies behind the place at which another sheet met this one."""
     for i in range(len(sheet.known) - 1):
-        if _between_neighbours(sheet.known[i].cycle, sheet.known[i + 1].cycle, meeting):
+        if lies_between(sheet.known[i].cycle, sheet.known[i + 1].cycle, meeting):
             del sheet.known[i + 1 :]
             sheet.special = [point for point in sheet.special if point.index <= i]
             return

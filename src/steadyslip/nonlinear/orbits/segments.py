@@ -39,7 +39,8 @@ def cut(shooting: Shooting, u: Array) -> Orbit | None:
     at = _cuts(steps)
     if len(at) <= shooting.segments:
         return None
-    return Orbit(states[at], orbit.period, orbit.value, np.diff(np.append(times[at], orbit.period)) / orbit.period)
+    fractions = np.diff(np.append(times[at], orbit.period)) / orbit.period
+    return Orbit(states[at], orbit.period, orbit.value, fractions, orbit.scales)
 
 
 def _nodes(shooting: Shooting, orbit: Orbit) -> tuple[Array, Array]:

@@ -18,16 +18,22 @@ from steadyslip.nonlinear.orbits.flow import Runs
 
 Array = np.ndarray
 ONE = np.ones(1)
+ROUNDED = 300.0  # so many times the rounding of a state, Newton's method may step where it is at its end,
+KNOWN = 1e-3  # but no farther than this share of a cycle's size
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit(ReadOnly):
-    """A cycle: states at the starts of its segments (K, n), period, parameter, shares of the period (K,)."""
+    """A cycle: states at the starts of its segments (K, n), period, parameter, shares of the period (K,).
+
+    `scales` (n,) are the sizes that its states were measured by; natural ones where there are none.
+    """
 
     states: Array
     period: float
     value: float
     fractions: Array = field(default_factory=lambda: np.ones(1))
+    scales: Array | None = None
 
 
 class Shooting:
@@ -42,10 +48,15 @@ class Shooting:
         Whether the parameter is positive and its logarithm the unknown.
     size : float
         Unit of the parameter otherwise.
+    scales : ndarray (n,), optional
+        Sizes of state variables beyond which unknowns count in logarithms; natural ones unless given.
     """
 
-    def __init__(self, flow: Runs, fractions: Array, logarithmic: bool, size: float) -> None:
+    def __init__(
+        self, flow: Runs, fractions: Array, logarithmic: bool, size: float, scales: Array | None = None
+    ) -> None:  # fmt: skip
         self.flow, self.fractions = flow, fractions
+        self.scales = flow.scales if scales is None else scales
         self.logarithmic, self.size = logarithmic, size
         self.amplitude = 1.0
         self._last: tuple[bytes, Array, Array] | None = None
@@ -57,7 +68,9 @@ class Shooting:
         """
         weights = np.ones(self.segments * self.flow.size + 2)
         weights[self.flow.size : -2] = 0.0
-        return Track(self.equations, max(1e-9, 100 * self.flow.noise / self.amplitude), most_turn=0.8, weights=weights)
+        tolerance = max(1e-9, 100 * self.flow.noise / self.amplitude)
+        rounding = min(ROUNDED * self.flow.rounding, KNOWN * self.amplitude)
+        return Track(self.equations, tolerance, most_turn=0.8, weights=weights, rounding=rounding)
 
     @property
     def segments(self) -> int:
@@ -67,14 +80,14 @@ class Shooting:
         """Unknowns of an orbit."""
         value = np.log(orbit.value / self.size) if self.logarithmic else orbit.value / self.size
         return np.append(
-            np.arcsinh(orbit.states / self.flow.scales).ravel(), [np.log(orbit.period / self.flow.time), value]
+            np.arcsinh(orbit.states / self.scales).ravel(), [np.log(orbit.period / self.flow.time), value]
         )
 
     def orbit(self, u: Array) -> Orbit:
         """The orbit of some unknowns."""
-        states = np.sinh(u[:-2].reshape(self.segments, self.flow.size)) * self.flow.scales
+        states = np.sinh(u[:-2].reshape(self.segments, self.flow.size)) * self.scales
         value = self.size * (np.exp(u[-1]) if self.logarithmic else u[-1])
-        return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value), self.fractions)
+        return Orbit(states, float(self.flow.time * np.exp(u[-2])), float(value), self.fractions, self.scales)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian; see `continuation.Equations`."""
@@ -110,7 +123,7 @@ class Shooting:
 
     def _stretch(self, orbit: Orbit) -> Array:
         """d(state)/d(unknown)."""
-        return np.asarray(np.hypot(self.flow.scales, orbit.states))
+        return np.asarray(np.hypot(self.scales, orbit.states))
 
     def multipliers(self, u: Array) -> tuple[float, Array]:
         """The trivial Floquet multiplier and the others, see `multipliers`."""

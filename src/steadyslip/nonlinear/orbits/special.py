@@ -9,11 +9,14 @@ import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure, Point
 from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
-from steadyslip.nonlinear.orbits.shooting import Shooting
+from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
 NOISE = 3e-9  # relative differences of the parameter that cannot be told from rounding near the onset
+MET = 2e-3  # difference of logarithms of period and velocities within which cycles are the same
+BLURRED = 10.0  # so many times what a last step of Newton's method was
 ROUNDING = 1e-11  # such differences that are rounding anywhere
+FOLDED = 0.9  # largest multiplier below which no fold is believed: there it is one
 SMALL = 1e-2  # amplitude below which multipliers within rounding of one are judged by the kind of onset
 
 
@@ -21,13 +24,16 @@ SMALL = 1e-2  # amplitude below which multipliers within rounding of one are jud
 class Known:
     """A point of a branch with what is derived from it.
 
-    `half` is how far the state has moved after half a period, in natural sizes: zero where that was a whole one.
+    `half` is how far the state has moved after half a period, in natural sizes: zero where that was a whole one;
+    `extent` the range that each state variable goes through; `begin` is a better beginning, where there is one.
     """
 
     point: Point
     shooting: Shooting
     cycle: Cycle
     half: Array
+    extent: Array
+    begin: Orbit | None = None
 
 
 Made = Callable[[Shooting, Point], Known]
@@ -73,7 +79,10 @@ def _located(
     other = shooting.orbit(low.u).value
     size = abs(cycle.value) or 1.0
     away = [abs(known.cycle.value - cycle.value) / size for known in (before, now)]
-    if kind == "fold" and (min(away) < NOISE or cycle.amplitude < SMALL):
+    blurred = max(NOISE, *(BLURRED * known.point.rounding for known in (before, now)))
+    if kind == "fold" and cycle.growth < FOLDED:  # the beginning of the cycle turns round, not the branch
+        return None
+    if kind == "fold" and (min(away) < blurred or cycle.amplitude < SMALL):
         return None
     precision = max(abs(other - cycle.value) / size, abs(cycle.trivial - 1) * max(away), 1e-12)
     beside = (before.cycle.value, now.cycle.value) if kind == "fold" else (other, cycle.value)
@@ -92,3 +101,16 @@ def torus(multipliers: Array) -> float:
     """
     pairs = multipliers[np.abs(multipliers.imag) > 1e-3 * np.abs(multipliers)]
     return float(np.max(np.abs(pairs) - 1, initial=-1.0))
+
+
+def lies_between(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
+    """Whether a cycle is one of those between two neighbours."""
+
+    def looks(one: Cycle) -> Array:
+        return np.array([np.log(one.period), np.log(one.peak_velocity), np.arcsinh(one.lowest_velocity / one.speed)])
+
+    if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
+        return False
+    share = (cycle.value - a.value) / (b.value - a.value) if b.value != a.value else 0.5
+    spread = MET + 0.3 * np.abs(looks(b) - looks(a)).max() ** 2
+    return bool(np.abs(looks(a) * (1 - share) + looks(b) * share - looks(cycle)).max() < spread)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
-from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes
+from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes, lies_between
 from steadyslip.nonlinear.orbits.verify import IMPRECISE
 
 Array = np.ndarray
@@ -26,11 +27,16 @@ LARGEST_STEP = 0.5
 SMALLEST_STEP = 1e-9
 WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
 CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
+SLOW_STEPS, SLOW, FASTER_AGAIN = 8, 0.2, 3.0  # so many steps below this share of the largest, and not growing, are slow
+OF_RANGE = 3.0  # in what a state variable goes through: its measure then
 STANDING = 12  # so many cycles within a twentieth of each other, at one value but for rounding, are no progress
+RETRACED = 4  # so many cycles in a row between neighbours that are known are the way back
 UNRESOLVED = 1e-7  # distance of a small cycle's multiplier from one that says nothing
 TOO_UNSTABLE = 1e8
 MOST_STEPS = 4_000_000  # of integration for all sheets of a question: some seconds
 LOST = 1e-5  # error of the trivial multiplier beyond which others are not believed, if more segments can mend it
+HIDDEN = 0.1  # share of a small cycle's distance from the edge that rounding may be
+SHRUNK = 0.5  # amplitude of ln v below which a cycle may be about to end in steady sliding
 LARGE = 1e6  # peak velocity, in units of the drive, of a cycle that is about to grow without bound
 INTERRUPTED = "interrupted by the user"
 ENDS = {
@@ -50,6 +56,7 @@ ENDS = {
     "winds": "folds close in on one value of the parameter while the period grows (a connection of a steady state with "
     "itself, through ever longer spirals)",
     "stands": "the parameter stands still in its last digits while the cycles hardly change, as in a canard",
+    "retraces": "rounding turns it back onto itself",
     "runs away": "the period runs away while the parameter stands still (a connection to another steady state)",
 }
 
@@ -105,8 +112,8 @@ class Tracer:
         self.unit_of_value = abs(onset.value) or 1.0
         self.count, self.interrupted = 0, False
 
-    def shooting(self, fractions: Array = ONE, amplitude: float = 1.0) -> Shooting:
-        made = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value)
+    def shooting(self, fractions: Array = ONE, amplitude: float = 1.0, scales: Array | None = None) -> Shooting:
+        made = Shooting(self.flow, fractions, self.logarithmic, self.unit_of_value, scales)
         made.amplitude = amplitude
         return made
 
@@ -117,7 +124,13 @@ class Tracer:
     # -- where a sheet starts
 
     def small(self, amplitude: float) -> tuple[Shooting, Point]:
-        """The cycle of a given small amplitude of ln v, from the critical eigenvector."""
+        """The cycle of a given small amplitude of ln v, from the critical eigenvector.
+
+        Raises
+        ------
+        Failure
+            If there is none, or rounding hides how far from the edge it is.
+        """
         flow, onset = self.flow, self.onset
         setting = flow.setting(onset.value)
         steady = flow.steady(onset.value)
@@ -132,7 +145,11 @@ class Tracer:
         shooting = self.shooting(amplitude=amplitude)
         guess = Orbit((steady + amplitude * start)[None], 2 * np.pi / onset.angular_frequency, onset.value)
         tangent = np.append(start / np.hypot(flow.scales, steady), [0.0, 0.0])
-        return shooting, shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent))
+        first = shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent))
+        away = abs(onset.coefficient / onset.growth_slope) * amplitude**2 / self.unit_of_value
+        if onset.kind != "degenerate" and first.rounding > HIDDEN * away:
+            raise Failure("its distance from the edge is lost in rounding")
+        return shooting, first
 
     def doubled(self, cycle: Cycle) -> tuple[Shooting, Point, float]:
         """The first cycle of twice the period, along the eigenvector of the multiplier −1, and its distance."""
@@ -147,10 +164,10 @@ class Tracer:
         rates, jacobian, _ = flow.field(setting, state[None])
         gradient, along = setting.slip @ jacobian[0] * flow.scales, rates[0] / flow.scales
         vector = vector - along * (gradient @ vector) / (gradient @ along)  # stay where v equals the drive
-        vector /= np.linalg.norm(vector)
-        shooting, size = self.shooting(), 1e-3
+        shooting, size = self.shooting(scales=orbit.scales), 1e-3
+        vector /= np.linalg.norm(vector * flow.scales / shooting.scales)
         guess = Orbit((state + size * vector * flow.scales)[None], 2 * cycle.period, cycle.value)
-        tangent = np.append(vector * flow.scales / np.hypot(flow.scales, state), [0.0, 0.0])
+        tangent = np.append(vector * flow.scales / np.hypot(shooting.scales, state), [0.0, 0.0])
         return shooting, shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent)), size
 
     def resumed(self, orbit: Orbit, amplitude: float, direction: Array | None = None, length: float = 0.0) -> Known:
@@ -161,7 +178,7 @@ class Tracer:
         Failure
             If the orbit is not one.
         """
-        shooting = self.shooting(orbit.fractions, amplitude)
+        shooting = self.shooting(orbit.fractions, amplitude, orbit.scales)
         u = shooting.packed(orbit)
         _, jacobian = shooting.equations(u)
         tangent = np.linalg.svd(jacobian)[2][-1]
@@ -202,6 +219,10 @@ class Tracer:
                     self._add(sheet, here)
                 if not sheet.end and _winds(sheet.special):
                     sheet.end = ENDS["winds"]
+                if not sheet.end and _retraces([known.cycle for known in sheet.known]):
+                    sheet.end = ENDS["retraces"]
+                    del sheet.known[-RETRACED:]
+                    sheet.special = [one for one in sheet.special if one.index <= len(sheet.known)]
                 if not sheet.end and _stands([known.cycle for known in sheet.known[-STANDING:]]):
                     sheet.end = ENDS["stands"]
                 if sheet.end:
@@ -213,7 +234,7 @@ class Tracer:
                     sheet.end = f"{MOST_STEPS / 1e6:g} million steps of integration taken, all that are spent "
                     sheet.end += "on one question; ask for the rest with between=(low, high)"
                     break
-            lost = {ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
+            lost = {ENDS["retraces"], ENDS["growth"], ENDS["runs away"], ENDS["winds"], ENDS["stands"]}
             lost |= set() if sheet.known[-1].cycle.stable else {ENDS["precision"]}
             sheet.whole = sheet.end not in lost
         except KeyboardInterrupt:
@@ -235,9 +256,11 @@ class Tracer:
         """Each point with the one before it, in the same unknowns.
 
         Cycles are cut into segments anew where they are too unstable, where deviations grow and shrink again so much
-        within a segment that the trivial multiplier is lost, or where they cannot be followed any further.
+        within a segment that the trivial multiplier is lost, or where they cannot be followed any further. Where steps
+        stay small, states are measured by what they go through in a cycle (see `_rescaled`).
         """
         limit, error, again, idle = MOST_GROWTH, LOST, True, 0
+        steps: list[float] = []
         while True:
             made: dict[int, Known] = {}
             curve = self._curve(here)
@@ -255,6 +278,14 @@ class Tracer:
                     before, here, step, again = here, made[0], taken, True
                     curve.tolerance = self._curve(here).tolerance
                     yield before, here
+                    finer = self._begun_anew(here)
+                    if finer is not None:
+                        break
+                    steps = [*steps[1 - SLOW_STEPS :], taken]
+                    if len(steps) == SLOW_STEPS and max(steps) < min(SLOW * LARGEST_STEP, FASTER_AGAIN * steps[0]):
+                        steps, finer = [], self._rescaled(here)
+                        if finer is not None:
+                            break
                     unstable = here.cycle.growth > limit**here.shooting.segments
                     lost = abs(here.cycle.trivial - 1) > error
                     if unstable or lost:
@@ -269,6 +300,35 @@ class Tracer:
                 step, again = max(step, 1e-2 * LARGEST_STEP), False
             if finer is not None:
                 here = finer
+
+    def _rescaled(self, known: Known) -> Known | None:
+        """The same point, its states measured by what they go through in the cycle; None if that changes little.
+
+        Beside a body that sticks another may ring on and be anywhere in its small oscillation when slip begins, by
+        turns ahead and behind as the parameter changes. Measured by natural sizes that makes the branch wriggle.
+        """
+        shooting, count = known.shooting, self.flow.size
+        scales = np.maximum(self.flow.scales, OF_RANGE * known.extent)
+        changed = scales / shooting.scales
+        if not np.any((changed > 2) | (changed < 0.5)):
+            return None
+        orbit = replace(shooting.orbit(known.point.u), scales=scales)
+        state, tangent = orbit.states[0], known.point.tangent
+        moved = tangent[:count] * np.hypot(shooting.scales, state) / np.hypot(scales, state)
+        try:
+            return self.resumed(orbit, shooting.amplitude, np.append(moved, tangent[-2:]), known.point.length)
+        except (Failure, np.linalg.LinAlgError):
+            return None
+
+    def _begun_anew(self, known: Known) -> Known | None:
+        """The same cycle, begun where slip passes the load point's velocity more steeply; None if nowhere."""
+        if known.begin is None:
+            return None
+        direction = np.append(np.zeros(self.flow.size), known.point.tangent[-2:])
+        try:
+            return self.resumed(known.begin, known.shooting.amplitude, direction, known.point.length)
+        except (Failure, np.linalg.LinAlgError):
+            return None
 
     def _curve(self, known: Known) -> Track:
         curve = known.shooting.curve()
@@ -301,7 +361,7 @@ class Tracer:
         if found.turns > 1:
             raise Failure(f"a shorter cycle, run through {found.turns} times")
         cycle = replace(found.cycle, stable=self._attracts(found.cycle))
-        return Known(point, shooting, cycle, found.half)
+        return Known(point, shooting, cycle, found.half, found.extent, found.begin)
 
     def _attracts(self, cycle: Cycle) -> bool:
         """Whether all multipliers lie inside the unit circle; by the kind of onset where that is too close to tell."""
@@ -322,7 +382,7 @@ class Tracer:
                 low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area_of(self.onset.along)
             )
             return f"end of the range, {end}", True
-        if self._slows(now):
+        if cycle.amplitude < SHRUNK and self._slows(now):
             return ENDS["steady"], False
         if twice and before.half @ now.half < -0.5 * np.linalg.norm(before.half) * np.linalg.norm(now.half):
             return ENDS["doubling"], False
@@ -412,6 +472,14 @@ def _winds(special: list[SpecialCycle]) -> bool:
         return False
     apart = np.abs(np.diff([cycle.value for cycle in folds]))
     return bool(np.all(apart[1:] < 0.8 * apart[:-1]) and np.all(np.diff([cycle.period for cycle in folds]) > 0))
+
+
+def _retraces(known: list[Cycle]) -> bool:
+    """Whether the last cycles lie between neighbours that were passed before."""
+    last, passed = known[-RETRACED:], known[: -2 * RETRACED]
+    if len(passed) < 2 or (known[-1].value - known[-2].value) * (known[-2].value - known[-3].value) < 0:
+        return False
+    return all(any(lies_between(a, b, one) for a, b in pairwise(passed)) for one in last)
 
 
 def _stands(last: list[Cycle]) -> bool:

@@ -70,7 +70,7 @@ def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
         raise InternalError("start._orbit is not None")
     if end._orbit is None:
         raise InternalError("end._orbit is not None")
-    first = tracer.shooting()
+    first = tracer.shooting(scales=start._orbit.scales)
     ends = [first.packed(replace(c._orbit, states=c._orbit.states[:1])) for c in (start, end) if c._orbit is not None]
     here = tracer.resumed(start._orbit, min(1.0, start.amplitude), ends[1] - ends[0])
     curve = here.shooting.curve()

@@ -17,7 +17,7 @@ from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs
+from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs, states_between
 from steadyslip.nonlinear.orbits.measure import amplitude, measured
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
@@ -97,7 +97,7 @@ def _stretches(
             visited = record[:, Recorded.STATE : Recorded.STATE + runs.size]
             at = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0), 1]
             times += list(now + at)
-            states += list(_between(runs, setting, record, at))
+            states += list(states_between(runs, setting, record, at))
             low.append(np.arcsinh(visited.min(axis=0) / runs.scales))
             high.append(np.arcsinh(visited.max(axis=0) / runs.scales))
             if np.max(high[-1] - low[-1]) < SMALLEST:
@@ -110,18 +110,6 @@ def _stretches(
             return
         extent = float(np.max(np.max(high, axis=0) - np.min(low, axis=0)))
         yield _Stretch(np.array(times), np.array(states), extent, amplitude(np.concatenate(speeds)))
-
-
-def _between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -> Array:
-    """States at some times between recorded steps: cubic polynomials with the rates at both ends."""
-    time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
-    i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    h = (time[i + 1] - time[i])[:, None]
-    s = (at - time[i])[:, None] / h
-    rates = runs.field(setting, states[np.append(i, i + 1)])[0]
-    first, last = rates[: len(i)] * h, rates[len(i) :] * h
-    value = states[i] * (1 + 2 * s) * (1 - s) ** 2 + states[i + 1] * s**2 * (3 - 2 * s)
-    return np.asarray(value + first * s * (1 - s) ** 2 - last * s**2 * (1 - s))
 
 
 def _candidates(runs: Runs, seen: _Stretch) -> Array:

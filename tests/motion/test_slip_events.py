@@ -13,7 +13,7 @@ from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
 
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def excursions(run):

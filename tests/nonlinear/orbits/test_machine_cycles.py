@@ -10,7 +10,7 @@ import pytest
 import steadyslip as ss
 from machines import renamed, same_block, two_mass
 
-EXAMPLES = Path(__file__).parents[1] / "examples" / "machines"
+EXAMPLES = Path(__file__).parents[3] / "examples" / "machines"
 KP, LOW = "drive.kp", 1.5
 
 

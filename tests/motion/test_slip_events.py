@@ -12,7 +12,6 @@ from steadyslip.core.domains import positive, real
 from steadyslip.kernels.layout import SLIP_EVENT
 from steadyslip.motion.jobs import Options, prepare
 
-
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 

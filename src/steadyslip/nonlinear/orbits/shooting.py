@@ -79,9 +79,7 @@ class Shooting:
     def packed(self, orbit: Orbit) -> Array:
         """Unknowns of an orbit."""
         value = np.log(orbit.value / self.size) if self.logarithmic else orbit.value / self.size
-        return np.append(
-            np.arcsinh(orbit.states / self.scales).ravel(), [np.log(orbit.period / self.flow.time), value]
-        )
+        return np.append(np.arcsinh(orbit.states / self.scales).ravel(), [np.log(orbit.period / self.flow.time), value])
 
     def orbit(self, u: Array) -> Orbit:
         """The orbit of some unknowns."""

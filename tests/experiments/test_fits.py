@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.experiments.fitting.comparison import lost
-from steadyslip.experiments.numerics.least_squares import minimise
 from steadyslip.experiments.numerics.noise import lag_one
 
 # -- truth
@@ -82,81 +81,6 @@ def test_scipy_finds_the_same_minimum():
     found = least_squares(residuals, start, jac=jacobian, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     assert 2 * found.cost == pytest.approx(fit.ssq, rel=1e-7)
     np.testing.assert_allclose(found.x, fit.coordinates, rtol=1e-5, atol=1e-5)
-
-
-def test_every_lane_solves_its_own_problem():
-    """Rosenbrock's valley from many places, with bounds and with a coordinate held."""
-
-    def valley(z, _):
-        x, y = z.T
-        r = np.stack([-10 * (y - x**2), -(1 - x)], axis=1)
-        rows = np.stack(
-            [np.stack([-20 * x, -np.ones_like(x)], 1), np.stack([np.full_like(x, 10.0), np.zeros_like(x)], 1)], 1
-        )
-        return r, rows
-
-    start = np.random.default_rng(0).uniform(-2, 2, (40, 2))
-    wide = np.full(2, -np.inf), np.full(2, np.inf)
-    free = minimise(valley, start, *wide, most=300)
-    np.testing.assert_allclose(free.coordinates, 1.0, rtol=1e-4)
-    assert np.all(free.converged)
-    bound = minimise(valley, start, np.array([-3.0, -3.0]), np.array([0.5, 3.0]), most=300)
-    np.testing.assert_allclose(bound.coordinates, np.tile([0.5, 0.25], (40, 1)), rtol=1e-4)
-    held = minimise(valley, start, *wide, held=np.tile([True, False], (40, 1)), most=300)
-    np.testing.assert_allclose(held.coordinates[:, 1], start[:, 0] ** 2, rtol=1e-5, atol=1e-7)
-
-
-def test_no_problems_have_no_minima():
-    found = minimise(lambda z, _: 1 / 0, np.empty((0, 3)), np.full(3, -1.0), np.full(3, 1.0))
-    assert found.coordinates.shape == (0, 3)
-    assert found.distinct(2)[0].shape == (0, 3)
-
-
-def test_steps_that_follow_each_other_along_one_line_are_stretched():
-    """The textbook's case of Gauss and Newton's slow way: residuals x + 1 and λx² + x − 1, each step λ of the last."""
-    pace = np.array([0.5, 0.9, 0.97])
-
-    def textbook(z, lanes):
-        x, share = z[:, 0], pace[lanes]
-        slopes = np.stack([np.ones_like(x), 2 * share * x + 1], axis=1)
-        return np.stack([x + 1, share * x**2 + x - 1], axis=1), -slopes[:, None, :]
-
-    found = minimise(textbook, np.full((3, 1), 0.1), np.array([-1.0]), np.array([1.0]), most=300)
-    assert np.all(found.converged)
-    np.testing.assert_allclose(found.ssq, 2.0, rtol=1e-8)
-    assert np.all(found.iterations < 20)  # 13, 58 and 131 one by one
-
-
-def test_starts_a_step_away_from_where_others_ended_are_there():
-    """Of linear problems, whose end one step tells: three starts agree as soon as one is there; none is run again."""
-    rows = np.random.default_rng(3).standard_normal((2, 30))
-    data, asked = np.random.default_rng(4).standard_normal(30), []
-    best = np.linalg.lstsq(rows.T, data)[0]
-    start = best + np.array([[0.0, 0.0], [0.02, -0.01], [-0.01, 0.02], [1.0, 1.0]])
-
-    def linear(z, lanes):
-        asked.append(len(z))
-        return data - z @ rows, np.broadcast_to(rows, (len(z), 2, 30))
-
-    wide = np.full(2, -9.0), np.full(2, 9.0)
-    found = minimise(linear, start, *wide, race=3)
-    assert asked == [4]
-    assert np.all(found.converged)
-    np.testing.assert_allclose(found.coordinates, np.tile(best, (4, 1)), atol=0.02)
-    assert np.all(found.ssq >= found.ssq[0])
-    minimise(linear, start, *wide, race=5)
-    assert len(asked) > 3
-
-
-def test_a_problem_that_cannot_be_computed_is_left_alone():
-    def broken(z, _):
-        r = np.where(z[:, :1] > 0, z - 1.0, np.nan)
-        return -r, np.ones((len(z), 1, 1))
-
-    found = minimise(broken, np.array([[3.0], [-3.0]]), np.array([-9.0]), np.array([9.0]))
-    assert found.coordinates[0, 0] == pytest.approx(1.0)
-    assert found.ssq[1] == np.inf
-    assert not found.converged[1]
 
 
 # -- options
@@ -363,77 +287,6 @@ def test_criteria_prefer_the_law_that_made_the_record():
         ss.compare({"one": found.fits["slip"], "two": other})
     with pytest.raises(ss.ParameterError, match="two states"):
         ss.compare_laws(ss.lab_rig(), record, ("slips",))
-
-
-# -- to the question
-
-
-def test_predictions_carry_the_uncertainty():
-    """Against the linear propagation of theory: k_cr = σ(b − a)/d_c."""
-    fit = lab.stepped()
-    kcr = (fit.values["friction.b"] - fit.values["friction.a"]) * lab.STRESS / fit.values["friction.d_c"]
-    rig = lab.rig().with_values({"slider.stiffness": kcr, "friction.v_ref": lab.SLOW})
-    found = ss.predict(rig, fit)
-    assert found.probability_stable == pytest.approx(0.5, abs=0.06)
-    low, _, middle, _, high = found.quantiles(found.critical_stiffness)
-    assert middle == pytest.approx(kcr, rel=0.005)
-    gradient = np.array([{"friction.a": -fit.values["friction.a"], "friction.b": 0.01}.get(n, 0.0) for n in fit.names])
-    gradient /= fit.values["friction.b"] - fit.values["friction.a"]
-    gradient[fit.index("d_c")] = -1.0
-    relative = np.sqrt(gradient @ fit.covariance @ gradient)
-    assert (high - low) / kcr == pytest.approx(2 * 1.96 * relative, rel=0.1)
-    assert found.dominant in found.shares
-    assert "Not decided by the records" in str(found)
-    stiff = ss.predict(rig.with_values({"slider.stiffness": 3 * kcr}), fit)
-    assert stiff.probability_stable == 1
-    assert str(stiff).startswith("Stable")
-    assert stiff.to_dict()["safety"][2] == pytest.approx(3, rel=0.01)
-
-
-@pytest.mark.slow
-def test_kick_thresholds_are_predicted():
-    fit = lab.stepped()
-    found = ss.predict(lab.rig(), ss.bootstrap(fit, 8), kick="velocity")
-    single = ss.threshold(found.rig, "velocity").size
-    _, _, middle, _, _ = np.quantile(found.thresholds["velocity"], [0.025, 0.16, 0.5, 0.84, 0.975])
-    assert middle == pytest.approx(single, rel=0.1)
-
-
-def test_a_prediction_keeps_the_memory_of_normal_stress_that_the_fit_has_not():
-    rig = lab.rig(alpha=0.4)
-    found = ss.predict(replace(rig, contact=ss.InclinedSpring(preload=8e6, angle=0.2)), lab.stepped())
-    assert found.rig.value("friction.normal_memory.alpha") == 0.4
-    moved = ss.predict(rig, lab.stepped(), transfer=["slider.stiffness"])
-    assert moved.rig.stiffness == lab.stepped().values["slider.stiffness"]
-    with pytest.raises(ss.ParameterError, match="was not fitted"):
-        ss.predict(rig, lab.stepped(), transfer=["slider.mass"])
-
-
-# -- design of experiments
-
-
-def test_promised_precision_is_what_a_fit_has():
-    rig = lab.rig()
-    promise = ss.precision(rig, lab.STEP, noise=lab.NOISE, samples=1000)
-    for name, error in promise.errors.items():
-        assert error == pytest.approx(lab.stepped().errors[name], rel=0.1)
-
-
-def test_the_best_experiment_comes_first():
-    found = ss.best_protocol(lab.rig(alpha=0.4), fixed=["slider.stiffness"], samples=1500)
-    errors = [one.errors[found.parameter] for one in found.found.values()]
-    assert errors == sorted(errors)
-    assert found.best != "step"
-    assert not found.found["step and velocity step"].unidentified
-    assert found.parameter == "friction.normal_memory.alpha"
-    assert str(found).splitlines()[1].split()[0] in found.best
-
-
-def test_which_parameter_an_experiment_is_for():
-    """That which friction's law calls its share of a change of stress; where there is none, it has to be said."""
-    rig = lab.rig()
-    with pytest.raises(ss.ParameterError, match=r"parameter: missing; allowed: .*friction\.a.*\(free parameters\)"):
-        ss.best_protocol(rig, {"one": lab.STEP}, until=80.0, samples=100)
 
 
 # -- files and words

@@ -5,7 +5,6 @@ import hashlib
 import html
 import inspect
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ import lab_records as lab
 import steadyslip as ss
 from command import run
 from fuzz_rigs import DRIVES, FRICTION
+from read_pages import words
 from rigs_of_theory import CONTACTS, SIGMA, V0, rate_state, rig
 from steadyslip.core.records import FrozenRecord
 from steadyslip.explorer.sketch import sketch
@@ -23,88 +23,12 @@ from steadyslip.figures.inline import drawn
 from steadyslip.files.standalone import write_page
 from steadyslip.motion.commands import write_history
 from steadyslip.nonlinear.commands import Thresholds
-from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, rows_of, unit_of
-from steadyslip.reports.elements import math, table, typed
+from steadyslip.reports.brief import _NOT_SHOWN, OWN, PLAIN, UNITS, brief, inside, unit_of
 from steadyslip.reports.results import LISTED, _told_apart, done_to
 from steadyslip.reports.rig import inputs
 
 MACHINES = Path(__file__).parents[2] / "examples" / "machines"
-VOID = {"br", "img", "meta", "hr", "input", "link"}
 OWN_RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
-
-
-class _Balanced(HTMLParser):
-    """Complains of elements that do not nest."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.words, self.quiet = [], [], 0
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attributes):
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        if tag not in VOID:
-            assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if not {"script", "style", "pre", "svg"} & set(self.open):
-            self.words.append(data)
-
-
-def words(text):
-    """What a reader sees, elements checked on the way."""
-    return re.sub(r"\s+", " ", " ".join(_Balanced(text.replace("<wbr>", "")).words))
-
-
-# -- set as in print
-
-
-@pytest.mark.parametrize(
-    ("text", "printed"),
-    [("5 um", "5 µm"), ("3 um/s", "3 µm/s"), ("9 kg/m^2", "9 kg/m²"), ("sum of 2", "sum of 2"), ("-45 deg", "−45 deg"),
-     ("1e-05", "1 × 10⁻⁵"), ("-1.001e+05 1/s", "−1.001 × 10⁵ 1/s"), ("v=1e-05", "v=1e-05"),
-     ("run-1e-05.csv", "run-1e-05.csv"), ("6.928 us", "6.928 µs"), ("5 uN", "5 µN"), ("menus", "menus"),
-     ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
-)  # fmt: skip
-def test_words_are_set_as_in_print(text, printed):
-    assert typed(text) == printed
-
-
-def test_lines_of_names_and_words_become_tables():
-    found = rows_of("Head\n  velocity      1 um/s to 2 um/s\n                going on\nlast  a  b\nThe end")
-    assert words(found).strip() == "Head velocity 1 µm/s to 2 µm/s going on last a b The end"
-    assert found.count("<tr>") == 2
-    assert found.count("<p>") == 2
-
-
-def test_a_sentence_over_two_lines_is_one_paragraph():
-    text = (
-        "A head\nthe stiffness is so many times the critical stiffness, above which sliding is\nstable, it seems.\nmore"
-    )
-    assert rows_of(text).count("<p>") == 3
-    assert "above which sliding is stable, it seems." in rows_of(text)
-
-
-def test_formulas_need_no_script_and_no_entity():
-    text = math(ss.formula(OWN_RIG))
-    _Balanced(text)
-    assert not re.search("&[a-zA-Z]", text)
-    assert text.startswith('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"')
-
-
-def test_long_names_may_go_on_in_the_next_line():
-    text = table([("friction.normal_memory.alpha", "a"), ("0.0145", "b")])
-    assert "friction.<wbr>normal_<wbr>memory.<wbr>alpha" in text
-    assert "0.0145" in text
-
-
-def test_cells_are_words_unless_they_say_otherwise():
-    assert "&lt;i&gt;" in table([("<i>", "b")])
 
 
 # -- notebooks
@@ -391,45 +315,6 @@ def test_sensitivities_have_documents():
     assert "friction.a decides most about the critical stiffness" in text
     assert "1 to 100 GPa/m" in text
     assert f"{found.total['critical_stiffness'][0]:.3f}" in text
-
-
-@pytest.fixture(scope="module")
-def lab_results():
-    records = [lab.record(lab.rig(b=b), lab.STEP, seed=i) for i, b in enumerate((0.0145, 0.0150, 0.0140))]
-    fits = [ss.fit(lab.rig(), one, free=["a", "b", "d_c"]) for one in records]
-    draws = ss.bootstrap(fits[0], 16)
-    return {
-        "draws": draws, "prediction": ss.predict(lab.rig(), draws),
-        "population": ss.population(dict(zip("ABC", fits, strict=True)), count=200),
-        "comparison": ss.compare_laws(lab.rig(), records[0], ("slip", "aging")), "fit": fits[0],
-    }  # fmt: skip
-
-
-LAB = {
-    "draws": ("16 draws, bootstrap", "error of the draws", "friction.d_c"),
-    "prediction": ("How sure is that?", "probability"),
-    "population": ("Population of 3 experiments", "another experiment, 95 %", "with the others"),
-    "comparison": ("2 laws compared", "aging"),
-    "fit": ("Fit to synthetic", "How sure is that?", "16 draws, bootstrap"),
-}
-
-
-@pytest.mark.parametrize("name", LAB)
-def test_answers_of_records_have_documents(lab_results, name, request):
-    if name != "fit":  # whose pictures are the largest
-        request.getfixturevalue("unpainted")
-    options = {"draws": lab_results["draws"]} if name == "fit" else {}
-    document = ss.report(lab_results[name], explorer=False, **options).html
-    text = words(document)
-    for part in LAB[name]:
-        assert part in text, part
-    if name == "fit":
-        assert (
-            words(typed(f"friction.a {lab_results[name]['a'].shown()}, friction.b")) in text
-        )  # what it found, at once
-    shown = re.sub(r"<pre>\[friction\].*?</pre>", "", document, flags=re.S)  # a file stays as it is
-    assert not re.search(r"\d um\b", shown)
-    assert len(document.encode()) <= 500_000
 
 
 @pytest.mark.usefixtures("unpainted")

@@ -1,0 +1,57 @@
+"""What pages are made of: words as in print, tables, formulas."""
+
+import re
+
+import pytest
+
+import steadyslip as ss
+from read_pages import Balanced, words
+from rigs_of_theory import rate_state, rig
+from steadyslip.reports.brief import rows_of
+from steadyslip.reports.elements import math, table, typed
+
+# -- set as in print
+
+
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [("5 um", "5 µm"), ("3 um/s", "3 µm/s"), ("9 kg/m^2", "9 kg/m²"), ("sum of 2", "sum of 2"), ("-45 deg", "−45 deg"),
+     ("1e-05", "1 × 10⁻⁵"), ("-1.001e+05 1/s", "−1.001 × 10⁵ 1/s"), ("v=1e-05", "v=1e-05"),
+     ("run-1e-05.csv", "run-1e-05.csv"), ("6.928 us", "6.928 µs"), ("5 uN", "5 µN"), ("menus", "menus"),
+     ("a-b", "a-b"), ("x 59", "× 59"), ("a -> b", "a → b"), ("<b>", "&lt;b&gt;"), ("inf", "∞")],
+)  # fmt: skip
+def test_words_are_set_as_in_print(text, printed):
+    assert typed(text) == printed
+
+
+def test_lines_of_names_and_words_become_tables():
+    found = rows_of("Head\n  velocity      1 um/s to 2 um/s\n                going on\nlast  a  b\nThe end")
+    assert words(found).strip() == "Head velocity 1 µm/s to 2 µm/s going on last a b The end"
+    assert found.count("<tr>") == 2
+    assert found.count("<p>") == 2
+
+
+def test_a_sentence_over_two_lines_is_one_paragraph():
+    text = (
+        "A head\nthe stiffness is so many times the critical stiffness, above which sliding is\nstable, it seems.\nmore"
+    )
+    assert rows_of(text).count("<p>") == 3
+    assert "above which sliding is stable, it seems." in rows_of(text)
+
+
+def test_formulas_need_no_script_and_no_entity():
+    own = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
+    text = math(ss.formula(own))
+    Balanced(text)
+    assert not re.search("&[a-zA-Z]", text)
+    assert text.startswith('<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"')
+
+
+def test_long_names_may_go_on_in_the_next_line():
+    text = table([("friction.normal_memory.alpha", "a"), ("0.0145", "b")])
+    assert "friction.<wbr>normal_<wbr>memory.<wbr>alpha" in text
+    assert "0.0145" in text
+
+
+def test_cells_are_words_unless_they_say_otherwise():
+    assert "&lt;i&gt;" in table([("<i>", "b")])

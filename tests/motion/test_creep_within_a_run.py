@@ -304,6 +304,11 @@ def test_files_words_and_results_have_it(tmp_path):
     assert ss.protocol_from_text(ss.rig_to_text(slider(), plan)) == plan
     run = ss.simulate(slider(), plan)
     assert "let go" in str(run)
+    panels = run.plot()
+    assert "drive let go" in [text.get_text() for text in panels[0].get_legend().get_texts()]
+    shaded = [patch.get_x() for patch in panels[1].patches]
+    assert shaded[0] == pytest.approx(5.0)
+    assert panels[1].patches[0].get_width() == pytest.approx(3.0)
     run.save(tmp_path / "run.nc")
     again = ss.load_history(tmp_path / "run.nc")
     assert again.units == run.units

@@ -59,6 +59,7 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
         panel.set_ylabel(labelled(label, own_unit))
         _plain(panel, largest / scale)
         panel.grid(color=GREY, linewidth=0.3)
+    let_go(run, panels, factor)
     _shade(run, panels, colors, factor)
     panels[-1].set_xlabel(labelled("time", unit))
     panels[0].legend(
@@ -136,6 +137,19 @@ def _plain(panel: Axes, size: float) -> None:
     if high - low < _STEADY * size:
         middle = 0.5 * (low + high)
         panel.set_ylim(middle - 0.5 * _STEADY * size, middle + 0.5 * _STEADY * size)
+
+
+def let_go(run: History, panels: np.ndarray, factor: float) -> None:
+    """Shade the times in which the drive pulls with a force of its own, where it moves in others."""
+    if "creep" not in run.data or not len(run["t"]):
+        return
+    free = np.concatenate([[False], run["creep"] > 0, [False]])
+    edges = np.flatnonzero(free[1:] != free[:-1])
+    time = np.append(run["t"], run["t"][-1]) / factor
+    for first, behind in edges.reshape(-1, 2):
+        for panel in panels:
+            panel.axvspan(time[first], time[behind], color=GREY, alpha=0.2, linewidth=0)
+    panels[0].fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="drive let go")
 
 
 def _shade(run: History, panels: np.ndarray, colors: dict[str, Any], factor: float) -> None:

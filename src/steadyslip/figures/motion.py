@@ -76,6 +76,7 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
     panels[2].set_xlabel(labelled("time", unit))
     _keep_span(panels[1], run["friction"])
     _keep_span(panels[2], run["normal_stress"] / stress_factor)
+    machine_motion.let_go(run, panels, factor)
     slips = run.slip_events if len(run.slip_events) < _SPANS else ()
     _name_slip_events(panels[0], len(run.slip_events))
     narrowest = _LEAST_BAND * run.end
@@ -88,7 +89,8 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
         if run.status != "done":
             panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
     if run.status != "done":
-        panels[0].set_title(f"{run.status} at {shown(run.end, 's')}", color=VERMILION, fontsize="medium", pad=22)
+        pad = 36 if "creep" in run.data else 22  # the legend has a second line
+        panels[0].set_title(f"{run.status} at {shown(run.end, 's')}", color=VERMILION, fontsize="medium", pad=pad)
     return panels
 
 

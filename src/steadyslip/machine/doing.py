@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
+
 from steadyslip.core.areas import total_unit
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import parameters, replaced
@@ -25,7 +27,8 @@ def turns(machine: Machine, piece: Piece) -> bool:
 def turns_on(machine: Machine, body: str | None) -> bool:
     """Whether a body turns, or the only one where none is named."""
     name = body or (next(iter(machine.bodies)) if len(machine.bodies) == 1 else "")
-    return name in machine.bodies and machine.bodies[name].turns
+    meant = [name] if name in machine.bodies else get_close_matches(name, machine.bodies, 1)  # a slip is told later
+    return any(machine.bodies[one].turns for one in meant)
 
 
 def unit_of(rig: Slider | Machine, piece: Piece, unit: str) -> str:

@@ -80,7 +80,7 @@ class Forces:
         """One link, or a controller, must carry the force of the drive."""
         acting = [dict(one.acts) for one in self.driven]
         if not acting or any(acts != acting[0] for acts in acting):
-            names = ", ".join(one.name for one in self.mechanism.elements if LOAD_POINT in one.senses and one.name)
+            names = ", ".join(dict.fromkeys(one.name or "the controller" for one in self.driven))
             raise NotAvailable(
                 f"a drive that pulls with a force of its own needs one link that carries it; {names or 'none'} "
                 "would share it, and how is open"

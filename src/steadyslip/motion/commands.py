@@ -20,7 +20,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.result import History, check_contact
 from steadyslip.motion.single import simulate
-from steadyslip.protocol import Protocol
+from steadyslip.protocol import Piece, Protocol
 
 ENDINGS = (".nc", ".csv", ".html", *FIGURES)
 
@@ -67,9 +67,9 @@ def run_file(
     check_contact(rig, contact)
     machine = rig if isinstance(rig, Machine) else None
     area = rig.area if isinstance(rig, Slider) else None
-    added = [piece_from_text(text, area, machine) for text in pieces]
-    for piece in added:
-        protocol = protocol + piece
+    added = _pieces(pieces, area, machine)
+    if added:
+        protocol = Protocol(pieces=(*protocol.pieces, *added), until=protocol.until)
     end = protocol.until if until is None else _seconds(until)
     if end is None:
         raise ParameterError(
@@ -85,6 +85,19 @@ def run_file(
             rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol,
             progress=progress,
         )  # fmt: skip
+
+
+def _pieces(texts: Iterable[str], area: float | None, machine: Machine | None) -> list[Piece]:
+    """Pieces in words, or all problems."""
+    found, problems = [], []
+    for text in texts:
+        try:
+            found.append(piece_from_text(text, area, machine))
+        except ParameterError as error:
+            problems += [problem.under(repr(text)) for problem in error.problems]
+    if problems:
+        raise ParameterError(problems)
+    return found
 
 
 def _seconds(text: str) -> float:

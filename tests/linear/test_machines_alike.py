@@ -7,6 +7,7 @@ import pytest
 
 import steadyslip as ss
 from machines import at_random, leading, rate_state, surface, three_bodies, two_mass
+from steadyslip.core.dimensions import unit
 
 
 def test_names_and_their_order_do_not_matter():
@@ -229,32 +230,75 @@ NAMES = [
 """What quantities, units, constants and words of Python are called; the same may name a body, a link and a contact."""
 
 
+def in_other_words(machine, random):
+    """The same machine with other names in another order, and what its parameters are called then."""
+    kinds = machine.bodies, machine.links, machine.contacts
+    new = [dict(zip(kind, random.choice(NAMES, len(kind), replace=False).tolist(), strict=True)) for kind in kinds]
+    end = {"ground": "ground", "drive": "drive", **new[0]}
+    bodies, links, contacts = (random.permutation(list(kind)).tolist() for kind in kinds)
+    drive = machine.drive
+    if drive.driven():
+        drive = replace(drive, body=end[drive.body], measured=end[drive.measured])
+    other = ss.Machine(
+        bodies={new[0][n]: machine.bodies[n] for n in bodies},
+        links={new[1][n]: replace(one := machine.links[n], between=tuple(end[e] for e in one.between)) for n in links},
+        contacts={
+            new[2][n]: replace(one := machine.contacts[n], body=end[one.body], against=end[one.against])
+            for n in contacts
+        },
+        drive=drive,
+    )
+    tables = dict(zip(("bodies", "links", "contacts"), new, strict=True))
+
+    def called(name):
+        table, member, *rest = name.split(".")
+        return ".".join([table, tables[table][member], *rest]) if table in tables else name
+
+    return other, called
+
+
 @pytest.mark.slow
 @pytest.mark.campaign
 def test_random_machines_are_the_same_under_any_names():
     random = np.random.default_rng(7)
     for seed in range(12):
         machine = at_random(seed)[0]
-        kinds = machine.bodies, machine.links, machine.contacts
-        new = [dict(zip(kind, random.choice(NAMES, len(kind), replace=False).tolist(), strict=True)) for kind in kinds]
-        end = {"ground": "ground", "drive": "drive", **new[0]}
-        bodies, links, contacts = (random.permutation(list(kind)).tolist() for kind in kinds)
-        drive = machine.drive
-        if drive.driven():
-            drive = replace(drive, body=end[drive.body], measured=end[drive.measured])
-        other = ss.Machine(
-            bodies={new[0][n]: machine.bodies[n] for n in bodies},
-            links={
-                new[1][n]: replace(one := machine.links[n], between=tuple(end[e] for e in one.between)) for n in links
-            },
-            contacts={
-                new[2][n]: replace(one := machine.contacts[n], body=end[one.body], against=end[one.against])
-                for n in contacts
-            },
-            drive=drive,
-        )
+        other, _ = in_other_words(machine, random)
         own, same = ss.eigenvalues(machine), ss.eigenvalues(other)
         assert [np.min(np.abs(same - s)) for s in own] == pytest.approx(np.zeros(len(own)), abs=1e-9 * abs(own).max())
         assert ss.growth_rate(ss.rig_from_text(ss.rig_to_text(other))) == pytest.approx(
             ss.growth_rate(machine), rel=1e-7
         )
+
+
+def in_units(machine, sizes):
+    """The same machine in smaller units of mass, length, time and angle; and by how much numbers of a unit grow."""
+
+    def grows(unit_name):
+        return float(np.prod(np.power(sizes, unit(unit_name)[1])))
+
+    changed = {n: a.value * grows(a.role.unit) for n, a in machine.parameters().items() if a.value}
+    return machine.with_values(changed), grows
+
+
+@pytest.mark.parametrize("seed", [5, 8])
+def test_stable_values_do_not_depend_on_units_names_or_idle_bodies(seed):
+    """Nor is rounding of zero taken for an edge, at 1e-16 of a stiffness."""
+    machine = at_random(seed)[0]
+    along = next(name for name in machine.parameters() if name.startswith("links.") and name.endswith("stiffness"))
+    name = {5: "contacts.c2.friction.a", 8: "contacts.c0.friction.b"}[seed]
+    values = machine.value(name) * np.array([0.5, 1.0, 2.0])
+    own = ss.stable_values(machine, along, {name: values})
+    assert np.all(np.isnan(own) | (own == 0) | (own > 1e-12 * machine.value(along)))
+    other, grows = in_units(machine, (1e3, 2e-4, 7e2, 1.0))
+    roles = machine.parameters()
+    found = ss.stable_values(other, along, {name: values * grows(roles[name].role.unit)})
+    np.testing.assert_allclose(found / grows(roles[along].role.unit), own, rtol=1e-7)
+    other, called = in_other_words(machine, np.random.default_rng(seed))
+    np.testing.assert_allclose(ss.stable_values(other, called(along), {called(name): values}), own, rtol=1e-7)
+    idle = replace(
+        machine,
+        bodies={**machine.bodies, "idle": ss.SlidingBody(mass=3.0)},
+        links={**machine.links, "idle": ss.Spring(between=("ground", "idle"), stiffness=7.0, damping=1.0)},
+    )
+    np.testing.assert_allclose(ss.stable_values(idle, along, {name: values}), own, rtol=1e-7)

@@ -7,6 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from charts import RANGES, STIFFNESSES, made, rig
+from machines import two_mass
 
 # -- edges -------------------------------------------------------------------------------------------------
 
@@ -158,5 +159,9 @@ def test_what_has_no_sensitivity_is_said():
     found = ss.sensitivity(
         rig(contact=ss.Constant(preload=5e6)), flat, ["critical_stiffness", "growth_rate"], points=64
     )
+    machine = two_mass()  # whose growth rate depends on neither, but for rounding
+    nothing = {"friction.mu_ref": (0.5, 0.6), "friction.v_ref": (0.5, 0.6)}
+    with pytest.raises(ss.NotAvailable, match="does not depend on"):
+        ss.sensitivity(machine, nothing, "growth_rate", points=64)
     assert set(found.first) == {"growth_rate"}  # what has none costs the others nothing
     assert "no shares of critical_stiffness: critical_stiffness does not depend on friction.mu_ref" in str(found)

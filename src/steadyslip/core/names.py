@@ -15,7 +15,7 @@ def unfit_name(name: Any) -> str:
     """Why a name cannot be that of a member, part of dotted names; empty if it can."""
     if isinstance(name, str) and _PLAIN_NAME.fullmatch(name) and len(name) <= 40:
         return ""
-    return "is no name; allowed: up to 40 letters, digits, hyphens and underscores, a letter first"
+    return "is no name; allowed: up to 40 letters from a to z, digits, hyphens and underscores, a letter first"
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:

@@ -18,6 +18,7 @@ from steadyslip.core.areas import AREA, TOTALS, total_unit
 from steadyslip.core.dimensions import MICRO, MOST_TEXT, Dimension, unit
 from steadyslip.core.errors import QuantityError, came
 
+_MASS, _WEIGHT = Dimension(1), Dimension(1, 1, -2)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
 _NONZERO = re.compile(r"[^eE]*[1-9]")
 
@@ -70,6 +71,13 @@ def parse(text: str, expected: str) -> float:
             message += (
                 f", or with the contact's area in the rig file, [slider] area = '0.01 m^2', {total_unit(expected)}"
             )
+        elif wanted == found.times(AREA):
+            message += (
+                "; it is per unit area: laws of a contact take that where it has an area, [contacts.NAME] "
+                "area = '0.01 m^2', all else is of the whole"
+            )
+        elif (found, wanted) == (_MASS, _WEIGHT):
+            message += "; a mass presses with its weight, mass times 9.81 m/s^2"
         raise QuantityError(message)
     return _scaled(digits, factor)
 

@@ -13,6 +13,7 @@ from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi
 
+_FAR = 1e12  # times its own value, and its inverse, beyond which rounding decides where a parameter has an edge
 _WINDOWS = 8  # of a rig with delay that arrays of them have room for
 
 
@@ -86,7 +87,7 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
     p, q, bent = _split(c)
     if np.any(known & (bent | ~np.any(q, axis=-1))):
         raise not_linear(name)
-    found, unit = stable_set(p, q), size[..., None]
+    found, unit = _resolved(stable_set(p, q)), size[..., None]
     intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
     return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
 
@@ -96,6 +97,16 @@ def _split(c: Array) -> tuple[Array, Array, Array]:
     low, own, high = (columns(one) for one in c)
     p, q, straight = linear_split(low, own, high)
     return np.stack(p, axis=-1), np.stack(q, axis=-1), ~np.asarray(straight)
+
+
+def _resolved(found: StableSet) -> StableSet:
+    """A set in units of the parameter's own value, with edges that are rounding of zero or infinity as these."""
+    ends = np.where(found.intervals < 1 / _FAR, 0.0, np.where(found.intervals > _FAR, np.inf, found.intervals))
+    ends = np.where((ends[..., :1] < ends[..., 1:]), ends, np.nan)
+    order = np.argsort(np.isnan(ends[..., 0]), axis=-1, kind="stable")  # empty intervals last
+    size = np.abs(found.edges)
+    inside = found.changes & (size >= 1 / _FAR) & (size <= _FAR)
+    return StableSet(np.take_along_axis(ends, order[..., None], axis=-2), found.edges, found.frequencies, inside)
 
 
 @quietly
@@ -120,7 +131,7 @@ def linear_set(point: OperatingPoint, name: str, size: float | None = None) -> S
     if np.any(bent) or not np.any(q):
         return None
     late = bool(point.model.delays)
-    found = linear_windows(p, q, h[1], factors[0], factors[2]) if late else stable_set(p[0], q[0])
+    found = linear_windows(p, q, h[1], factors[0], factors[2]) if late else _resolved(stable_set(p[0], q[0]))
     return (
         None
         if found is None

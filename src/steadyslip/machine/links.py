@@ -24,7 +24,7 @@ class Link(FrozenRecord, family="link"):
 
     def inconsistencies(self) -> Iterator[Problem]:
         if len(self.between) != 2:
-            yield Problem("between", f"got {len(self.between)} names; allowed: two, such as ['motor', 'table']")
+            yield Problem("between", f"got {list(self.between)}; allowed: two names, such as ['motor', 'table']")
         elif self.between[0] == self.between[1]:
             yield Problem("between", f"links {self.between[0]!r} to itself; allowed: two different ends")
         if self.rigidity() is None and not self.is_damped():

@@ -23,6 +23,7 @@ POINTS = 4096
 RESAMPLES = 200
 BLOCK = 32  # sets of points at a time, between which Ctrl-C takes effect
 LEAST, MOST = 64, 2**20
+ROUNDING = 1e-12  # relative, of a result: what varies by less does not depend on anything
 WIDE = 0.2  # width of an interval from which on an index says little
 LEVEL = 0.95
 
@@ -194,7 +195,7 @@ def sensitivity(
             without[output.name] = f"{count}; ask for more points, or for other ranges"
             continue
         column = column[:, used]
-        if np.ptp(column) == 0:
+        if np.ptp(column) <= ROUNDING * np.max(np.abs(column)):
             without[output.name] = f"{output.name} does not depend on {', '.join(plan.varied)}"
             continue
         found["first"][output.name], found["total"][output.name] = _indices(column)

@@ -44,6 +44,7 @@ _LINEAR = 721
 _ROUNDING = 64  # units of the last place within which two conditions are one, at first;
 _WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
 _FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a level stretch, which hides no zero
+_DIPS = 16  # lowest of a scan that are looked into: contacts that are alike have roots that jitter at every sample
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # growing roots of rigs with delay, of which a dip between two samples may be a window; of more none is
 _SCARCE = 6  # times fewer samples where roots have to be counted one rig after the other: with several delays
@@ -209,6 +210,7 @@ class Search:
             dips = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
             dips &= np.maximum(size[:-2], size[2:]) > size[1:-1] * (1 + _FLAT)
             at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
+            at = np.sort(at[np.argsort(size[at], kind="stable")[:_DIPS]])
             if at.size:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
         return np.concatenate(extra)

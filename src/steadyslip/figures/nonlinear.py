@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.telling import shown
 from steadyslip.figures.map_axes import short, spaced_by_ratio
 from steadyslip.figures.style import (
     BLACK,
@@ -35,6 +36,7 @@ _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY}
 _AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY,
           "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
 _UNDECIDED = ("xx", "++", "oo")
+NARROW = 1e-3  # share of a value within which cycles are drawn over their distance from it
 WRAPPED = 36  # characters of a line in a legend
 
 
@@ -53,7 +55,13 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     matplotlib.axes.Axes
     """
     ax = axes_or_new(ax)
-    factor, unit = display_unit(branch.unit, branch.onset.value, branch.rig.area_of(branch.along))
+    area, origin, along = branch.rig.area_of(branch.along), 0.0, short(branch.along)
+    factor, unit = display_unit(branch.unit, branch.onset.value, area)
+    reach = max((abs(one.value - branch.onset.value) for one in branch.cycles), default=0.0)
+    if 0 < reach < NARROW * abs(branch.onset.value):  # an axis of values would have them all alike
+        origin = branch.onset.value
+        factor, unit = display_unit(branch.unit, reach, area)
+        along = f"{along} less {shown(origin, branch.unit, 6, area)}"
     drive = branch.cycles[0].speed if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
     onset_speed, driven = drive, branch.along == "drive.velocity"
@@ -61,36 +69,43 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         at = branch.cycles[0].value if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
         onset_speed = drive * branch.onset.value / at
         speed, speed_unit = display_unit("m/s", onset_speed)
-    _velocities(branch, ax, factor, speed, 1.8, True)
+    _velocities(branch, ax, (origin, factor), speed, 1.8, True)
     if branch.doubled is not None:
-        _velocities(branch.doubled, ax, factor, speed, 0.9, False)
+        _velocities(branch.doubled, ax, (origin, factor), speed, 0.9, False)
     line: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "linestyle": ":", "label": "steady sliding"}
     if driven:
         values = np.unique([branch.onset.value, *(one.value for one in branch.cycles)])
-        ax.plot(values / factor, onset_speed * values / branch.onset.value / speed, **line)
+        ax.plot((values - origin) / factor, onset_speed * values / branch.onset.value / speed, **line)
     else:
         ax.axhline(drive / speed, **line)
     kind = branch.onset.kind
     mark: dict[str, Any] = {"color": _COLOURS[kind], "marker": "o", "linestyle": "none"}
-    ax.plot([branch.onset.value / factor], [onset_speed / speed], label=f"{kind} onset", **mark)
+    ax.plot([(branch.onset.value - origin) / factor], [onset_speed / speed], label=f"{kind} onset", **mark)
     seen: set[str] = set()
     for point in (*branch.special, *(branch.doubled.special if branch.doubled else ())):
         symbol, colour = _MARKS[point.kind]
         name = "" if point.kind in seen else point.kind
         seen.add(point.kind)
-        ax.plot([point.cycle.value / factor], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
-    ax.set_yscale("log" if len(branch) else "linear")
-    if len(branch) and np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
+        x = (point.cycle.value - origin) / factor
+        ax.plot([x], [point.cycle.peak_velocity / speed], symbol, color=colour, label=name)
+    lowest, highest = (min((one.lowest_velocity for one in branch.cycles), default=0.0),
+                       max((one.peak_velocity for one in branch.cycles), default=0.0))  # fmt: skip
+    ax.set_yscale("log" if len(branch) and not highest < 2 * lowest else "linear")
+    if origin:
+        ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4), useOffset=False)
+    elif len(branch) and np.all(branch["value"] > 0) and branch["value"].max() > 10 * branch["value"].min():
         ax.set_xscale("log")
     where = f" at {branch.cycles[0].contact}" if len(branch) and branch.cycles[0].contact else ""
-    ax.set_xlabel(labelled(short(branch.along), unit))
+    ax.set_xlabel(labelled(along, unit))
     ax.set_ylabel(labelled(f"highest and lowest velocity{where}", speed_unit))
     ax.grid(color=GREY, linewidth=0.3)
     ax.legend(fontsize="small")
     return ax
 
 
-def _velocities(branch: CycleBranch, ax: Axes, factor: float, speed: float, width: float, named: bool) -> None:
+def _velocities(
+    branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float, width: float, named: bool
+) -> None:
     """Stretches of equal stability, one line each; neighbours share their point, but across a gap of the branch.
 
     Where the block stops or turns round there is no lowest velocity to draw.
@@ -106,8 +121,9 @@ def _velocities(branch: CycleBranch, ax: Axes, factor: float, speed: float, widt
         name = ("stable cycle" if good else "unstable cycle") if named and good not in used else ""
         used.add(good)
         for quantity in ("peak_velocity", "lowest_velocity"):
-            shown = np.where(branch[quantity][part] > 0, branch[quantity][part], np.nan)
-            ax.plot(branch["value"][part] / factor, shown / speed, label=name, **style)  # type: ignore[arg-type]
+            velocity = np.where(branch[quantity][part] > 0, branch[quantity][part], np.nan)
+            x = (branch["value"][part] - axis[0]) / axis[1]
+            ax.plot(x, velocity / speed, label=name, **style)  # type: ignore[arg-type]
             name = ""
 
 
@@ -204,7 +220,8 @@ def basin(found: Basin, ax: Axes | None = None) -> Axes:
             height = f"memory {name} of {kind}"
     ax.set_xlabel(labelled(place, length_unit))
     ax.set_ylabel(labelled(height, speed_unit))
-    ax.legend(fontsize="small", loc="upper right")
+    columns = 1 if np.any(found.doubt != "") else 2
+    ax.legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)  # the plane is full
     return ax
 
 

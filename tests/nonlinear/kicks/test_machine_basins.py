@@ -62,3 +62,8 @@ def test_a_massless_machine_starts_as_fast_as_it_is_told():
     found = ss.simulate(machine, until=1.0, initial={"block.v": 2.0})
     assert found["block.v"][0] == pytest.approx(2.0, rel=1e-12)
     assert found["block.v"][-1] == pytest.approx(own["v"][-1], rel=1e-9)
+
+
+def test_nothing_is_drawn_where_nothing_returns():
+    with pytest.raises(ss.NotAvailable, match="no basin: steady sliding of this rig is unstable"):
+        ss.basin(two_mass(kp=1.0))

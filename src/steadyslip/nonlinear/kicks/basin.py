@@ -142,7 +142,7 @@ def basin(
     Raises
     ------
     NotAvailable
-        If numbers leave the range of floating point.
+        If steady sliding is unstable, so that nothing returns to it, or numbers leave the range of floating point.
 
     Notes
     -----
@@ -159,6 +159,11 @@ def basin(
     rest = rest_of(own, np.atleast_1d(np.asarray(own.point.drive, dtype=float)), np.zeros(1))
     if not rest.exists[0]:
         raise beyond_range(own.point)
+    if not (rest.stable[0] or rest.neutral[0]):
+        raise NotAvailable(
+            "no basin: steady sliding of this rig is unstable, so that no starting point returns to it; "
+            "`cycles` follows what the rig does instead, `simulate` shows it"
+        )
     plane = _plane_of(rig, rest, at)
     x = plane.length * np.linspace(-15.0, 15.0, POINTS) if x is None else x  # type: ignore[assignment]
     v = plane.heights if v is None else v  # type: ignore[assignment]

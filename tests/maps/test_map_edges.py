@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from charts import RANGES, STIFFNESSES, made, rig
-from machines import two_mass
+from machines import at_random
 
 # -- edges -------------------------------------------------------------------------------------------------
 
@@ -159,8 +159,9 @@ def test_what_has_no_sensitivity_is_said():
     found = ss.sensitivity(
         rig(contact=ss.Constant(preload=5e6)), flat, ["critical_stiffness", "growth_rate"], points=64
     )
-    machine = two_mass()  # whose growth rate depends on neither, but for rounding
-    nothing = {"friction.mu_ref": (0.5, 0.6), "friction.v_ref": (0.5, 0.6)}
+    machine = at_random(21)[0]  # whose growth rate depends on neither, but for rounding
+    names = ("links.l1.stiffness", "contacts.c0.friction.v_ref")
+    nothing = {name: (0.5 * machine.value(name), 2 * machine.value(name)) for name in names}
     with pytest.raises(ss.NotAvailable, match="does not depend on"):
         ss.sensitivity(machine, nothing, "growth_rate", points=64)
     assert set(found.first) == {"growth_rate"}  # what has none costs the others nothing

@@ -23,7 +23,7 @@ POINTS = 4096
 RESAMPLES = 200
 BLOCK = 32  # sets of points at a time, between which Ctrl-C takes effect
 LEAST, MOST = 64, 2**20
-ROUNDING = 1e-12  # relative, of a result: what varies by less does not depend on anything
+ROUNDING = 1e-10  # relative, of a result: what varies by less does not depend on anything
 WIDE = 0.2  # width of an interval from which on an index says little
 LEVEL = 0.95
 

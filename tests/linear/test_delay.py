@@ -389,3 +389,9 @@ def test_roots_followed_through_their_crossings_are_those_that_are_counted(monke
         monkeypatch.undo()
         cells += len(own)
     assert sum(asked) < 0.5 * cells  # the few ends of rows of crossings; wrong directions would have all counted
+
+
+def test_where_delayed_terms_outweigh_what_acts_at_once_is_told_to_the_last_digit():
+    """The two sides of that edge are neighbours in floating point: both are asked in the same words."""
+    machine = at_random(78, delay=10 ** np.random.default_rng(78).uniform(-3, 2))[0]
+    assert [edge.kind for edge in ss.boundary(machine, "drive.velocity")] == ["ill-posed"]

@@ -107,7 +107,7 @@ def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = F
     h = np.broadcast_to(h, (*lead, h.shape[-1])).reshape(-1, h.shape[-1])
     found = np.full(len(c), -1, dtype=np.int64)
     good = np.all(np.isfinite(c), axis=(-2, -1)) & np.all(np.isfinite(h), axis=-1)
-    ahead = good & without_end(c, h)
+    ahead = good & outweighed(c) & np.any(h[:, 1:] > 0, axis=-1)
     found[ahead] = INFINITE
     rows = np.flatnonzero(good & ~ahead)
     if c.shape[-2] <= 2 and rows.size:
@@ -121,11 +121,6 @@ def counted_right(c: Array, h: Array, shift: ArrayLike = 0.0, *, alone: bool = F
             if found[one] == UNKNOWN:
                 break
     return found.reshape(lead)
-
-
-def without_end(c: Array, h: Array) -> NDArray[np.bool_]:
-    """Whether infinitely many roots lie to the right, (...)."""
-    return np.asarray(outweighed(c) & np.any(h[..., 1:] > 0, axis=-1))
 
 
 def outweighed(c: Array) -> NDArray[np.bool_]:

@@ -56,8 +56,8 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
     """
     if not point.model.delays:
         return ill_posed(characteristic(point))
-    c, h = quasi(point)
-    return np.asarray(ill_posed(c[..., 0, :]) | sums.without_end(c, h))
+    c, _ = quasi(point)
+    return np.asarray(ill_posed(c[..., 0, :]) | (_counts(point) == sums.INFINITE))
 
 
 def ill_posed(c: Array) -> NDArray[np.bool_]:

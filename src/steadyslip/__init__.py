@@ -4,7 +4,9 @@
         -> linear stability -> verdict (`analyze`), figures, command line
     Model + protocol -> compiled kernels -> motion (`simulate`, `simulate_many`) -> figures, command line
     linear stability + motion -> onset, cycles, thresholds -> verdict, figures, command line
-    records of experiments + compiled kernels -> fits (`fit`) -> predictions (`predict`) -> figures, command line
+    records of experiments + compiled kernels -> fits (`fit`) -> predictions for a rig (`predict`) -> verdict, figures,
+        command line
+    all of these over many rigs -> maps on disk (`run_map`), edges, sensitivities -> figures, files, command line
 
 Quantities are SI floats, stresses per unit nominal area; parameters have dotted names such as
 ``contact.angle``. Public names are listed in ``__init__.pyi`` and loaded on first use, so that importing the

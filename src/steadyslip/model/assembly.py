@@ -12,7 +12,7 @@ import sympy as sp
 from steadyslip.core.roles import Parameter
 from steadyslip.machine.mechanism import LOAD_POINT, Mechanism, Shares
 from steadyslip.model.equations import MOVED, Contact, Coordinate, Model, Variable
-from steadyslip.model.forces import INTEGRAL, TIME, V_LP, Forces, Letters, P, Place, Q
+from steadyslip.model.forces import INTEGRAL, TIME, V_LP, Forces, Letters, P, Q, SymbolicTouch
 from steadyslip.model.statics import row_of
 
 RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
@@ -122,7 +122,7 @@ class _Assembly(Forces):
             outside=place.outside if contact.has_pores() else None,
         )
 
-    def _strength(self, place: Place) -> sp.Expr:
+    def _strength(self, place: SymbolicTouch) -> sp.Expr:
         """Friction as its law states it."""
         law, now = place.touch.friction, (place.sigma, place.memory, place.tau)
         delay = law.lateness()

@@ -27,7 +27,7 @@ Letters = Callable[[str], str]
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SymbolicTouch:
     """A contact on its way into the Model: its symbols, and what the laws say in them."""
 
     touch: Touch
@@ -92,7 +92,7 @@ class Forces:
 
     # -- contacts in symbols
 
-    def _place(self, touch: Touch) -> Place:
+    def _place(self, touch: Touch) -> SymbolicTouch:
         def symbol(name: str, **assumptions: bool) -> sp.Symbol:
             return sp.Symbol(name if self.single else self.letter(f"{touch.name}.{name}"), **assumptions)
 
@@ -103,7 +103,7 @@ class Forces:
         states = tuple(
             sp.Symbol(self.letter(f"{touch.name or 'contact'}.{name}"), real=True) for name in touch.contact.memory()
         )
-        return Place(
+        return SymbolicTouch(
             touch,
             row_of(touch.slip, self.x),
             self.v[body] if self.single else symbol("v", real=True),
@@ -145,7 +145,9 @@ class Forces:
             return expression.xreplace(self.friction)
         return sp.cancel(sp.together(expression)).xreplace(self.friction)
 
-    def _motion(self, place: Place, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any) -> Motion:
+    def _motion(
+        self, place: SymbolicTouch, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any
+    ) -> Motion:
         return Motion(
             place.slip, place.velocity, place.acceleration, place.spring, spring_ss, place.tau, place.tau_ss,
             stiffness, place.speed, separation, steady_separation, row_of(place.touch.separation, self.v),
@@ -298,7 +300,7 @@ class Forces:
             self.definitions[self.places[0].tau] = self._friction_of_balance()
         self.definitions |= {place.sigma: law for place, law in zip(self.places, self.normal, strict=True)}
 
-    def _seen(self, place: Place) -> Motion:
+    def _seen(self, place: SymbolicTouch) -> Motion:
         """What a contact law sees; defines T, the pull at the body as a stress of the contact."""
         touch, body = place.touch, next(name for name in place.touch.slip if name != LOAD_POINT)
         belt = LOAD_POINT in touch.slip  # the drive is what it slides on, and links to the ground hold it against that

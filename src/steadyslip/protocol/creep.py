@@ -18,7 +18,7 @@ at the start of a segment where that changes, 1 if its force goes on, 2 if it is
 ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
 
 
-class Done(Protocol):
+class PieceLike(Protocol):
     """What pieces of a protocol say of themselves here; see `steadyslip.protocol.Piece`."""
 
     name: ClassVar[str]
@@ -80,7 +80,7 @@ class Release:
             slope[:, :, LOADING] += within * rate
 
 
-def spans_of(pieces: Sequence[Done], drive: Sequence[Curve]) -> tuple[list[Release], list[Problem]]:
+def spans_of(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> tuple[list[Release], list[Problem]]:
     """When a drive is let go, in the order of time, and what pieces do then that they cannot.
 
     Parameters
@@ -108,7 +108,7 @@ def spans_of(pieces: Sequence[Done], drive: Sequence[Curve]) -> tuple[list[Relea
     return [Release(one.begin, one.end, one.to, tuple(own)) for one, own in zip(spans, added, strict=True)], problems
 
 
-def _spans(pieces: Sequence[Done], drive: Sequence[Curve]) -> list[Release]:
+def _spans(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> list[Release]:
     found, place = [], count()
     for piece in pieces:
         if piece.channel != 0 or piece.curve(0.0) is None:
@@ -126,7 +126,7 @@ def _spans(pieces: Sequence[Done], drive: Sequence[Curve]) -> list[Release]:
     return found
 
 
-def _moves_within(piece: Done, spans: Sequence[Release]) -> bool:
+def _moves_within(piece: PieceLike, spans: Sequence[Release]) -> bool:
     """Whether a wave or a jump of the load point meets a time in which it is free, in any lane."""
     wave, jump = piece.wave(), piece.jump()
     if wave is not None:

@@ -118,5 +118,10 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
             p, q = stiffness_polynomials(point)
             terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
         neutral = share_left(terms) <= ON_THE_EDGE
-        edge = np.asarray(undamped | neutral)
-        return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge
+        edge = np.array(np.broadcast_to(undamped | neutral, point.shape))
+        if point.single or len(point.shape) != 1:
+            return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge
+        rows = np.flatnonzero(edge)  # few of many, whose eigenvalues take long with a delay
+        if rows.size:
+            edge[rows] = ~outgrown(point.part(rows), np.broadcast_to(neutral, point.shape)[rows], ON_THE_EDGE)
+        return edge

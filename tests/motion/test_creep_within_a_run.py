@@ -168,6 +168,16 @@ def test_force_goes_on_at_both_switches():
     assert run["load_velocity"][-1] == 1.0
 
 
+@pytest.mark.parametrize("at", [0.1, 0.3, 0.7])
+def test_rounding_does_not_part_the_end_of_creep_from_the_next_piece(at):
+    """The load point is taken up with the velocity that follows: without a jump of the force through the dashpot."""
+    for end in np.nextafter(1.1, [0.0, 1.1, 2.0]):
+        plan = [ss.VelocityStep(at=0.0, to=1.3), ss.Creep(at=at, duration=end - at), ss.VelocityStep(at=1.1, to=0.4)]
+        run = ss.simulate(slider(), plan, until=2.0, times=[1.1 - 1e-9, 1.1 + 1e-9])
+        assert run["load_velocity"][1] == 0.4
+        assert run["spring_stress"][1] == pytest.approx(run["spring_stress"][0], abs=1e-7)
+
+
 def test_what_is_told_is_pulled():
     """`to` says the whole pull, at once; what comes after it adds up."""
     inclined = replace(slider(), contact=ss.InclinedSpring(preload=1.0, angle=0.3))

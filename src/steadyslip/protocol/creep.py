@@ -120,7 +120,8 @@ def _spans(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> list[Release]
         later = drive[k + 1].times[:, :1] if k + 1 < len(drive) else np.full((1, 1), np.inf)
         end = later
         if times.shape[1] > 1:
-            end = np.where(np.abs(later - times[:, 1:]) <= ROUNDING * np.abs(times[:, 1:]), later, times[:, 1:])
+            own = times[:, 1:]  # the next piece begins no earlier, whatever rounding says of their sum
+            end = np.where(np.abs(later - own) <= ROUNDING * np.abs(own), np.maximum(later, own), own)
         told = getattr(piece, "to", None)
         found.append(Release(times[:, :1], end, None if told is None else column(told)))
     return found

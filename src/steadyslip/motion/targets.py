@@ -157,6 +157,6 @@ class _Targets:
             if piece.channel == channels.LOAD_POINT:
                 message = (
                     f"{piece.name} sets the motion of the load point, which creep leaves to the force of the drive; "
-                    "allowed: one of the two in a run"
+                    "allowed: one of the two in a run, or a piece creep that says when the drive is let go"
                 )
                 self.problems.append(Problem(f"protocol.pieces.{i}", message))

@@ -119,3 +119,26 @@ def test_a_map_holds_the_contact_that_is_lost():
     assert "threshold_contact" not in {one.name for one in KickThreshold().outputs(ss.Slider(
         friction=ss.RateState(a=0.1, b=0.2, d_c=1.0, mu_ref=0.6, v_ref=1.0), contact=ss.Constant(preload=1.0),
         stiffness=1.0, drive=ss.Steady(1.0)), [])}  # fmt: skip
+
+
+@pytest.mark.parametrize("to", [1.5, 1e4])
+def test_contacts_that_a_dashpot_joins_run_away_together(to):
+    """Both reach infinite velocity at one moment, before the rounding of time lets either be beyond all numbers."""
+
+    def contact(body, b):
+        friction = ss.RateState(a=0.01, b=b, d_c=1.0, mu_ref=0.6, v_ref=1.0, regularised=True)
+        return ss.Surface(body=body, friction=friction, contact=ss.Constant(preload=1.0))
+
+    machine = ss.Machine(
+        bodies={"one": ss.SlidingBody(), "two": ss.SlidingBody()},
+        links={
+            "pull": ss.Spring(between=("drive", "one"), stiffness=0.003),
+            "bar": ss.Spring(between=("one", "two"), stiffness=0.01, damping=0.02),
+        },
+        contacts={"first": contact("one", 0.014), "second": contact("two", 0.013)},
+        drive=ss.Pull(velocity=1.0),
+    )
+    run = ss.simulate(machine, ss.VelocityStep(at=1.0, to=to), until=3000.0)
+    assert run.status == "blow-up"
+    assert run.contact == max(("first", "second"), key=lambda name: run[f"{name}.slip_rate"][-1])
+    assert min(run[f"{name}.slip_rate"][-1] for name in ("first", "second")) > 1e9

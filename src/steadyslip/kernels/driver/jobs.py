@@ -24,6 +24,9 @@ from steadyslip.kernels.layout import (
     Status,
 )
 
+RUNAWAY = 1e9
+"""So many times as fast as the drive, a block without mass that no step of time resolves any more reaches infinite
+velocity: contacts that a dashpot joins run away together, and time is rounded before they are beyond all numbers."""
 Arrays = tuple[Array, Array, Array, Array, Array]
 Results = tuple[Array, Array, Array, Array, Array, Array]
 
@@ -179,6 +182,8 @@ def go_on(
     if lowest_stress(R, layout) <= R[Row.SIGMA_LOW]:
         return Status.CONTACT_LOST
     status = exhausted(R, 1, 0)
+    if status == Status.STUCK and layout.massless > 0 and highest_velocity(R, layout) >= RUNAWAY * abs(R[Row.V_DRIVE]):
+        return Status.BLOW_UP
     if status != Status.RUNNING:
         return status
     while R[Row.TAU] >= R[Row.END]:

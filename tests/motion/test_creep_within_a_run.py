@@ -274,6 +274,16 @@ def test_ensembles_let_go_when_each_is_told_to():
                 assert many.samples[name][i] == pytest.approx(alone[name], rel=1e-7, abs=1e-8)
 
 
+def test_ensembles_pull_as_each_is_told():
+    plan = [ss.Creep(at=1.0, duration=4.0, to=0.6), ss.CreepStep(at=2.0, by=0.0)]
+    vary = {"protocol.pieces.1.to": [0.6, 0.62, 0.64], "protocol.pieces.2.by": [0.0, 0.01, -0.01]}
+    for some in ({name: values} for name, values in vary.items()):
+        many = ss.simulate_many(slider(), some, plan, until=10.0, times=[3.0])
+        (values,) = some.values()
+        changes = np.array(values) - (0.6 if next(iter(some)).endswith(".to") else 0.0)
+        assert many.samples["spring_stress"][:, 0] == pytest.approx(0.6 + changes, abs=1e-9)
+
+
 def test_bodies_are_pushed_and_contacts_pressed_while_a_drive_is_let_go():
     law = rate_state(0.5, 0.3, 1.0)
     plan = [*PLAN[:2], ss.DisturbanceStep(at=7.0, by=0.05, on="table"), ss.DisturbanceStep(at=7.0, by=0.05, on="motor"),

@@ -136,6 +136,8 @@ def test_one_contact_is_pressed_while_fluid_is_injected_into_another():
     found = run(wet, pieces)
     assert found["oiled.normal_force"][-1] == pytest.approx(1.2)
     assert found["injection"][-1] == pytest.approx(0.3)
+    dry = run(wet, pieces[:1])
+    assert found["dry.pore_pressure"][-1] - dry["dry.pore_pressure"][-1] == pytest.approx(0.3, rel=0.02)
     assert found["normal_disturbance"][-1] == pytest.approx(0.2)
     pressed = run(wet, [*pieces, ss.NormalStressStep(at=3.0, by=0.1, on="dry")])
     later = TIMES > 3

@@ -66,6 +66,23 @@ def brake(friction, k1=1.0, press=1.0):
     )
 
 
+def stacked_pads(count, mass=1.0, slope=-0.02):
+    """Pads that a drive pulls, each by the one before, along the slide and at an angle."""
+    names = [f"pad{i}" for i in range(count)]
+    links = {}
+    for before, name in zip(["drive", *names], names, strict=False):
+        links[f"along-{name}"] = ss.Spring(between=(before, name), stiffness=50.0, damping=0.5)
+        links[f"aslant-{name}"] = ss.Spring(between=(before, name), stiffness=20.0, damping=0.2, angle=0.5)
+    friction = rate_state(0.05, slope, 2.0, mu=0.4)
+    touch = ss.Compliant(normal_stiffness=30.0, normal_damping=0.1)
+    return ss.Machine(
+        bodies={name: ss.PlanarBody(mass=mass * (i + 1), press=5.0) for i, name in enumerate(names)},
+        links=links,
+        contacts={f"at-{name}": ss.Surface(body=name, friction=friction, contact=touch) for name in names},
+        drive=ss.Pull(velocity=1.0),
+    )
+
+
 def three_bodies():
     """Motor, screw and table with a carriage on two guides: the machine whose speed is measured."""
     deep = {"normal_memory": ss.LinkerDieterich(alpha=0.2, sigma_ref=1.0)}

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 
 import steadyslip as ss
-from machines import brake, coulomb, rate_state, surface, two_blocks, two_mass
+from machines import brake, coulomb, rate_state, stacked_pads, surface, two_blocks, two_mass
 from moving_machines import FINE, TIMES, aging, agree, friction, law, radau, slopes_of_motion
 
 
@@ -59,6 +59,42 @@ def test_two_unlike_blocks_on_a_load_point_that_jumps():
         agree(run, f"{name}.v", found[2 + i])
         agree(run, f"{name}.x", found[i] - 0.1)  # behind the load point that jumped
         agree(run, f"{name}.Theta", found[4 + i])
+
+
+def test_pads_in_the_plane_that_hold_each_other_along_and_aslant():
+    """What their springs carry has no formula in the Model."""
+    machine = stacked_pads(2)
+    run = ss.simulate(machine, ss.VelocityStep(at=0.0, to=1.05), times=TIMES[TIMES <= 6], until=6.0, **FINE)
+    own, cos, sin = machine.contacts["at-pad0"].friction, np.cos(0.5), np.sin(0.5)
+
+    def forces(t, y, speed):
+        """On both pads, along and away, without friction and the press of the contacts."""
+        found, before = np.zeros((2, 2)), np.array([speed * t, 0.0, speed, 0.0])
+        for i in range(2):
+            dx, dy, dv, dw = y[[i, 2 + i, 4 + i, 6 + i]] - before
+            along, aslant = 50 * dx + 0.5 * dv, 20 * (cos * dx + sin * dy) + 0.2 * (cos * dv + sin * dw)
+            pull = np.array([along + aslant * cos, aslant * sin])
+            found[i] -= pull
+            found[i - 1] += pull if i else 0.0
+            before = y[[i, 2 + i, 4 + i, 6 + i]]
+        return found
+
+    def right(t, y, speed=1.05):
+        load, v = -30 * y[2:4] - 0.1 * y[6:8], y[4:6]
+        rubbing = np.array([friction(own, load[i], v[i], y[8 + i]) for i in range(2)])
+        pulled = forces(t, y, speed)
+        rates = [(pulled[:, 0] - rubbing) / [1.0, 2.0], (pulled[:, 1] + load - 5.0) / [1.0, 2.0]]
+        return np.array([*v, *y[6:8], *np.concatenate(rates), *(aging(own, v[i], y[8 + i]) for i in range(2))])
+
+    def steady(places):
+        return right(0.0, np.array([*places, 1, 1, 0, 0, 0, 0]), 1.0)[4:8]
+
+    start = np.array([*fsolve(steady, [-0.1] * 4, xtol=1e-14), 1, 1, 0, 0, 0, 0])
+    found = radau(right, start, TIMES[TIMES <= 6])
+    for i in range(2):
+        agree(run, f"at-pad{i}.slip_rate", found[4 + i])
+        agree(run, f"at-pad{i}.normal_force", -30 * found[2 + i] - 0.1 * found[6 + i])
+        agree(run, f"at-pad{i}.Theta", found[8 + i])
 
 
 def test_flutter_of_a_pad_on_coulomb_friction_that_is_regularised():

@@ -226,3 +226,14 @@ velocity = "2 um/s"
     assert run.status != "done"
     assert all(np.all(np.isfinite(run[name])) for name in run.units)
     assert "nan" not in str(run)
+
+
+def test_friction_far_beyond_its_stribeck_velocity_sets_no_scale():
+    """There it depends on velocity by exp(−100): steps that tell such differences apart would never end."""
+    pad = ss.read_rig("examples/machines/brake-pad.toml")
+    disc = pad.contacts["disc"]
+    friction = ss.CoulombStribeck(mu_coulomb=0.2, mu_static=0.3, v_stribeck=0.1)
+    quick = dataclasses.replace(pad, contacts={"disc": dataclasses.replace(disc, friction=friction)})
+    done = ss.simulate(quick, ss.VelocityStep(at=1e-3, to=1.1), until=5e-3)
+    assert (done.status, done.steps < 5000) == ("done", True)
+    assert done["pad.v"][-1] == pytest.approx(1.1, rel=0.2)

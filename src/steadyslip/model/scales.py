@@ -15,6 +15,8 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.weights import Weights, slip_rates, weighed, weights
 
+_FELT = 1e-5  # least share of the normal stress of a direct effect that sets sizes
+
 
 @question
 def natural_scales(point: OperatingPoint, reduction: Reduction) -> tuple[Mapping[str, Any], tuple[Any, ...]]:
@@ -82,7 +84,7 @@ def _together(
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
     """Scales of a machine, from those at its contacts."""
     numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_moving_function(point.model))]
-    directs = [np.abs(weights(point, i).direct) for i in range(len(point.model.contacts))]
+    directs = [felt(weights(point, i), np.where) for i in range(len(point.model.contacts))]
     scales, searched = joined_sizes(reduction, numbers, speeds, point.sigmas, directs, each, np.where)
     return scales, searched or (np.ones(1),)
 
@@ -166,6 +168,12 @@ def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
     return found
 
 
+def felt(found: Weights, choose: Choose) -> Any:
+    """The size of the direct effect as far as it sets scales, Pa; zero where there is none."""
+    direct, least = abs(found.direct), _FELT * abs(found.stress)
+    return choose(direct > 0, choose(direct > least, direct, least), 0.0)
+
+
 def sizes(
     found: Weights, drive: Any, reduction: Reduction, choose: Choose, index: int = 0
 ) -> tuple[dict[str, Any], Any]:
@@ -181,7 +189,7 @@ def sizes(
     index : int, optional
         The contact.
     """
-    direct, by_slip = abs(found.direct), abs(found.by_slip)
+    direct, by_slip = felt(found, choose), abs(found.by_slip)
     x: Any = np.inf
     for distance in (*(drive / abs(n) for n in found.decay), direct / by_slip):
         x = choose((distance > 0) & (distance < x), distance, x)

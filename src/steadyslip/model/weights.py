@@ -38,6 +38,8 @@ class Weights(ReadOnly):
         The memory variables themselves.
     by_unknown : ndarray
         Of the balance in its unknown.
+    stress : ndarray
+        The normal stress itself, Pa.
     """
 
     direct: Any
@@ -46,21 +48,22 @@ class Weights(ReadOnly):
     decay: tuple[Any, ...]
     memory: tuple[Any, ...]
     by_unknown: Any
+    stress: Any
 
     @classmethod
     def of(cls, values: Sequence[Any]) -> Weights:
         """From the values of what `weighed` lists."""
-        direct, by_slip, by_unknown, *rest = values
+        direct, by_slip, by_unknown, stress, *rest = values
         count = len(rest) // 3
         by_memory, decay, memory = (tuple(rest[i : i + count]) for i in (0, count, 2 * count))
-        return cls(direct, by_slip, by_memory, decay, memory, by_unknown)
+        return cls(direct, by_slip, by_memory, decay, memory, by_unknown, stress)
 
 
 def weighed(model: Model, index: int = 0) -> list[sp.Expr]:
-    """What `Weights` holds: direct, by slip, by unknown, then of each memory its weight, its decay, itself."""
+    """What `Weights` holds: direct, by slip, by unknown, stress, then of each memory its weight, its decay, itself."""
     contact = model.contacts[index]
     v, memory = contact.velocity, [item.symbol for item in contact.memory]
-    wanted = [v * derivative(contact.balance, v), *_held(model, index)]
+    wanted = [v * derivative(contact.balance, v), *_held(model, index), contact.sigma_ss]
     wanted += [derivative(contact.balance, m) for m in memory]
     wanted += [derivative(model.rate_of[m], m) for m in memory]
     return [model.at_steady(e.doit()) for e in (*wanted, *memory)]

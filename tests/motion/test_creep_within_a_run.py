@@ -258,6 +258,25 @@ def test_a_run_that_starts_anew_from_the_last_values_is_the_run_that_went_on():
         assert again["v"] == pytest.approx(whole["v"][at:], rel=1e-7)
 
 
+@pytest.mark.parametrize("kd", [0.0, 0.3])
+def test_a_motor_without_mass_is_let_go_as_one_of_hardly_any(kd):
+    """To first order in its mass: its place and speed follow from forces, which go on at both switches."""
+    plan = [
+        *PLAN[:2],
+        ss.CreepRamp(at=6.0, by=0.05, duration=1.0),
+        ss.DisturbanceStep(at=7.0, by=0.02, on="motor"),
+        PLAN[3],
+    ]
+    moved = []
+    for mass in (0.0, 1e-4, 1e-5):
+        machine = two_mass(kp=2.0, kd=kd, friction=rate_state(0.5, 0.3, 1.0))
+        machine = replace(machine, bodies={**machine.bodies, "motor": ss.SlidingBody(mass=mass)})
+        moved.append(ss.simulate(machine, plan, **FINE)["table.v"])
+    apart = [np.max(np.abs(one - moved[0])) for one in moved[1:]]
+    assert apart[0] < 1e-3
+    assert apart[0] / apart[1] == pytest.approx(10.0, rel=0.05)
+
+
 def test_ensembles_let_go_when_each_is_told_to():
     vary = {
         "protocol.pieces.2.at": [5.0, 6.0, 4.0],

@@ -105,7 +105,8 @@ class Kernel(Formulation):
         moved = record.program.load(Row.LOAD_MOVED) + record.load_advance(record.program.load(Row.TAU))
         record.program.store(Row.LOAD_MOVED, moved)
         if self.reduction.letting_go:
-            record.program.store(Row.PULL, record.evaluated(self.letting_go, point)[0])
+            for row, value in zip((Row.PULL, Row.STRETCH), record.evaluated(self.letting_go, point), strict=False):
+                record.program.store(row, value)
         return record.program
 
     def _balance_program(self) -> Program:
@@ -159,7 +160,8 @@ class Kernel(Formulation):
         names = {symbol: f"in{i}" for i, symbol in enumerate(self.reduction.channels)}
         free, switch = (names[self.reduction.channels[place]] for place in (FREE, SWITCH))
         point = record.point(program.load(Row.TAU))
-        _, driven, steady = record.evaluated(self.letting_go, point, found=True)
+        _, _, dashpot, steady = record.evaluated(self.letting_go, point, found=True)
+        driven = program.load(Row.STRETCH) + dashpot * point["in0"]  # as bodies stood and moved before
         place = self.layout.continuous + self.reduction.continuous.index(held)
         goes_on = program.load(Row.PULL) - select(as_node(point[free]) > 0.5, 0.0, driven)
         change = as_node(point[switch])

@@ -57,8 +57,9 @@ class Row(IntEnum):
     """The first unknown of the balances at the start of the last step."""
     H_OLD = 62
     """Length of the last step that was accepted."""
-    PULL = 63
-    """Force of a drive that is let go and moves on, less that of steady sliding, at the end of the last segment."""
+    PULL, STRETCH = 63, 64
+    """Of a drive that is let go and moves on, at the end of the last segment: its force less that of steady sliding,
+    and what its motion alone would make of it with the load point at rest."""
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1

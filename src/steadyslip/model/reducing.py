@@ -370,8 +370,11 @@ class _Reducing:
     def _letting_go(self) -> tuple[sp.Expr, ...]:
         """Of a drive that is let go and moves on."""
         own = self.model.letting_go
-        forces = () if own is None else (own.force, own.driven, own.steady)
-        return tuple(self._written(self._variables(force, None)) for force in forces)
+        if own is None:
+            return ()
+        moves = self.model.inputs["load_velocity"]
+        at_rest, dashpot = own.driven.xreplace({moves: sp.Integer(0)}), derivative(own.driven, moves)
+        return tuple(self._written(self._variables(e, None)) for e in (own.force, at_rest, dashpot, own.steady))
 
     def _names_of(self, state: tuple[sp.Symbol, ...]) -> tuple[str, ...]:
         names = {item.symbol: item.name for item in self.model.variables}

@@ -91,8 +91,9 @@ class Reduction(Keeper):
     channels : tuple of sympy.Symbol
         What is done to the rig: velocity of the load point, pushes and normal stresses; see `channels_for`.
     letting_go : tuple of sympy.Expr
-        Of a drive that is let go and moves on: its force, what its motion alone would make of it (both less those of
-        steady sliding), and that of steady sliding; see `steadyslip.model.equations.LettingGo`.
+        Of a drive that is let go and moves on: its force, what its motion alone would make of it with the load point at
+        rest (both less those of steady sliding), by how much the latter grows with the velocity of the load point, and
+        the force of steady sliding; see `steadyslip.model.equations.LettingGo`.
     directions : tuple of tuple of sympy.Symbol
         State variables (see `steadyslip.model.variational`) that answer to changes of the constants, one tuple
         for each independent change; the kernel adds that to their `rates`, in the order of the first variables

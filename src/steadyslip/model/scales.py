@@ -15,7 +15,7 @@ from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import Reduction
 from steadyslip.model.weights import Weights, slip_rates, weighed, weights
 
-_FELT = 1e-5  # least share of the normal stress of a direct effect that sets sizes
+_FELT = 1e-7  # least share of the normal stress of a direct effect that sets sizes
 
 
 @question

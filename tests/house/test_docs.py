@@ -20,7 +20,7 @@ from command import run, without_laws_of_tests
 from steadyslip.linear import paper
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
 SHOWN_PAGES = [page for page in PAGES if "```console\n" in page.read_text(encoding="utf-8")]
 COMPARE = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 

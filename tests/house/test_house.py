@@ -77,3 +77,33 @@ def test_only_laws_know_laws():
                 if (dotted or node.value in telling) and (path.as_posix(), node.value) not in arguments:
                     found.append(f"{path}:{node.lineno} says {node.value!r}")
     assert "\n".join(found) == ""
+
+
+def bound_around(node, above):
+    """Names that comprehensions around a node bind anew for each of their elements."""
+    found = set()
+    while (node := above.get(node)) is not None and not isinstance(node, ast.FunctionDef | ast.ClassDef):
+        for one in getattr(node, "generators", ()):
+            found |= {name.id for name in ast.walk(one.target) if isinstance(name, ast.Name)}
+    return found
+
+
+def test_no_generator_that_is_kept_reads_the_variable_of_a_loop():
+    """A list of generators computes them when it is whole, and all of them find the variable's last value."""
+    found = []
+    for path, tree in trees().items():
+        above = {child: node for node in ast.walk(tree) for child in ast.iter_child_nodes(node)}
+        for node in ast.walk(tree):
+            kept = isinstance(above.get(node), ast.ListComp | ast.SetComp | ast.DictComp | ast.List | ast.Tuple)
+            if not (kept and isinstance(node, ast.GeneratorExp)):
+                continue
+            own = {name.id for one in node.generators for name in ast.walk(one.target) if isinstance(name, ast.Name)}
+            late = [
+                node.elt,
+                *(one.iter for one in node.generators[1:]),
+                *(e for one in node.generators for e in one.ifs),
+            ]
+            read = {name.id for part in late for name in ast.walk(part) if isinstance(name, ast.Name)} - own
+            if names := read & bound_around(node, above):
+                found.append(f"{path}:{node.lineno} reads {', '.join(names)} late; make it a list")
+    assert not found

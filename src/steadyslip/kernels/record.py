@@ -115,9 +115,9 @@ class Evaluator:
 
     def _waves(self, channel: int) -> list[tuple[Node, Node, Node]]:
         count, layout, load = self.kernel.choice.harmonics, self.kernel.layout, self.program.load
-        places = [(group + channel * count + h for group in (layout.amplitude, layout.omega, layout.phase))
-                  for h in range(count)]  # fmt: skip
-        return [(load(amplitude), load(omega), load(phase)) for amplitude, omega, phase in places]
+        groups = (layout.amplitude, layout.omega, layout.phase)
+        places = range(channel * count, (channel + 1) * count)
+        return [(load(groups[0] + i), load(groups[1] + i), load(groups[2] + i)) for i in places]
 
     def load_advance(self, moment: Value) -> Value:
         """How far the load point has moved since the start of the segment."""

@@ -25,7 +25,8 @@ from steadyslip.explorer.programs import program
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear.boundary import present_zeros
-from steadyslip.linear.polynomials import is_hurwitz, roots, stable_set
+from steadyslip.linear.polynomials import is_hurwitz, stable_set
+from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed
 from steadyslip.model.point import operating_point
 from steadyslip.model.posed import posed

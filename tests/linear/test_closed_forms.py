@@ -11,7 +11,8 @@ import steadyslip as ss
 from rigs_of_theory import CONTACTS, D_C, ONE_MEMORY, SIGMA, V0, A, B, rate_state, rig
 from steadyslip.linear import cubic
 from steadyslip.linear.formula import MU_SS, formula_in_parts
-from steadyslip.linear.polynomials import is_hurwitz, roots
+from steadyslip.linear.polynomials import is_hurwitz
+from steadyslip.linear.roots import roots
 from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients
 from steadyslip.model.point import operating_point

@@ -7,7 +7,7 @@ import pytest
 
 import steadyslip as ss
 from machines import at_random, brake, coulomb, leading, rate_state, surface, three_bodies, two_blocks, two_mass
-from steadyslip.linear.polynomials import roots
+from steadyslip.linear.roots import roots
 from steadyslip.model import build_model
 from steadyslip.model.linearisation import characteristic_coefficients
 

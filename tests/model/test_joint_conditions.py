@@ -8,7 +8,7 @@ import pytest
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, SIGMA, rate_state, rig
-from steadyslip.linear.polynomials import quietly
+from steadyslip.linear.roots import quietly
 from steadyslip.model.point import operating_point
 
 CRANK = {"preload": SIGMA, "crank_angle": math.radians(30), "crank_radius": 0.1, "rod_length": 0.3}

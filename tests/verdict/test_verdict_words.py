@@ -8,7 +8,7 @@ import steadyslip as ss
 from dimensionless import unit_rig
 from rigs_of_theory import rate_state, rig
 from steadyslip.core.errors import ParameterError
-from steadyslip.linear.polynomials import roots
+from steadyslip.linear.roots import roots
 from steadyslip.linear.status import on_edge
 from steadyslip.model.point import operating_point
 from words_at_random import false_sentences, some_rig

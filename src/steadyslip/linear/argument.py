@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from steadyslip.linear.polynomials import Array, ComplexArray, evaluate
+from steadyslip.linear.roots import Array, ComplexArray, evaluate
 
 UNKNOWN = -2
 _MOST = 400_000  # pieces of the axis that are neither short enough nor led by one term, at a time, of all rigs

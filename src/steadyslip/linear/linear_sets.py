@@ -7,7 +7,8 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.crossing import APART, linear_split
-from steadyslip.linear.polynomials import Array, StableSet, columns, most_intervals, quietly, stable_set
+from steadyslip.linear.polynomials import StableSet, columns, most_intervals, stable_set
+from steadyslip.linear.roots import Array, quietly
 from steadyslip.linear.windows import delay_set, delay_set_among, linear_windows
 from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
@@ -16,6 +15,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.core.telling import percent, shown
 from steadyslip.laws.contact import Motion
+from steadyslip.linear.pencil import matrix_function
 from steadyslip.linear.spectrum import spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, Mechanism, Touch
@@ -135,7 +135,7 @@ def mode_of(rig: Machine, point: OperatingPoint, s: complex) -> Mode:
     """The mode of an eigenvalue."""
     model = point.model
     size = len(characteristic_rows(model))
-    powers, function = _matrix_function(model)
+    powers, function = matrix_function(model)
     entries = np.array([float(e) for e in point.evaluate(function)]).reshape(size, size, len(powers))
     with np.errstate(all="ignore"):
         late = np.exp(-s * delays_of(point))
@@ -218,14 +218,6 @@ def _stiffness_of(touch: Touch) -> Any:
     at_rest = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     apart = replace(at_rest, separation=1.0)
     return touch.contact.normal_stress(at_rest) - touch.contact.normal_stress(apart)
-
-
-@question
-def _matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
-    """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
-    entries = [entry for row in characteristic_rows(model).values() for entry in row]
-    powers = sorted({own for entry in entries for own in entry})
-    return powers, model.function(entry.get(own, sp.Integer(0)) for entry in entries for own in powers)
 
 
 @question

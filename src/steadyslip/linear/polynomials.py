@@ -1,4 +1,4 @@
-"""Arrays of real polynomials: roots, Hurwitz test, and the k for which p(s) + k q(s) is stable.
+"""Arrays of real polynomials: Hurwitz test, and the k for which p(s) + k q(s) is stable.
 
 Coefficients run along the last axis, lowest power first; the other axes are rigs. Highest coefficients
 may be zero (a rig without mass), rig by rig.
@@ -6,148 +6,17 @@ may be zero (a rig without mass), rig by rig.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.linear import crossing
+from steadyslip.linear.roots import Array, ComplexArray, degrees, quietly, roots
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-
-P = ParamSpec("P")
-R = TypeVar("R")
 _NEARLY_REAL = 1e-6  # relative imaginary part below which a root in β² is tried as a boundary
-_CLOSE = 1e-3  # relative distance of two roots below which they are found again as a pair
-_ROUNDING = 16 * np.finfo(float).eps  # share of (half sum)² below which a pair's discriminant is zero to rounding
 _FAR = 1e75  # size beyond which products of four coefficients may leave the range of floating point
 _SAME = 1e-9  # relative distance below which two boundaries in k are one
-
-
-def quietly(function: Callable[P, R]) -> Callable[P, R]:
-    """Overflow ends as inf or NaN, which every function here expects.
-
-    A fresh `numpy.errstate` for every call: one instance that decorates functions which call each other, or run in
-    several threads, leaves NumPy's error state changed (before NumPy 2).
-    """
-
-    @wraps(function)
-    def inner(*args: P.args, **kwargs: P.kwargs) -> R:
-        with np.errstate(all="ignore"):
-            return function(*args, **kwargs)
-
-    return inner
-
-
-def degrees(c: Array) -> NDArray[np.int64]:
-    """Degree of each polynomial, −1 for zero and for non-finite coefficients."""
-    present = (c != 0) & np.all(np.isfinite(c), axis=-1, keepdims=True)
-    top = c.shape[-1] - 1 - np.argmax(present[..., ::-1], axis=-1)
-    return np.asarray(np.where(np.any(present, axis=-1), top, -1))
-
-
-def evaluate(c: Any, s: Any) -> Any:
-    """Value at `s` of polynomials; `c` (..., n+1) against `s` (...)."""
-    value = np.zeros_like(s) + c[..., -1]
-    for i in range(c.shape[-1] - 2, -1, -1):
-        value = value * s + c[..., i]
-    return value
-
-
-@quietly
-def roots(c: Array) -> ComplexArray:
-    """All roots, (..., n) complex, sorted by falling real part; NaN where the degree is lower.
-
-    Eigenvalues of the balanced companion matrix, then Newton steps on the polynomial itself where they
-    improve it, so that slow roots keep their digits beside very fast ones. Two roots that lie close together are
-    found again as one quadratic factor, whose coefficients keep their digits where the roots do not: whether such a
-    pair is real or complex is right unless it is double to within rounding of the polynomial, which is called real.
-    """
-    n = c.shape[-1] - 1
-    flat = np.ascontiguousarray(c.reshape(-1, n + 1))
-    found: ComplexArray = np.full((len(flat), n), np.nan + 0j, dtype=complex)
-    degree = degrees(flat)
-    for d in np.unique(degree):
-        if d < 1:
-            continue
-        rows = np.flatnonzero(degree == d)
-        found[rows, :d] = _roots_of_degree(flat[rows, : d + 1])
-    order = np.argsort(-found.real, axis=-1, kind="stable")
-    return np.take_along_axis(found, order, axis=-1).reshape(*c.shape[:-1], n)
-
-
-def _roots_of_degree(c: Array) -> ComplexArray:
-    d = c.shape[-1] - 1
-    if d == 1:
-        return (-c[:, :1] / c[:, 1:]).astype(complex)
-    if d == 2:
-        return _quadratic(c)
-    companion = np.zeros((len(c), d, d))
-    companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
-    with np.errstate(over="ignore"):
-        companion[:, :, -1] = -c[:, :-1] / c[:, -1:]
-    found = np.full((len(c), d), np.nan + 0j, dtype=complex)
-    usable = np.all(np.isfinite(companion[:, :, -1]), axis=-1)
-    found[usable] = np.linalg.eigvals(companion[usable])
-    slope = c[:, None, 1:] * np.arange(1, d + 1)
-    value = evaluate(c[:, None, :], found)
-    for _ in range(3):
-        with np.errstate(all="ignore"):
-            step = found - value / evaluate(slope, found)
-            better_value = evaluate(c[:, None, :], step)
-            better = np.abs(better_value) < np.abs(value)
-        found = np.where(better, step, found)
-        value = np.where(better, better_value, value)
-    for i, j in zip(*np.triu_indices(d, 1), strict=True):
-        one, other = found[:, i], found[:, j]
-        partners = (one == np.conj(other)) | ((one.imag == 0) & (other.imag == 0))
-        rows = np.flatnonzero(partners & (np.abs(one - other) < _CLOSE * np.abs(one)))
-        if rows.size:
-            found[rows[:, None], [i, j]] = _close_pair(c[rows], one[rows], other[rows])
-    return found
-
-
-def _close_pair(c: Array, one: ComplexArray, other: ComplexArray) -> ComplexArray:
-    """Two roots close to each other, from their common factor s² + u s + w by Bairstow's iteration."""
-    size = np.abs(one).astype(np.longdouble)
-    scaled = c.astype(np.longdouble) * size[:, None] ** np.arange(c.shape[-1])
-    start = one / size.astype(float), other / size.astype(float)
-    u, w = -(start[0] + start[1]).real.astype(np.longdouble), (start[0] * start[1]).real.astype(np.longdouble)
-    nothing = np.zeros_like(u)
-    for _ in range(5):
-        b, slope = [nothing, nothing], [nothing, nothing]  # of the polynomial over the factor, and of that once more
-        for column in scaled.T[::-1]:
-            b.append(column - u * b[-1] - w * b[-2])
-            slope.append(b[-1] - u * slope[-1] - w * slope[-2])
-        c1, c2, c3 = slope[-2], slope[-3], slope[-4]
-        determinant = c2 * c2 - c1 * c3
-        du, dw = (b[-2] * c2 - b[-1] * c3) / determinant, (b[-1] * c2 - b[-2] * c1) / determinant
-        good = np.isfinite(du) & np.isfinite(dw) & (np.abs(du) + np.abs(dw) < 0.1)
-        u, w = np.where(good, u + du, u), np.where(good, w + dw, w)
-    ones = np.ones_like(u)
-    pair: ComplexArray = _quadratic(np.stack([w, u, ones], axis=-1)) * size.astype(float)[:, None]
-    return pair
-
-
-def _quadratic(c: Array) -> ComplexArray:
-    """Roots of c0 + c1 s + c2 s² without cancellation; a pair that is double to within rounding is real."""
-    c0, c1, c2 = (part.astype(np.longdouble) for part in c.T)
-    discriminant = c1 * c1 - 4 * c0 * c2
-    discriminant = np.where(np.abs(discriminant) <= _ROUNDING * c1 * c1, 0, discriminant)
-    root = np.sqrt(np.abs(discriminant))
-    large = -0.5 * (c1 + np.where(c1 < 0, -1.0, 1.0) * root)
-    with np.errstate(all="ignore"):
-        first, second = large / c2, np.where(large != 0, c0 / large, 0)
-        real, imaginary = -0.5 * c1 / c2, 0.5 * root / c2
-    is_complex = discriminant < 0
-    out: ComplexArray = np.empty((len(c), 2), dtype=complex)
-    out.real = np.where(is_complex[:, None], real[:, None], np.stack([first, second], axis=-1))
-    out.imag = np.where(is_complex, imaginary, 0.0)[:, None] * np.array([1.0, -1.0]) + 0.0  # no negative zeros
-    return out
 
 
 @quietly

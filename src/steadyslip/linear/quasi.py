@@ -21,15 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.linear.argument import UNKNOWN, SumsOnAxis, bound_on_axis, count_by_argument
-from steadyslip.linear.polynomials import (
-    Array,
-    ComplexArray,
-    evaluate,
-    even_odd,
-    product,
-    quietly,
-    roots,
-)
+from steadyslip.linear.polynomials import even_odd, product
+from steadyslip.linear.roots import Array, ComplexArray, evaluate, quietly, roots
 
 INFINITE = 2**62
 _HALVINGS = 60  # of a bracket of a real part

@@ -21,7 +21,7 @@ from steadyslip.core.options import checked, slider
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
-from steadyslip.linear.polynomials import quietly
+from steadyslip.linear.roots import quietly
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.point import OperatingPoint, Vary, operating_point

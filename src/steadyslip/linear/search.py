@@ -21,7 +21,8 @@ from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.pages import Displayed
 from steadyslip.core.telling import shown
 from steadyslip.linear.linear_sets import linear_set
-from steadyslip.linear.polynomials import Array, StableSet
+from steadyslip.linear.polynomials import StableSet
+from steadyslip.linear.roots import Array
 from steadyslip.linear.spectrum import (
     can_be_counted,
     crossing_frequency,

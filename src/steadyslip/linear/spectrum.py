@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from steadyslip.core.questions import question
 from steadyslip.linear import crossing, quasi as sums
 from steadyslip.linear.argument import UNKNOWN
-from steadyslip.linear.polynomials import Array, ComplexArray, damping_measures, is_hurwitz, roots
+from steadyslip.linear.polynomials import damping_measures, is_hurwitz
+from steadyslip.linear.roots import Array, ComplexArray, roots
 from steadyslip.model.eigenvalues import eigenvalues_of
 from steadyslip.model.linearisation import is_written_out
 from steadyslip.model.point import OperatingPoint

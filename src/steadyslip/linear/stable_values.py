@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.options import checked
 from steadyslip.linear.linear_sets import linear_set, not_linear, sets_of
-from steadyslip.linear.polynomials import Array
+from steadyslip.linear.roots import Array
 from steadyslip.linear.stiffness import STIFFNESS, critical_stiffness, in_chunks, own_safety_factor, stable_stiffness
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

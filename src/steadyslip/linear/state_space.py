@@ -12,7 +12,7 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, UnknownNameError
 from steadyslip.core.options import checked
-from steadyslip.linear.polynomials import Array
+from steadyslip.linear.roots import Array
 from steadyslip.linear.spectrum import is_ill_posed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

@@ -21,8 +21,9 @@ from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
 from steadyslip.linear import cubic
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_late
-from steadyslip.linear.polynomials import Array, ComplexArray, StableSet, quietly, stable_set
+from steadyslip.linear.polynomials import StableSet, stable_set
 from steadyslip.linear.response import Response, has_closed_form, response, response_numbers
+from steadyslip.linear.roots import Array, ComplexArray, quietly
 from steadyslip.linear.spectrum import is_ill_posed, spectrum
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

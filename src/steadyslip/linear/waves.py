@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.linear.polynomials import Array, ComplexArray, evaluate
+from steadyslip.linear.roots import Array, ComplexArray, evaluate
 
 _EPS = float(np.finfo(float).eps)
 _ROUNDING = 64 * _EPS  # of the sizes of all terms, in their sum

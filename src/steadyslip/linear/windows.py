@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.linear.argument import bound_on_axis
-from steadyslip.linear.polynomials import Array, StableSet, quietly, roots
+from steadyslip.linear.polynomials import StableSet
 from steadyslip.linear.quasi import (
     count_right,
     crossing_delays,
@@ -26,6 +26,7 @@ from steadyslip.linear.quasi import (
     slope,
     value,
 )
+from steadyslip.linear.roots import Array, quietly, roots
 from steadyslip.linear.waves import where_alike, where_real
 
 _TURNS = 100  # of an oscillation during the delay, beyond which windows are not looked for any more,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from steadyslip.linear.cubic import coefficients, hopf_line
-from steadyslip.linear.polynomials import quietly
 from steadyslip.linear.response import Response, has_closed_form, response_numbers
+from steadyslip.linear.roots import quietly
 from steadyslip.linear.stiffness import stiffness_polynomials
 from steadyslip.model.point import operating_point
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.linear.polynomials import is_hurwitz, roots, routh_column
+from steadyslip.linear.polynomials import is_hurwitz, routh_column
 from steadyslip.linear.quasi import INFINITE
+from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi, require_range

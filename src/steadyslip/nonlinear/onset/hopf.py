@@ -24,7 +24,8 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.telling import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.linear_sets import linear_sets
-from steadyslip.linear.polynomials import quietly, stable_set
+from steadyslip.linear.polynomials import stable_set
+from steadyslip.linear.roots import quietly
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
 from steadyslip.machine.machine import Machine

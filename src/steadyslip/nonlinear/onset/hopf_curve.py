@@ -20,7 +20,7 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
 from steadyslip.core.telling import shown, shown_range
 from steadyslip.linear.boundary import boundary, present_zeros
-from steadyslip.linear.polynomials import roots
+from steadyslip.linear.roots import roots
 from steadyslip.linear.search import Search
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider

@@ -1,0 +1,120 @@
+"""Eigenvalues with many digits, of the characteristic matrix with its entries evaluated by mpmath.
+
+What cancels in double precision, of stiffnesses and velocities twenty decades apart, does not here: digits are doubled
+until as many eigenvalues as there are agree, with each other or with another route.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from steadyslip.core.questions import question
+from steadyslip.linear.roots import ComplexArray
+from steadyslip.model import Model
+from steadyslip.model.linearisation import characteristic_rows
+from steadyslip.model.point import OperatingPoint
+
+_DIGITS = (50, 100, 200, 400, 800, 1100)
+_SHARE = 0.3  # of the digits: decades beyond the machine's own rate from which on an eigenvalue is infinite
+_PLACE = 1.2345678  # in units of that rate, where the matrix is inverted: no eigenvalue
+_SAME = 1e-13  # relative difference of an eigenvalue at a number of digits and at half of them,
+_NEARLY = 1e-9  # and from what another route found, within which they agree
+
+
+def precise_eigenvalues(point: OperatingPoint, rough: ComplexArray) -> ComplexArray | None:
+    """All eigenvalues (1/s) of a single rig without delay, by falling real part; None where digits do not decide.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Of a single rig.
+    rough : ndarray (n,) of complex
+        What another route found: as many as there should be, which with few digits may look infinite.
+    """
+    rate = float(np.median(np.abs(rough))) or 1.0
+    least = (np.log10(np.max(np.abs(rough))) - np.log10(rate)) / _SHARE
+    before = rough
+    for digits in (one for one in _DIGITS if one > least):
+        found = _with_digits(point, digits, rate)
+        if found is None:
+            return None
+        if len(found) >= len(rough) and _alike(before, found, _SAME if before is not rough else _NEARLY):
+            return found
+        before = found
+    return None
+
+
+def _alike(some: ComplexArray, others: ComplexArray, share: float) -> bool:
+    return len(some) == len(others) and bool(np.allclose(some, others, share, 0.0))
+
+
+def _with_digits(point: OperatingPoint, digits: int, rate: float) -> ComplexArray | None:
+    """The eigenvalues that so many digits find finite; None where no digits would help."""
+    import mpmath  # slow to import
+
+    with mpmath.workdps(digits):
+        parts = _parts(point, mpmath.mpf(rate))
+        if parts is None:
+            return None
+        a, e = _pencil(*parts)
+        place = mpmath.mpf(_PLACE)
+        try:
+            inner = mpmath.inverse(a - place * e) * e
+        except ZeroDivisionError:
+            return None
+        found = mpmath.eig(inner, left=False, right=False) if inner.rows > 1 else [inner[0]]
+        least = mpmath.mpf(10) ** (-_SHARE * digits)
+        finite = np.array([complex(rate * (place + 1 / one)) for one in found if abs(one) > least])
+    real = np.abs(finite.imag) <= _SAME * np.abs(finite)
+    finite = np.where(real, finite.real + 0j, finite)
+    return np.asarray(finite[np.lexsort((-finite.imag, -finite.real))])
+
+
+def _parts(point: OperatingPoint, rate: Any) -> list[Any] | None:
+    """The coefficients of s^0, s^1 and s² in the characteristic matrix, in units of time of 1/rate."""
+    import mpmath
+
+    function = _function(point.model)
+    try:
+        numbers = function(*(mpmath.mpf(float(np.asarray(a))) for a in (*point.arguments, *point.steady)))
+        return [mpmath.matrix(part) * rate**power for power, part in enumerate(numbers)]
+    except (ZeroDivisionError, TypeError, ValueError):
+        return None
+
+
+def _pencil(p0: Any, p1: Any, p2: Any) -> tuple[Any, Any]:
+    """A and E with (A − s E) z = 0 where (P0 + s P1 + s² P2) y = 0; z are y, and s y of columns that have an s²."""
+    import mpmath
+
+    n = p0.rows
+    moved = [j for j in range(n) if any(p2[i, j] != 0 for i in range(n))]
+    a, e = mpmath.eye(n + len(moved)), mpmath.zeros(n + len(moved))
+    for i in range(n):
+        for j in range(n):
+            a[i, j], e[i, j] = p0[i, j], -p1[i, j]
+        for k, j in enumerate(moved):
+            e[i, n + k] = -p2[i, j]
+    for k, j in enumerate(moved):
+        e[n + k, j] = 1
+    return a, e
+
+
+@question
+def _function(model: Model) -> Any:
+    """A function of mpmath's numbers that gives the three parts of the characteristic matrix."""
+    rows = list(characteristic_rows(model).values())
+    names = {symbol: sp.Symbol(f"p{i}") for i, symbol in enumerate(model.arguments)}
+    parts = [
+        [[sp.sympify(entry.get((power,), 0)).xreplace(names) for entry in row] for row in rows] for power in range(3)
+    ]
+    own = {"asinh_exp": _asinh_exp}
+    return sp.lambdify(list(names.values()), parts, modules=[own, "mpmath"], cse=True)
+
+
+def _asinh_exp(x: Any, y: Any) -> Any:
+    import mpmath  # slow to import
+
+    return mpmath.asinh(x * mpmath.exp(y))

@@ -1,0 +1,253 @@
+"""Eigenvalues with their errors, asked of the machine's own matrix, of which no characteristic polynomial was made.
+
+M(s) x = 0, with M a polynomial in s whose entries are slopes of the Model's equations (`characteristic_rows`), is the
+machine's matrix pencil; delays add factors exp(−s h). An eigenvalue that was found by another route is checked by the
+least singular value of M(s), in units in which rows and columns are alike, over what M(s) changes with s: how far the
+eigenvalue of that matrix is, rounding of its entries included. Whether all are there is asked of the determinant along
+the imaginary axis, whose argument must turn as that of Π(s − s_i) does; with delays, of the argument principle itself.
+What fails is computed anew with many digits, from the eigenvalues of the same matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.questions import question
+from steadyslip.linear.argument import count_by_argument
+from steadyslip.linear.digits import precise_eigenvalues
+from steadyslip.linear.quasi import in_own_time, outweighed
+from steadyslip.linear.roots import Array, ComplexArray
+from steadyslip.linear.spectrum import spectrum
+from steadyslip.model import Model
+from steadyslip.model.linearisation import characteristic_rows, is_written_out
+from steadyslip.model.point import OperatingPoint
+from steadyslip.model.range import characteristic, delays_of, quasi
+
+GOOD = 1e-6
+"""Share of an eigenvalue that its error may be; beyond it the eigenvalue is computed anew with many digits."""
+_NOISE = np.finfo(float).eps
+_LAST = 8 * _NOISE  # relative rounding of what a few operations make of the machine's numbers
+_ALIKE = 100.0  # times the least singular value of a matrix, its rounding included, up to which others vanish with it
+_SWEEPS = 3  # of rows and columns towards one size
+_APART = 0.3  # rad by which the argument of the determinant may be off at a place; a lost eigenvalue makes more than 1
+_PLACES = 3  # on the axis, for each eigenvalue
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedSpectrum:
+    """Eigenvalues of one operating point, each with its error.
+
+    Attributes
+    ----------
+    values : ndarray (n,) of complex
+        1/s, by falling real part, without those that do not exist; with delays the rightmost. Empty without steady
+        sliding and where the numbers leave the range of floating point.
+    errors : ndarray (n,)
+        1/s: by how much each may be wrong, rounding of the machine's numbers in their last digit included. A double
+        eigenvalue has an error of about its size times 1e-8, a triple one of 1e-5. inf where nothing is known.
+    growing : int
+        How many have a positive real part, by the argument principle; −1 where that was not to be decided.
+    complete : bool
+        Whether that is the number of those in `values` which grow, those within their error of the imaginary axis
+        counted on either side.
+    refined : bool
+        Whether they were computed with many digits, because the usual route did not pass.
+    """
+
+    values: ComplexArray
+    errors: Array
+    growing: int
+    complete: bool
+    refined: bool
+
+    @property
+    def decided(self) -> bool:
+        """Whether every eigenvalue is known to a millionth of it or is one of several within their error, and none is
+        missing."""
+        return self.complete and bool(np.all(_is_good(self.values, self.errors)))
+
+
+@question
+def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
+    """Eigenvalues (1/s) of a single rig, each with an error, and whether the argument principle finds as many growing.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Of a single rig: ``point.shape`` is ().
+
+    Returns
+    -------
+    CheckedSpectrum
+    """
+    found = np.ravel(spectrum(point))
+    found = found[np.isfinite(found)]
+    matrix = _Matrix.of(point)
+    if not found.size or not matrix.finite:
+        return CheckedSpectrum(found, np.full(found.shape, np.inf), -1, False, False)
+    first = _checked(point, matrix, found, matrix.errors(found), False)
+    if first.decided or point.model.delays:
+        return first
+    better = precise_eigenvalues(point, found)
+    if better is None:
+        return first
+    errors = np.maximum(_coefficient_errors(point, better), _NOISE * np.abs(better))
+    return _checked(point, matrix, better, errors, True)
+
+
+def _checked(
+    point: OperatingPoint, matrix: _Matrix, values: ComplexArray, errors: Array, refined: bool
+) -> CheckedSpectrum:
+    surely, perhaps = (int(np.sum(values.real > edge * errors)) for edge in (1, -1))
+    if point.model.delays:
+        growing = _count(point)
+        some = len(values) if growing > len(values) else growing  # of many that grow, not all are in the list
+        return CheckedSpectrum(values, errors, growing, growing >= 0 and surely <= some <= perhaps, refined)
+    complete = refined or matrix.has_all(values)
+    return CheckedSpectrum(values, errors, int(np.sum(values.real > 0)) if complete else -1, complete, refined)
+
+
+def _is_good(values: ComplexArray, errors: Array) -> NDArray[np.bool_]:
+    """Where an eigenvalue is known to `GOOD`, or lies so close to others that rounding decides where."""
+    apart = np.abs(values[:, None] - values[None, :]) + np.where(np.eye(len(values)) > 0, np.inf, 0.0)
+    near = np.min(apart, axis=1, initial=np.inf) <= 2 * errors
+    size = np.abs(values)
+    return np.asarray((errors <= GOOD * size) | (near & (errors <= np.sqrt(GOOD) * size)))
+
+
+def _count(point: OperatingPoint) -> int:
+    """Growing roots by the argument principle, −1 where that takes too long."""
+    c, h = quasi(point)
+    with np.errstate(all="ignore"):
+        scaled, own, _ = in_own_time(c[None], h[None])
+        if outweighed(scaled)[0] or not np.all(np.isfinite(scaled)):
+            return -1
+        return max(int(count_by_argument(scaled, own)[0]), -1)
+
+
+def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
+    """What the last digits of the coefficients of the characteristic polynomial do to its roots; zero without one."""
+    if not is_written_out(point.model):
+        return np.zeros(len(s))
+    c = characteristic(point)
+    power = np.arange(c.shape[-1])
+    with np.errstate(all="ignore"):
+        logs = np.log(np.abs(c)) + power * np.log(np.abs(s))[:, None]  # powers may leave the range of floating point
+        terms = np.exp(logs - np.max(logs, axis=1, keepdims=True)) * np.sign(c) * (s / np.abs(s))[:, None] ** power
+        return _spread(s, np.abs(s) * _LAST * np.sum(np.abs(terms), axis=1) / np.abs(terms @ power))
+
+
+@dataclass(frozen=True, eq=False)
+class _Matrix:
+    """M(s) of one rig: the coefficients (n, n, k) before each product of a power of s and of exp(−s delay)."""
+
+    powers: Array
+    late: Array
+    entries: Array
+    model: Model
+
+    @classmethod
+    def of(cls, point: OperatingPoint) -> _Matrix:
+        powers, function = matrix_function(point.model)
+        table = np.array(powers, dtype=float).reshape(len(powers), -1)
+        size = len(characteristic_rows(point.model))
+        entries = np.array([float(np.asarray(e)) for e in point.evaluate(function)]).reshape(size, size, len(powers))
+        return cls(table[:, 0], table[:, 1:] @ delays_of(point), entries, point.model)
+
+    @property
+    def finite(self) -> bool:
+        return bool(np.all(np.isfinite(self.entries)))
+
+    def even(self, s: ComplexArray) -> tuple[ComplexArray, Array, ComplexArray]:
+        """M at places (p,), sizes of its terms, dM/ds, each (p, n, n) with rows and columns of one size."""
+        place, top = s[:, None], np.max(self.powers)
+        size = np.maximum(np.abs(place), 1.0)  # all is divided by its highest power, which may leave floating point
+        unit, late = place / size, np.exp(-place * self.late)
+        factor = unit**self.powers * size ** (self.powers - top) * late
+        lower = np.maximum(self.powers - 1, 0)
+        steeper = self.powers * unit**lower * size ** (lower - top) * late - self.late * factor
+        sizes = np.einsum("ijk,pk->pij", np.abs(self.entries), np.abs(factor))
+        rows, columns = np.ones((2, *sizes.shape[:2]))
+        for _ in range(_SWEEPS):
+            even = sizes * rows[:, :, None] * columns[:, None, :]
+            rows = rows / np.max(even, axis=2)
+            columns = columns / np.max(sizes * rows[:, :, None] * columns[:, None, :], axis=1)
+        units = rows[:, :, None] * columns[:, None, :]
+        whole, slope = (np.einsum("ijk,pk->pij", self.entries, f) * units for f in (factor, steeper))
+        return whole, sizes * units, slope
+
+    def errors(self, s: ComplexArray) -> Array:
+        """How far each of these is from an eigenvalue of the matrix; inf where that cannot be said."""
+        with np.errstate(all="ignore"):
+            whole, sizes, slope = self.even(s)
+            good = np.all(np.isfinite(whole) & np.isfinite(sizes) & np.isfinite(slope), axis=(1, 2))
+            found = np.full(len(s), np.inf)
+            for i in np.flatnonzero(good):
+                found[i] = _distance(whole[i], sizes[i], slope[i])
+        return _spread(s, found)
+
+    def has_all(self, s: ComplexArray) -> bool:
+        """Whether the determinant turns along the imaginary axis as the product of s − s_i does, at enough places."""
+        size = np.abs(s[s != 0])
+        if not size.size:
+            return True
+        logs = np.log(size)
+        omega = np.exp(np.linspace(np.min(logs) - 2, np.max(logs) + 2, _PLACES * len(s) + 3))
+        with np.errstate(all="ignore"):
+            whole, sizes, _ = self.even(1j * omega)
+            if not (np.all(np.isfinite(whole)) and np.all(np.isfinite(sizes))):
+                return False
+            left, singular, right = np.linalg.svd(whole)
+            rounding = np.abs(left[:, :, -1])[:, None, :] @ sizes @ np.abs(right[:, -1, :])[:, :, None]
+            clear = len(self.entries) * _NOISE * rounding[:, 0, 0] < _APART * singular[:, -1]
+            sign, _ = np.linalg.slogdet(whole)
+            apart = 1j * omega[:, None] - s
+            turned = sign * np.conj(np.prod(apart / np.abs(apart), axis=1))
+        turned = turned[clear]
+        off = np.abs(np.angle(turned * np.conj(turned[:1])))
+        return len(turned) > len(s) and bool(np.all(off < _APART))
+
+
+def _distance(whole: ComplexArray, sizes: Array, slope: ComplexArray) -> float:
+    """By how much s must change for a matrix to be singular, rounding included."""
+    left, singular, right = np.linalg.svd(whole)
+    u, v = np.abs(left[:, -1]), np.abs(right[-1])
+    noise = float(u @ sizes @ v) * _LAST
+    least = float(singular[-1]) + noise
+    alike = int(np.sum(singular <= _ALIKE * least))  # a space of as many dimensions goes to zero
+    steep = np.linalg.svd(left[:, -alike:].conj().T @ slope @ right[-alike:].conj().T, compute_uv=False)
+    return least / float(steep[-1]) if steep[-1] > 0 else np.inf
+
+
+def _spread(s: ComplexArray, errors: Array) -> Array:
+    """Errors of eigenvalues close to others: m that meet move as the m-th root of what moves one alone.
+
+    `errors` are those of each alone, which are the larger the closer the others are.
+    """
+    size = np.maximum(np.abs(s), np.finfo(float).tiny)
+    best = np.array(errors)
+    apart = np.sort(np.maximum(np.abs(s[:, None] - s[None, :]), _NOISE * size[:, None]), axis=1)
+    with np.errstate(all="ignore"):
+        for many in range(2, len(s) + 1):
+            moved = (np.log(errors) + np.sum(np.log(apart[:, 1:many]), axis=1)) / many
+            best = np.minimum(best, np.exp(moved))
+    return np.asarray(np.where(np.isnan(best), np.inf, best))
+
+
+@question
+def matrix_function(model: Model) -> tuple[list[tuple[int, ...]], ArrayFunction]:
+    """Powers of s and of exp(−s delay) in the characteristic matrix, and of every entry what stands before each."""
+    powers, entries = _written(model)
+    return powers, model.function(entries)
+
+
+@question
+def _written(model: Model) -> tuple[list[tuple[int, ...]], list[sp.Expr]]:
+    entries = [entry for row in characteristic_rows(model).values() for entry in row]
+    powers = sorted({own for entry in entries for own in entry})
+    return powers, [entry.get(own, sp.Integer(0)) for entry in entries for own in powers]

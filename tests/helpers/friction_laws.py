@@ -16,6 +16,8 @@ ROCK = {"a": 0.0145, "mu_ref": 0.7, "v_ref": 1e-6}
 
 ONE = {"b": 0.016, "d_c": 1e-6}
 
+FADING = {"a_cutoff_velocity": 2e-5, "b_cutoff_velocity": 5e-6}
+
 TWO = {"states": [ss.State(b=0.0145, d_c=1e-6), ss.State(b=0.004, d_c=2e-5)]}
 
 THREE = {"states": [ss.State(b=0.01, d_c=1e-6), ss.State(b=-0.003, d_c=5e-6), ss.State(b=0.009, d_c=4e-5)]}
@@ -84,6 +86,8 @@ LAWS = [
     ss.RateState(**ROCK, b=-0.003, d_c=1e-6, evolution=ss.Nagata(c_nagata=0.5)),
     ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton()),
     ss.RateState(**ROCK, **ONE, normal_memory=ss.PrakashClifton(direct_share=1.0)),
+    ss.RateState(**ROCK, **ONE, evolution=ss.Aging(), **FADING, normal_memory=ss.LinkerDieterich(alpha=0.3)),
+    ss.RateState(**ROCK, states=[ss.State(b=0.01, d_c=1e-6), ss.State(b=0.009, d_c=4e-5, b_cutoff_velocity=3e-6)]),
     ss.LuGre(**BRISTLE, bristle_stiffness=1e5, bristle_damping=1e3),
     ss.LuGre(**BRISTLE, bristle_stiffness=1e5),
     ss.CoulombStribeck(**BRISTLE),

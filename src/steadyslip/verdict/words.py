@@ -73,7 +73,7 @@ def meaning(analysis: Findings) -> list[str]:
         if not analysis.kicks:
             lines.append("The kind of onset does not tell how large; steadyslip threshold does.")
         return lines if analysis.onset is not None or analysis.kicks else lines[:1]
-    if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away and not _limited(analysis.rig):
+    if analysis.growth_rate != math.inf and analysis.rig.friction.runs_away() and not _limited(analysis.rig):
         return [
             "Neither mass nor damping limits what grows: it may end in a run-away (blow-up) rather than in stick-slip.",
             "steadyslip simulate shows which.",

@@ -24,8 +24,6 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     Stresses are in Pa per unit nominal area, velocity in m/s, positive in the direction of loading.
     """
 
-    runs_away: ClassVar[bool] = False
-    """Whether friction alone, without mass or damping, lets velocity grow beyond all bounds in finite time."""
     compared: ClassVar[tuple[str, ...]] = ()
 
     def memory(self) -> tuple[str, ...]:
@@ -82,6 +80,10 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     def alternatives(self) -> Mapping[str, FrictionLaw]:
         """Laws of the same kind that records may speak for instead, by label; `compared` are tried by default."""
         return {}
+
+    def runs_away(self) -> bool:
+        """Whether friction alone, without mass or damping, lets velocity grow beyond all bounds in finite time."""
+        return False
 
     def motion_conditions(self) -> Iterator[Condition]:
         """Relations between numbers that motion needs beyond small perturbations; as `conditions`, named likewise."""

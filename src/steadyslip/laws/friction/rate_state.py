@@ -28,6 +28,10 @@ class RateState(FrictionLaw, name="rate-state"):
 
     Symbols of the paper: A = a, B = b, L = d_c, θ = Θ. One state is given by `b` and `d_c`, several by
     `states`. `a` > 0 and `d_c` > 0; `b` may have either sign (some gouges are measured with b < 0).
+
+    Both effects may fade at speed (Okubo 1989; theory 12): with `a_cutoff_velocity` v_a and `b_cutoff_velocity` v_b
+    τ = σ[μ* + a ln((1 + v_a/v*)/(1 + v_a/v)) + Σ b_i ln((v* + v_b e^Θ_i)/(v* + v_b))], which near steady sliding at v
+    is the law with a v_a/(v_a + v) for a and b v_b/(v_b + v) for b. A cut-off that is not given is infinite.
     """
 
     a: float = parameter("1", positive, "direct effect", kind="direct effect", standing=0.01)
@@ -41,30 +45,51 @@ class RateState(FrictionLaw, name="rate-state"):
         "1", positive, "friction coefficient in steady sliding at v_ref", kind="friction level", size=0.01, standing=0.6
     )
     v_ref: float = parameter("m/s", positive, "reference velocity v*", kind="reference rate", standing=1e-6)
+    a_cutoff_velocity: float | None = parameter(
+        "m/s", positive, "velocity v_a above which the direct effect fades; infinite unless given", default=None,
+        letter="v_a",
+    )  # fmt: skip
+    b_cutoff_velocity: float | None = parameter(
+        "m/s", positive, "velocity v_b above which the evolution effect fades (one state); infinite unless given",
+        default=None, letter="v_b",
+    )  # fmt: skip
     states: tuple[State, ...] = parts(State, "several states, each with its own b and d_c", default=())
     evolution: Evolution = part(Evolution, "evolution of the state", default=Slip(), inline=True)
     regularised: bool = option(False, True, doc="regularised at low velocity (asinh form)", default=False)
     normal_memory: NormalMemory = part(NormalMemory, "memory of normal stress", default=NoMemory())
 
-    runs_away: ClassVar[bool] = True
     compared: ClassVar[tuple[str, ...]] = ("slip", "aging", "prz", "slip, two states")
 
     def inconsistencies(self) -> Iterator[Problem]:
         single = {"b": self.b, "d_c": self.d_c}
         if self.states:
-            for name, value in single.items():
+            for name, value in {**single, "b_cutoff_velocity": self.b_cutoff_velocity}.items():
                 if value is not None:
                     yield Problem(name, "given beside states; give it in each state instead")
         else:
             for name, value in single.items():
                 if value is None:
                     yield Problem(name, "missing; give b and d_c (one state) or a list of states")
+        if self.regularised:
+            for name, value in self._cutoffs().items():
+                if value is not None:
+                    yield Problem(
+                        name, "not defined for the regularised law; leave it out, or set regularised to false"
+                    )
         yield from self.evolution.problems(self.states, self.normal_memory)
         yield from self.normal_memory.problems(self.states)
 
     def conditions(self) -> Iterator[Condition]:
         yield from self.evolution.conditions_with(self.b)
         yield from self.normal_memory.conditions_with(self.states)
+        for name, b, cutoff in self._named_effects() if self._is_scaled() else ():
+            if cutoff is not None:
+                message = "got 0; a state whose effect fades at speed has b > 0 or b < 0: leave b_cutoff_velocity out"
+                yield Condition(name, np.asarray(b) != 0, message, (b,))
+
+    def runs_away(self) -> bool:
+        """Unless the direct effect outlasts every other."""
+        return self.a_cutoff_velocity is not None or any(cutoff is None for cutoff in self._state_cutoffs())
 
     def motion_conditions(self) -> Iterator[Condition]:
         if not self._is_scaled() or not self.evolution.divides():
@@ -72,8 +97,7 @@ class RateState(FrictionLaw, name="rate-state"):
         message = (
             f"got {{}}, with memory of normal stress; the rate of {self.evolution.name} divides by b: use a small b"
         )
-        for number, (b, _) in enumerate(self._all_states(), start=1):
-            name = f"states.{number}.b" if self.states else "b"
+        for name, b, _ in self._named_effects():
             yield Condition(name, np.asarray(b) != 0, message, (b,))
 
     def completed_by(self, other: FrictionLaw) -> FrictionLaw:
@@ -96,6 +120,33 @@ class RateState(FrictionLaw, name="rate-state"):
         return found
 
     # The parts of the law; each is valid for numbers and for symbols.
+
+    def _cutoffs(self) -> dict[str, Expression]:
+        """Every cut-off velocity by the name of its field, None where there is none."""
+        found: dict[str, Expression] = {
+            "a_cutoff_velocity": self.a_cutoff_velocity, "b_cutoff_velocity": self.b_cutoff_velocity
+        }  # fmt: skip
+        return found | {
+            f"states.{i}.b_cutoff_velocity": s.b_cutoff_velocity for i, s in enumerate(self.states, start=1)
+        }
+
+    def _named_effects(self) -> Iterator[tuple[str, Expression, Expression]]:
+        """Name of the field, b and v_b of every state."""
+        for number, ((b, _), cutoff) in enumerate(zip(self._all_states(), self._state_cutoffs(), strict=True), start=1):
+            yield (f"states.{number}.b" if self.states else "b"), b, cutoff
+
+    def _state_cutoffs(self) -> tuple[Expression, ...]:
+        """v_b of every state, None where there is none."""
+        return tuple(s.b_cutoff_velocity for s in self.states) if self.states else (self.b_cutoff_velocity,)
+
+    def _direct(self, v: Expression) -> Expression:
+        """What a multiplies: ln(v/v*), or less above the cut-off velocity."""
+        effect, cutoff = sp.log(v / self.v_ref), self.a_cutoff_velocity
+        return effect if cutoff is None else effect - sp.log((v + cutoff) / (self.v_ref + cutoff))
+
+    def _evolved(self, theta: Expression, cutoff: Expression) -> Expression:
+        """What b multiplies: Θ, or ln((v* + v_b e^Θ)/(v* + v_b)), which ends falling at speed."""
+        return theta if cutoff is None else sp.log((self.v_ref + cutoff * sp.exp(theta)) / (self.v_ref + cutoff))
 
     def _all_states(self) -> tuple[tuple[Expression, Expression], ...]:
         """(b, d_c) of every state."""
@@ -123,6 +174,17 @@ class RateState(FrictionLaw, name="rate-state"):
             return tuple(b * theta for (b, _), theta in zip(states, memory, strict=False))
         return tuple(psi - off for psi, off in zip(memory, self._offsets(sigma, tau), strict=False))
 
+    def _effects(self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Iterator[Expression]:
+        """What every state adds to the coefficient: b_iΘ_i, or less where that fades at speed."""
+        states = zip(self._all_states(), self._state_cutoffs(), strict=True)
+        for ((b, _), cutoff), b_theta, stored in zip(
+            states, self._b_theta(sigma, memory, tau), memory, strict=False
+        ):  # fmt: skip
+            if cutoff is None:
+                yield b_theta
+            else:
+                yield b * self._evolved(b_theta / b if self._is_scaled() else stored, cutoff)
+
     def _slip_rate(self, v: Expression) -> Expression:
         return sp.Abs(v) if self.regularised else v
 
@@ -130,7 +192,7 @@ class RateState(FrictionLaw, name="rate-state"):
         """μ(v, bΘ): logarithmic or regularised."""
         if self.regularised:
             return self.a * asinh_exp(v / (2 * self.v_ref), (self.mu_ref + b_theta) / self.a)
-        return self.mu_ref + self.a * sp.log(v / self.v_ref) + b_theta
+        return self.mu_ref + self.a * self._direct(v) + b_theta
 
     def memory(self) -> tuple[str, ...]:
         letter = "Psi" if self._is_scaled() else "Theta"
@@ -142,7 +204,7 @@ class RateState(FrictionLaw, name="rate-state"):
         return ("1",) * len(self._all_states()) + self.normal_memory.memory_units()
 
     def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
-        coefficient = self._coefficient(v, sum(self._b_theta(sigma, memory, tau)))
+        coefficient = self._coefficient(v, sum(self._effects(sigma, memory, tau)))
         return self.normal_memory.strength(sigma, self._own(memory)) * coefficient
 
     def rates(
@@ -170,11 +232,15 @@ class RateState(FrictionLaw, name="rate-state"):
         return steady + self.normal_memory.steady_memory(sigma)
 
     def steady_strength(self, v: Expression, sigma: Expression) -> Expression:
-        total = sum(b for b, _ in self._all_states())
         felt = self.normal_memory.steady_strength(sigma)
-        if self.regularised:
-            return felt * self._coefficient(v, -total * sp.log(v / self.v_ref))
-        return felt * (self.mu_ref + (self.a - total) * sp.log(v / self.v_ref))
+        if all(cutoff is None for cutoff in self._cutoffs().values()):
+            total = sum(b for b, _ in self._all_states())
+            if self.regularised:
+                return felt * self._coefficient(v, -total * sp.log(v / self.v_ref))
+            return felt * (self.mu_ref + (self.a - total) * sp.log(v / self.v_ref))
+        theta = -sp.log(v / self.v_ref)
+        states = zip(self._all_states(), self._state_cutoffs(), strict=True)
+        return felt * self._coefficient(v, sum(b * self._evolved(theta, cutoff) for (b, _), cutoff in states))
 
     def observables(
         self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression

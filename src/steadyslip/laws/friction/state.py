@@ -16,3 +16,7 @@ class State(FrozenRecord):
     alpha: float | None = parameter(
         "1", nonnegative, "this state's part of α", default=None, kind="stress share", size=0.2, idle=0.0
     )
+    b_cutoff_velocity: float | None = parameter(
+        "m/s", positive, "velocity above which this state's effect fades; infinite unless given", default=None,
+        letter="v_b",
+    )  # fmt: skip

@@ -65,7 +65,8 @@ def boundary(
         Dotted name, or a unique last part, of any parameter that the rig has.
     between : (low, high), optional
         Range to search, SI units or text such as ``"10 deg"``. By default the whole domain of angles and
-        shares, six decades to each side of other values, and both signs where they are allowed.
+        shares, six decades to each side of other values and of their natural size, and both signs where they are
+        allowed. The edges in a range are the same whatever the range.
     branch : int
         Which steady sliding, by rising normal stress, where a rig has several.
 
@@ -118,10 +119,7 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
         edge = min(edges, key=lambda e, v=value: abs(e.value - v), default=None)  # type: ignore[misc]
         gap = edge.value - value if edge else float("nan")
         relative = gap / abs(value) if value else float("nan")
-        grid = search.grid(None)
-        found.append(
-            Margin(name, address.role.unit, value, edge, edges, gap, relative, (float(grid[0]), float(grid[-1])))
-        )
+        found.append(Margin(name, address.role.unit, value, edge, edges, gap, relative, search.searched))
     return tuple(sorted(found, key=_urgency))
 
 

@@ -14,7 +14,9 @@ from steadyslip.model.linearisation import delays_of_terms
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi
 
-_FAR = 1e12  # times its own value, and its inverse, beyond which rounding decides where a parameter has an edge
+_FAR = 1e12  # times such a size, and its inverse, beyond which rounding decides where a parameter has an edge
+_FACTORS = np.array([1 / APART, 1.0, APART])  # of a size of the parameter, at which its polynomial is asked for
+_SIZES = 3  # tried of a parameter, until one is near that at which its part of the polynomial is like the rest
 _WINDOWS = 8  # of a rig with delay that arrays of them have room for
 
 
@@ -80,14 +82,19 @@ def linear_sets(point: OperatingPoint, name: str) -> StableSet:
     place = list(point.model.parameters).index(name)
     own = np.broadcast_to(np.asarray(point.arguments[place], dtype=float), point.shape)
     size = np.where(own > 0, own, 1.0)
-    factors = np.array([1 / APART, 1.0, APART])
-    arguments = list(point.arguments)
-    arguments[place] = factors.reshape(3, *(1,) * size.ndim) * size
-    c = quasi(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
-    known = np.all(np.isfinite(c), axis=(0, -1))
-    p, q, bent = _split(c)
-    if np.any(known & (bent | ~np.any(q, axis=-1))):
-        raise not_linear(name)
+    for _ in range(_SIZES):
+        arguments = list(point.arguments)
+        arguments[place] = _FACTORS.reshape(3, *(1,) * size.ndim) * size
+        c = quasi(point.with_arguments(arguments, (3, *point.shape)))[0][..., 0, :]
+        known = np.all(np.isfinite(c), axis=(0, -1))
+        p, q, bent = _split(c)
+        if np.any(known & (bent | ~np.any(q, axis=-1))):
+            raise not_linear(name)
+        factor = np.where(known, _alike(p, q), 1.0)
+        far = (factor < 1 / APART) | (factor > APART)
+        if not np.any(far):
+            break
+        size = np.where(far, size * factor, size)
     found, unit = _resolved(stable_set(p, q)), size[..., None]
     intervals = np.where(known[..., None, None], found.intervals * unit[..., None], np.nan)
     return StableSet(intervals, found.edges * unit, found.frequencies, found.changes & known[..., None])
@@ -111,10 +118,13 @@ def _resolved(found: StableSet) -> StableSet:
 
 
 @quietly
-def linear_set(point: OperatingPoint, name: str, size: float | None = None) -> StableSet | None:
+def linear_set(
+    point: OperatingPoint, name: str, size: float | None = None, reach: tuple[float, float] | None = None
+) -> StableSet | None:
     """The stable set of one parameter of a single rig; None where it does not enter linearly, or is not positive.
 
-    With a `size` of the parameter its own value does not matter.
+    With a `size` of the parameter its own value does not matter. Windows of rigs with delay are looked for up to a
+    factor of a million from there, or as far as `reach`.
     """
     value = float(point.named()[name]) if size is None else size
     symbol = point.model.parameters[name]
@@ -122,22 +132,52 @@ def linear_set(point: OperatingPoint, name: str, size: float | None = None) -> S
         return _delay_set(point, symbol)
     if not value > 0:
         return None
-    place = list(point.model.parameters).index(name)
-    factors = np.array([1 / APART, 1.0, APART])
-    arguments = [a if i != place else value * factors for i, a in enumerate(point.arguments)]
-    c, h = quasi(point.with_arguments(arguments, (3,)))
-    if not np.all(np.isfinite(c)):
-        return None
-    p, q, bent = _split(c)
-    if np.any(bent) or not np.any(q):
-        return None
     late = bool(point.model.delays)
-    found = linear_windows(p, q, h[1], factors[0], factors[2]) if late else _resolved(stable_set(p[0], q[0]))
+    found = _split_around(point, name, value, not late)
+    if found is None:
+        return None
+    p, q, h, value = found
+    if late:
+        low, high = (1 / APART, APART) if reach is None else (reach[0] / value, reach[1] / value)
+        windows = linear_windows(p, q, h, min(low, 1 / APART), max(high, APART))
+    else:
+        windows = _resolved(stable_set(p[0], q[0]))
     return (
         None
-        if found is None
-        else StableSet(found.intervals * value, found.edges * value, found.frequencies, found.changes)
+        if windows is None
+        else StableSet(windows.intervals * value, windows.edges * value, windows.frequencies, windows.changes)
     )
+
+
+def _split_around(
+    point: OperatingPoint, name: str, size: float, again: bool
+) -> tuple[Array, Array, Array, float] | None:
+    """P, Q and delays of P + f Q for a single rig, f times a size being the parameter, and that size.
+
+    `again` the size is changed to one at which both are alike, which does not depend on the value of the parameter.
+    """
+    place, found = list(point.model.parameters).index(name), None
+    for _ in range(_SIZES if again else 1):
+        arguments = [a if i != place else size * _FACTORS for i, a in enumerate(point.arguments)]
+        c, h = quasi(point.with_arguments(arguments, (3,)))
+        if not np.all(np.isfinite(c)):
+            break
+        p, q, bent = _split(c)
+        if np.any(bent) or not np.any(q):
+            break
+        found = p, q, h[1], size
+        factor = float(_alike(p[0], q[0]))
+        if 1 / APART <= factor <= APART:
+            break
+        size = size * factor
+    return found
+
+
+def _alike(p: Array, q: Array) -> Array:
+    """The factor f at which p and f q are alike in size, of polynomials (..., n+1); 1 where they share no power."""
+    both = (p != 0) & (q != 0)
+    ratios = np.sum(np.where(both, np.log(np.abs(p)) - np.log(np.abs(q)), 0.0), axis=-1)
+    return np.asarray(np.exp(ratios / np.maximum(np.sum(both, axis=-1), 1)))
 
 
 def _delay_set(point: OperatingPoint, symbol: sp.Symbol) -> StableSet | None:

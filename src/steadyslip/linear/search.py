@@ -12,14 +12,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from steadyslip.core.dimensions import Dimension, unit
 from steadyslip.core.errors import NoSteadySliding, NotAvailable
+from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.pages import Displayed
+from steadyslip.core.questions import question
 from steadyslip.core.telling import shown
+from steadyslip.linear import samples
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.polynomials import StableSet
 from steadyslip.linear.roots import Array
@@ -31,21 +35,22 @@ from steadyslip.linear.spectrum import (
     static_sum,
     unstable_roots,
 )
-from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, on_edge, status
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral, on_edge, status
 from steadyslip.linear.stiffness import STIFFNESS, set_of_one
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
+from steadyslip.model import Model
 from steadyslip.model.linearisation import linearise
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import explain_absence
 
-_PER_DECADE = 40
-_DECADES = 6
-_LINEAR = 721
 _ROUNDING = 64  # units of the last place within which two conditions are one, at first;
 _WIDER = 6  # times that it is widened by 8: to some 1e-10 of the value, within what a verdict calls the edge
 _FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a level stretch, which hides no zero
 _DIPS = 16  # lowest of a scan that are looked into: contacts that are alike have roots that jitter at every sample
+_ROUNDS = 8  # of narrowing, each of which finds one edge more in a cell that has several
+_CHANGES = 64  # of samples next to each other, of more only those of the status: conditions that rounding decides
+_BESIDE = 4  # the status is what is left when kinds are divided by this
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # growing roots of rigs with delay, of which a dip between two samples may be a window; of more none is
 _SCARCE = 6  # times fewer samples where roots have to be counted one rig after the other: with several delays
@@ -97,6 +102,10 @@ class Boundary(Displayed):
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
 
 
+Sample = tuple[float, int]
+"""A value of the parameter and its status."""
+
+
 class Search:
     """Scanning one parameter of one rig."""
 
@@ -104,51 +113,52 @@ class Search:
         self.rig, self.name, self.present, self.branch = rig, name, tuple(present), branch
         address = rig.parameters()[name]
         self.role, self.value = address.role, float(address.value)  # type: ignore[arg-type]
-        scarce = len(operating_point(rig, None, self.present, branch).model.delays) > 1
-        self.share = _SCARCE if scarce else 1
+        self.own = operating_point(rig, None, self.present, branch)
+        self.share = _SCARCE if len(self.own.model.delays) > 1 else 1
 
     def values(self, x: float | Array) -> OperatingPoint:
         return operating_point(self.rig, {self.name: x}, self.present, self.branch, scan=True)
 
     # -- the range
 
-    def grid(self, between: tuple[float, float] | None) -> Array:
-        """Sample values of rigs that can be built, rising; the rig's own value is one of them."""
-        samples = self._whole_grid() if between is None else self._grid_between(*between)
-        return np.asarray(samples[np.broadcast_to(self.values(samples).valid, samples.shape)])
+    @cached_property
+    def searched(self) -> tuple[float, float]:
+        """The range that is searched unless another is asked for: from the first to the last that can be built."""
+        grid, point = self._usual
+        built = grid[np.broadcast_to(point.valid, grid.shape)]
+        return float(built[0]), float(built[-1])
 
-    def _whole_grid(self) -> Array:
+    @cached_property
+    def _usual(self) -> tuple[Array, OperatingPoint]:
+        grid = self._grid(None)
+        return grid, self.values(grid)
+
+    def _grid(self, between: tuple[float, float] | None) -> Array:
+        """Samples, rising; the rig's own value is one of them."""
         domain = self.role.domain
         if np.isfinite(domain.high):
-            inset = 1e-9 * (domain.high - domain.low)
-            low = domain.low if domain.low_allowed else domain.low + inset
-            high = domain.high if domain.high_allowed else domain.high - inset
-            samples = np.linspace(low, high, _LINEAR // self.share)
+            found = samples.bounded(domain, self.share)
         else:
-            size = abs(self.value) or self.natural_size()
-            count = 2 * _DECADES * _PER_DECADE // self.share + 1
-            with np.errstate(all="ignore"):
-                samples = size * np.geomspace(10.0**-_DECADES, 10.0**_DECADES, count)
-            samples = samples[np.isfinite(samples) & (samples > 0)]  # the ends of floating point are no parameters
-            if domain.low < 0:
-                samples = np.concatenate([-samples[::-1], [0.0], samples])
-            elif domain.low_allowed and not self.role.adds_state:
-                samples = np.concatenate([[0.0], samples])
-        return np.unique(np.append(samples, self.value))
+            zero = domain.low_allowed and not self.role.adds_state
+            found = samples.unbounded(domain, zero, self._sizes[0], *self._reach(between), self.share)
+        return np.unique(np.append(found, self.value))
 
-    def _grid_between(self, low: float, high: float) -> Array:
-        samples = [np.linspace(low, high, _LINEAR // self.share)]
-        for a, b, sign in ((low, high, 1.0), (-high, -low, -1.0)):  # even in logarithm too
-            if b > 0:
-                a = max(a, b * 1e-12)
-                decades = np.log10(b / a)
-                samples.append(sign * np.geomspace(a, b, int(_PER_DECADE * decades / self.share) + 2)[1:-1])
-        return np.unique(np.concatenate(samples))
+    @cached_property
+    def _sizes(self) -> tuple[float, float]:
+        """The rig's own and the natural one."""
+        natural = self.natural_size()
+        return abs(self.value) or natural, natural
+
+    def _reach(self, between: tuple[float, float] | None) -> tuple[float, float]:
+        """Least and largest size to look at: around the rig's own and the natural one, and what is asked for."""
+        far, sizes = 10.0**samples.DECADES, self._sizes
+        asked = [abs(end) for end in between or () if end]
+        return min([min(sizes) / far, *asked]), max([max(sizes) * far, *asked])
 
     def natural_size(self) -> float:
-        """A size for a parameter that is zero, from σss, v0 and the slip distance v0/r."""
-        point = operating_point(self.rig, None, self.present, self.branch)
-        sigma, v0 = float(point.sigmas[0]), point.drive
+        """A size of the parameter that does not follow from its value: from σss, v0 and the slip distance v0/r."""
+        point = self.own
+        sigma, v0 = np.exp(np.mean(np.log([float(one) for one in point.sigmas]))), point.drive
         length = v0 / (_decay_rate(point) or 1.0)
         _, d = unit(self.role.unit)
         if isinstance(self.rig, Machine) and self.rig.area_of(self.name) is None:
@@ -156,53 +166,101 @@ class Search:
         by_velocity = -2 * d.mass - d.time
         sigma, v0, length = np.float64(sigma), np.float64(v0), np.float64(length)  # overflow to inf, no exception
         size = sigma**d.mass * v0**by_velocity * length ** (d.length + d.mass - by_velocity)
-        return float(size) if np.isfinite(size) and size > 0 else 1.0
+        return float(size) if np.isfinite(size) and size > 0 else abs(self.value) or 1.0
 
-    # -- status along the parameter
+    # -- what sliding is along the parameter
 
     def status(self, x: Array) -> NDArray[np.int64]:
-        return status(self.values(np.asarray(x, dtype=float)))
+        """The status at values (n,)."""
+        return status(self.values(x))
+
+    def kinds(self, x: Array) -> NDArray[np.int64]:
+        """The status at values (n,), and what else may end a strip of it: 4 where the static stiffness is positive, 8
+        where the equations are ill-posed are added."""
+        point = self.values(x)
+        return _kinds(point, status(point))
 
     def measures(self, x: Array) -> Array:
         """Two functions that pass through zero at an edge: damping of pairs, and of single eigenvalues."""
         return nearness(self.values(np.asarray(x, dtype=float)))
 
     def boundaries(self, between: tuple[float, float] | None) -> tuple[Boundary, ...]:
-        grid = self.grid(between)
+        """Edges in a range, or in the usual one: those of the whole search that are in it."""
         with np.errstate(all="ignore"):
-            exact = self._exact()
+            low, high = self.searched if between is None else between
+            exact = self._exact(between)
             if exact is not None:
-                return self._of_set(exact, grid[0], grid[-1])
-            grid, status = self._judged(grid)
-            if len(grid) < 2:
-                return ()
-            known = (status[1:] != UNKNOWN) & (status[:-1] != UNKNOWN)
-            at = np.flatnonzero((status[1:] != status[:-1]) & known)
-            low, high = self._narrowed(grid[at], grid[at + 1], status[at])
-            if self.role.domain.low == 0:  # then zero itself is the end of the domain, no edge
-                inside = ~((low == 0) & (high < 1e-9 * np.abs(grid[at + 1])))
-                low, high = low[inside], high[inside]
-            return tuple(self._described(a, b) for a, b in zip(low, high, strict=True))
+                return self._of_set(exact, low, high)
+            return tuple(one for one in self._found(between) if low <= one.value <= high)
 
-    def _judged(self, grid: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Samples, those of hidden windows among them, and their status; without those that rounding decides."""
-        found: list[tuple[Array, NDArray[np.int64], NDArray[np.bool_]]] = []
-        extra = grid
-        while extra.size:
-            point = self.values(extra)
-            if not np.all(known := can_be_counted(point)):
-                extra, point = extra[known], self.values(extra[known])
-            found.append((extra, own := status(point), on_edge(point)))
-            extra = np.empty(0) if len(found) > 1 else self._hidden_windows(extra, own, point)
-        samples, judged, edge = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        samples, at = np.unique(samples, return_index=True)
-        certain = ~edge[at]
-        return samples[certain], judged[at][certain]
+    def _found(self, between: tuple[float, float] | None) -> list[Boundary]:
+        """All edges, rising.
+
+        Where two samples next to each other differ, the lowest change between them is narrowed. Others may hide beside
+        it, so that samples are added ever closer to it from both sides, until whatever differs has been narrowed.
+        """
+        x, kind = self._judged(*(self._usual if between is None else self._asked(between)))
+        low, high = np.empty(0), np.empty(0)
+        for _ in range(_ROUNDS):
+            at = np.flatnonzero(kind[1:] != kind[:-1])
+            if len(at) > _CHANGES:
+                at = at[(kind[at + 1] - kind[at]) % _BESIDE != 0]
+            at = at[~_within(low, x[at], x[at + 1])]
+            if not at.size:
+                break
+            lower, upper = self._narrowed(x[at], x[at + 1], kind[at], kind[at + 1])
+            ends = zip(lower, x[at], upper, x[at + 1], strict=True)
+            beside = [samples.towards(*pair, share=self.share) for a, b, c, d in ends for pair in ((a, b), (c, d))]
+            x, kind = _merged((x, kind), self._certain(np.concatenate(beside)))
+            low, high = np.concatenate([low, lower]), np.concatenate([high, upper])
+        order = np.argsort(low)
+        low, high = low[order], high[order]
+        at = np.searchsorted(x, low, side="right") - 1
+        below, above = kind[at] % _BESIDE, kind[at + 1] % _BESIDE
+        real = (below != above) & (below != UNKNOWN) & (above != UNKNOWN)
+        if self.role.domain.low == 0:
+            real &= low != 0  # zero itself is the end of the domain, no edge
+        return [
+            self._described(low[i], high[i], (x[at[i]], below[i]), (x[at[i] + 1], above[i]))
+            for i in np.flatnonzero(real)
+        ]
+
+    def _asked(self, between: tuple[float, float]) -> tuple[Array, OperatingPoint]:
+        grid = self._grid(between)
+        return grid, self.values(grid)
+
+    def _judged(self, grid: Array, point: OperatingPoint) -> tuple[Array, NDArray[np.int64]]:
+        """Samples, those of hidden windows among them, and their kinds; without those that rounding decides."""
+        valid = np.broadcast_to(point.valid, grid.shape)
+        outside = grid[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
+        here, point = (grid, point) if np.all(valid) else (grid[valid], self.values(grid[valid]))
+        if not np.all(known := can_be_counted(point)):
+            here, point = here[known], self.values(here[known])
+        own = status(point)
+        certain = ~on_edge(point)
+        found = here[certain], _kinds(point, own)[certain]
+        return _merged(found, outside, self._certain(self._hidden_windows(here, own, point)))
+
+    def _certain(self, x: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Samples and their kinds; without those that rounding decides, or whose roots cannot be counted."""
+        x = np.unique(x)
+        if not x.size:
+            return x, np.empty(0, dtype=np.int64)
+        point = self.values(x)
+        valid = np.broadcast_to(point.valid, x.shape)
+        if not np.all(valid):
+            outside = x[~valid], np.full(np.count_nonzero(~valid), UNKNOWN)
+            return _merged(outside, self._certain(x[valid]))
+        if not np.all(known := can_be_counted(point)):
+            return self._certain(x[known])
+        certain = ~on_edge(point)
+        return x[certain], _kinds(point, status(point))[certain]
 
     def _hidden_windows(self, grid: Array, status: NDArray[np.int64], point: OperatingPoint) -> Array:
         """Samples at dips of the damping towards zero, where a narrow window may lie between two samples."""
-        measures = nearness(point)
-        same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:]) & np.isin(status[1:-1], (STABLE, UNSTABLE))
+        measures, (low, high) = nearness(point), self.searched
+        same = (status[1:-1] == status[:-2]) & (status[1:-1] == status[2:])
+        same &= (status[1:-1] == STABLE) | (status[1:-1] == UNSTABLE)
         if point.model.delays:
             same &= unstable_roots(point)[1:-1] <= _FEW
         extra = [np.empty(0)]
@@ -211,7 +269,9 @@ class Search:
             dips = (size[1:-1] <= size[:-2]) & (size[1:-1] <= size[2:])
             dips &= np.maximum(size[:-2], size[2:]) > size[1:-1] * (1 + _FLAT)
             at = np.flatnonzero(dips & same & np.isfinite(measure[1:-1])) + 1
-            at = np.sort(at[np.argsort(size[at], kind="stable")[:_DIPS]])
+            at = at[np.argsort(size[at], kind="stable")]
+            usual = (grid[at] >= low) & (grid[at] <= high)  # what is asked for beyond changes nothing within
+            at = np.sort(np.concatenate([at[usual][:_DIPS], at[~usual][:_DIPS]]))
             if at.size:
                 extra += self._descended(which, np.sign(measure[at]), grid[at - 1], grid[at + 1])
         return np.concatenate(extra)
@@ -228,26 +288,32 @@ class Search:
             low, high = x[row, best - 1], x[row, best + 1]
         return found
 
-    def _narrowed(self, low: Array, high: Array, low_status: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Brackets down to rounding, all at once; keeps the lowest change inside each."""
-        for _ in range(int(60 / np.log2(_SPLIT))):
-            if not len(low):
-                break
-            x = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, _SPLIT + 1)
-            x[:, -1] = high
-            status = self.status(x.ravel()).reshape(x.shape)
-            first = np.argmax(status != low_status[:, None], axis=-1)
-            first = np.where(first == 0, _SPLIT, first)
-            row = np.arange(len(low))
-            low, high = x[row, first - 1], x[row, first]
+    def _narrowed(
+        self, low: Array, high: Array, low_kind: NDArray[np.int64], high_kind: NDArray[np.int64]
+    ) -> tuple[Array, Array]:
+        """Brackets down to rounding, all at once; keeps the lowest change in each, of the status if that differs."""
+        low, high = low.copy(), high.copy()
+        judged = (low_kind - high_kind) % _BESIDE != 0
+        for rows, asked in ((np.flatnonzero(judged), self.status), (np.flatnonzero(~judged), self.kinds)):
+            first = None
+            for _ in range(int(60 / np.log2(_SPLIT)) if rows.size else 0):
+                x = low[rows, None] + (high - low)[rows, None] * np.linspace(0, 1, _SPLIT + 1)
+                x[:, -1] = high[rows]
+                kind = asked(x.ravel()).reshape(x.shape)
+                first = kind[:, :1] if first is None else first
+                at = np.argmax(kind != first, axis=-1)
+                at = np.where(at == 0, _SPLIT, at)
+                row = np.arange(len(rows))
+                low[rows], high[rows] = x[row, at - 1], x[row, at]
         return low, high
 
-    def _described(self, low: float, high: float) -> Boundary:
+    def _described(self, low: float, high: float, below: Sample, above: Sample) -> Boundary:
+        """The edge in a bracket, between two samples of which rounding does not decide."""
         low, high = self._past_rounding(low, high)
-        below, above = (int(s) for s in self.status(np.array([low, high])))
-        lost = self._why_none(low if below == ABSENT else high) if ABSENT in (below, above) else None
+        absent = next((value for value, kind in (below, above) if kind == ABSENT), None)
+        lost = None if absent is None else self._why_none(absent)
         kind, frequency = self._kind(low, high) if lost is None else (lost.condition, 0.0)
-        stable = "above" if above == STABLE else "below" if below == STABLE else "neither"
+        stable = "above" if above[1] == STABLE else "below" if below[1] == STABLE else "neither"
         middle = 0.0 if low <= 0 <= high else low + 0.5 * (high - low)
         bracket = float(low), float(high)
         return Boundary(
@@ -282,9 +348,9 @@ class Search:
         frequency = crossing_frequency(self.values(np.array([low])))
         return ("oscillatory" if frequency else "divergence"), frequency
 
-    def _exact(self) -> StableSet | None:
+    def _exact(self, between: tuple[float, float] | None) -> StableSet | None:
         """The stable set of the stiffness of a slider, and of whatever enters linearly in a machine."""
-        point = operating_point(self.rig, None, self.present, self.branch)
+        point = self.own
         late = bool(point.model.delays)
         if self.name == STIFFNESS:
             with suppress(NotAvailable):  # windows without end
@@ -292,7 +358,7 @@ class Search:
             return None
         if (point.model.is_slider and not late) or not point.exists or self.role.domain.low < 0:
             return None
-        return linear_set(point, self.name)
+        return linear_set(point, self.name, None if self.value else self._sizes[0], self._reach(between))
 
     def _of_set(self, edges: StableSet, low: float, high: float) -> tuple[Boundary, ...]:
         """The exact edges of the stable set."""
@@ -309,9 +375,33 @@ class Search:
         return Boundary(self.name, k, bracket, kind, beta, stable, self.role.unit, self.rig.area_of(self.name))
 
 
+def _kinds(point: OperatingPoint, status: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The status of samples, and beside it which conditions hold; none beside what is no sliding."""
+    more = _BESIDE * ((static_sum(point) > 0) & ~is_neutral(point)) + 2 * _BESIDE * is_ill_posed(point)
+    return np.asarray(status + np.where((status == STABLE) | (status == UNSTABLE), more, 0))
+
+
+def _merged(*parts: tuple[Array, NDArray[np.int64]]) -> tuple[Array, NDArray[np.int64]]:
+    """Samples and their kinds, rising."""
+    x, at = np.unique(np.concatenate([x for x, _ in parts]), return_index=True)
+    return x, np.concatenate([kind for _, kind in parts])[at]
+
+
+def _within(places: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Whether any of some places is in each of some brackets."""
+    rising = np.sort(places)
+    return np.asarray(np.searchsorted(rising, low) < np.searchsorted(rising, high))
+
+
+@question
+def _decay_function(model: Model) -> ArrayFunction:
+    """Decay rates of the memory (1/s) that are numbers in steady sliding, with their signs."""
+    linear = linearise(model)
+    own = [linear.rows[item.symbol][item.symbol] for item in model.memory]
+    known = {*model.arguments}
+    return model.function(rate for rate in own if rate.free_symbols <= known)
+
+
 def _decay_rate(point: OperatingPoint) -> float:
     """Fastest decay rate of the memory (1/s), zero without memory."""
-    model, linear = point.model, linearise(point.model)
-    numbers = dict(zip(model.arguments, (*point.arguments, *point.steady), strict=True))
-    own = [linear.rows[item.symbol][item.symbol].xreplace(numbers) for item in model.memory]
-    return max((abs(float(rate)) for rate in own if rate.is_number), default=0.0)
+    return max((abs(float(rate)) for rate in point.evaluate(_decay_function(point.model))), default=0.0)

@@ -100,6 +100,21 @@ def _static_terms(model: Model) -> ArrayFunction:
     return model.function(part for own in parts for part in own)
 
 
+@question
+def is_neutral(point: OperatingPoint) -> NDArray[np.bool_]:
+    """Where the static stiffness is zero to within rounding, to 9 digits."""
+    if has_closed_form(point.model):
+        part = response_numbers(point)
+        terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]
+    elif point.model.delays or not point.model.is_slider:
+        terms = [np.broadcast_to(term, point.shape) for term in point.evaluate(_static_terms(point.model))]
+        terms = terms or [static_sum(point)]
+    else:
+        p, q = stiffness_polynomials(point)
+        terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
+    return np.asarray(share_left(terms) <= ON_THE_EDGE)
+
+
 def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     """Where the verdict is a matter of rounding: an undamped oscillation, or static stiffness zero, to 9 digits.
 
@@ -108,16 +123,7 @@ def on_edge(point: OperatingPoint) -> NDArray[np.bool_]:
     """
     with np.errstate(all="ignore"):
         undamped = is_near_edge(point, ON_THE_EDGE)
-        if has_closed_form(point.model):
-            part = response_numbers(point)
-            terms = [part.k * np.ones(point.shape), part.mu * part.k * part.B2, part.mu * part.B3]
-        elif point.model.delays or not point.model.is_slider:
-            terms = [np.broadcast_to(term, point.shape) for term in point.evaluate(_static_terms(point.model))]
-            terms = terms or [static_sum(point)]
-        else:
-            p, q = stiffness_polynomials(point)
-            terms = [p[..., 0], point.named()["slider.stiffness"] * q[..., 0]]
-        neutral = share_left(terms) <= ON_THE_EDGE
+        neutral = is_neutral(point)
         edge = np.array(np.broadcast_to(undamped | neutral, point.shape))
         if point.single or len(point.shape) != 1:
             return edge & ~outgrown(point, neutral, ON_THE_EDGE) if np.any(edge) else edge

@@ -31,6 +31,7 @@ from steadyslip.linear.waves import where_alike, where_real
 
 _TURNS = 100  # of an oscillation during the delay, beyond which windows are not looked for any more,
 _PLAIN = 1e-6  # share of a root's speed that leads it across the axis, below which it may as well run along it
+_STEPS = 8  # a decade, at which it is asked where that begins
 _MANY = 20_000  # where the rig itself has none so fast
 
 
@@ -86,11 +87,12 @@ def _of_cells(edges: Array, frequencies: Array, stable: NDArray[np.bool_]) -> St
 def linear_windows(p: Array, q: Array, h: Array, low: float, high: float) -> StableSet | None:
     """Where P + θ Q is stable for θ from `low` to `high`, in between of which is the rig's own one.
 
-    P and Q are (m, n+1), with delays h (m,). The range is cut where there may be windows without end. An interval
-    that begins at `low`, or ends at an uncut `high`, is given as from zero, or to infinity. None where the delay is
-    so long for the rig itself that its windows are too many.
+    P and Q are (m, n+1), with delays h (m,). The range is cut where there may be windows without end, at the same
+    places whatever it is. An interval that begins at `low`, or ends at an uncut `high`, is given as from zero, or to
+    infinity. None where the delay is so long for the rig itself that its windows are too many.
     """
-    scale = np.geomspace(low, high, 97)
+    scale = 10 ** (np.arange(np.floor(_STEPS * np.log10(low)), np.ceil(_STEPS * np.log10(high)) + 1) / _STEPS)
+    low, high = float(scale[0]), float(scale[-1])
     bound = _fastest(p, q, scale)
     turn = 2 * np.pi / max(float(np.max(h)), 1e-300)
     own = float(np.interp(0.0, np.log(scale), bound))

@@ -1,17 +1,15 @@
-"""The compiled core: primitives, tableaus, convergence, and that machine code is what the text says."""
+"""The compiled core: tableaus, convergence, and that machine code is what the text says."""
 
 import ast
 from dataclasses import replace
 from pathlib import Path
 
-import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
 import steadyslip as ss
 from rigs_of_theory import CONTACTS, ONE_MEMORY, rate_state, rig
-from steadyslip.kernels import build, driver_text, linking, primitives, record
+from steadyslip.kernels import build, driver_text, linking, record
 from steadyslip.kernels.driver.jobs import start_job
 from steadyslip.kernels.events import Watched
 from steadyslip.kernels.layout import TALLIED, Cursor, Out, Routines, Row, make_layout
@@ -24,60 +22,6 @@ from steadyslip.kernels.source import Constants, Formulas
 from steadyslip.motion.engine import run_single
 from steadyslip.motion.jobs import Options, prepare
 from tiny_kernel import called, routine_at
-
-mpmath.mp.dps = 50
-
-
-def ulps(name, x):
-    """Error of a primitive in units of the last place."""
-    exact = getattr(mpmath, name)(mpmath.mpf(x))
-    got = mpmath.mpf(float(getattr(primitives, name)(x)))
-    return 0.0 if exact == 0 else float(abs(got - exact) / abs(exact)) / 2**-52
-
-
-wide = st.floats(-1e-12, 1e-12) | st.floats(-1.5, 1.5) | st.floats(-300, 300)
-
-
-@given(wide)
-def test_exp_and_its_kin(x):
-    assert ulps("exp", x) < 2
-    for name in ("expm1", "sinh", "cosh", "tanh", "asinh"):
-        if abs(x) > 1e-290:
-            assert ulps(name, x) < 5, name
-
-
-@given(st.floats(1e-300, 1e300) | st.floats(0.5, 2))
-def test_log(x):
-    assert ulps("log", x) < 2
-
-
-@given(st.floats(1e-300, 1e300))
-def test_rough_logarithm(x):
-    assert abs(primitives.rough_log(x) - np.log(x)) < 0.03
-
-
-@given(st.floats(-1.5, 1.5).filter(lambda x: abs(x) > 1e-290))
-def test_sine(x):
-    assert ulps("sin", x) < 3
-    quarter = abs(float(mpmath.pi / 2 - mpmath.mpf(np.pi / 2)))  # as a float, which x is added to
-    rounded = quarter + 0.5 * np.spacing(abs(x) + np.pi / 2)  # x + pi/2, whose sine it is: relative to 1, not to cos x
-    assert abs(primitives.cos(x) - float(mpmath.cos(mpmath.mpf(x)))) < rounded + 3 * np.spacing(np.cos(x))
-
-
-@given(st.floats(-1e6, 1e6))
-def test_sine_of_large_angles(x):
-    assert abs(primitives.sin(x) - float(mpmath.sin(mpmath.mpf(x)))) < 4e-16
-    assert abs(primitives.cos(x) - float(mpmath.cos(mpmath.mpf(x)))) < 2e-10  # x + pi/2 is rounded
-
-
-def test_primitives_at_the_ends():
-    assert primitives.exp(-1e9) > 0
-    assert np.isfinite(primitives.exp(1e9))
-    assert np.isnan(primitives.log(-1.0))
-    assert 0.0 * primitives.log(0.0) == 0.0
-    assert primitives.asinh_exp(0.5, 800.0) == pytest.approx(800.0, abs=1e-12)
-    assert primitives.asinh_exp(-1e-30, 3.0) == pytest.approx(-1e-30 * np.exp(3.0), rel=1e-14)
-
 
 # -- tableaus
 

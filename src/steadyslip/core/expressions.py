@@ -45,9 +45,9 @@ class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like 
 
 def numpy_asinh_exp(x: Any, y: Any) -> Any:
     """NumPy counterpart of `asinh_exp`."""
-    size = np.log(np.abs(x) + np.finfo(float).tiny) + y
-    small = np.arcsinh(np.exp(np.minimum(size, 20.0)))
-    return np.sign(x) * np.where(size > 20.0, size + np.log(2.0), small)
+    size, half = np.abs(x), np.exp(np.clip(0.5 * y, -700.0, 700.0))
+    product = size * half * half  # neither overflows nor vanishes unless x e^y does
+    return np.sign(x) * np.where(product > 1e150, np.log(size) + y + np.log(2.0), np.arcsinh(product))
 
 
 _PYTHON = frozenset((int, float, bool))
@@ -59,9 +59,10 @@ _NUMPY = {
     sp.Max: "maximum", sp.Min: "minimum", sp.Not: "logical_not",
 }  # fmt: skip
 _COMPARED = {sp.Lt: "<", sp.Le: "<=", sp.Gt: ">", sp.Ge: ">=", sp.Eq: "==", sp.Ne: "!="}
-_JOINED = {sp.And: " & ", sp.Or: " | "}
+_JOINED = {sp.And: " & ", sp.Or: " | ", sp.Xor: " ^ "}
 _WORLD = {
-    name: getattr(np, name, numpy_asinh_exp) for name in (*_NUMPY.values(), "where", "sqrt", "square", "nan", "inf")
+    name: getattr(np, name, numpy_asinh_exp)
+    for name in (*_NUMPY.values(), "where", "sqrt", "square", "power", "nan", "inf")
 }
 
 FEW = 8
@@ -83,7 +84,7 @@ def _of_numbers(function: Callable[..., Any]) -> Callable[..., float]:
 _PLAIN: dict[str, Any] = {
     name: _of_numbers(function) for name, function in _WORLD.items() if callable(function)
 } | {
-    "absolute": abs, "square": lambda x: x * x, "sqrt": math.sqrt, "logical_not": lambda x: not x,
+    "absolute": abs, "square": lambda x: x * x, "sqrt": math.sqrt, "power": math.pow, "logical_not": lambda x: not x,
     "maximum": lambda x, y: x if x >= y or x != x else y, "minimum": lambda x, y: x if x <= y or x != x else y,
     "where": lambda condition, x, y: x if condition else y, "nan": math.nan, "inf": math.inf,
 }  # fmt: skip
@@ -144,6 +145,12 @@ class _Text:
             return f"({parts[0]} {_COMPARED[e.func]} {parts[1]})"
         if e.func in _JOINED:
             return f"({_JOINED[e.func].join(parts)})"
+        if isinstance(e, sp.Implies):
+            return f"(logical_not({parts[0]}) | {parts[1]})"
+        if isinstance(e, sp.Equivalent):
+            return f"(({' & '.join(parts)}) | logical_not({' | '.join(parts)}))"
+        if isinstance(e, sp.ITE):
+            return f"where({', '.join(parts)})"
         if e.func not in _NUMPY:
             raise NotAvailable(f"the equations contain {e.func.__name__}(...), which has no counterpart for arrays")
         while e.func in (sp.Max, sp.Min) and len(parts) > 2:
@@ -181,7 +188,9 @@ class _Text:
             return f"sqrt({self._of(base)})"
         if exponent == 2:
             return f"square({self._of(base)})"
-        return f"({self._of(base)}**{exponent if exponent.is_Integer else self._of(exponent)})"
+        if exponent.is_Integer:
+            return f"({self._of(base)}**{exponent})"
+        return f"power({self._of(base)}, {self._of(exponent)})"  # Python's own is complex where NumPy's is NaN
 
 
 def _number(e: Any) -> str:

@@ -14,12 +14,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, cast
 
-FUNCTIONS = (
+PRIMITIVES = (
     "exp", "log", "log1p", "expm1", "sinh", "cosh", "tanh", "asinh", "asinh_exp", "sin", "cos", "sqrt", "power", "sign",
+    "rough_log",
 )  # fmt: skip
-"""Elementary functions that formulas may use; `steadyslip.kernels.primitives` says what they are."""
-PRIMITIVES = (*FUNCTIONS, "rough_log")
-"""Those that programs may use."""
+"""Elementary functions that programs may use; `steadyslip.kernels.primitives` says what they are."""
 _order = itertools.count()
 
 

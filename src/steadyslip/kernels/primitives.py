@@ -1,7 +1,14 @@
 """Elementary functions for kernels: free of branches and calls, so that lanes vectorise.
 
-Written for nodes of a program and for plain numbers alike. All but `rough_log` are within 5 units in the last place
-(exp 2.5, log 2), as tests/kernels/test_compiled.py measures.
+Written for nodes of a program and for plain numbers alike. Each is within 5 units in the last place, 2^-52 of its
+value, of the exact one for every float, as tests/kernels/test_primitives.py measures, but for what its docstring says.
+For all of them:
+
+- NaN gives NaN, and the sign of zero is not kept.
+- e^x is taken as e^±700 beyond ±700, so that no step meets an infinity: e^x itself, and what grows or falls as it does.
+- A logarithm takes numbers below 2.2e-308, zero among them, as 2.2e-308: it is finite at zero, and v ln v is 0 at rest.
+
+`printers/runtime.js` keeps the same promises.
 """
 
 from __future__ import annotations
@@ -18,6 +25,11 @@ ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer that s
 _DOUBLE, _LONG = struct.Struct("<d"), struct.Struct("<q")
 ONE = 0x3FF0000000000000  # the bits of 1.0
 LN2_HIGH, LN2_LOW = 0.6931471805598903, 5.497923018708371e-14  # the first with 42 bits: times 2^11 it is exact
+LN2 = math.log(2.0)
+TINY, HUGE = 2.0**-1022, (2.0 - 2.0**-52) * 2.0**1023  # the ends of numbers with 53 bits
+LARGE = 2.0**500  # its square is no infinity; asinh of what is beyond is ln 2z to the last bit
+QUARTER = (1.570796325802803, 9.920935774287987e-10, 2.2517417706346578e-18, 3.5215598651832e-27)  # pi/2 in parts
+FARTHEST = 2.0**45  # floats there are 1/128 apart, and turns can no longer be counted much further
 
 
 def bits(x: Any) -> Any:
@@ -53,7 +65,7 @@ def sqrt(x: Any) -> Any:
 
 
 def exp(x: Any) -> Any:
-    """e^x; saturates at e^±700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
+    """e^x to 2.5 units; e^±700 beyond ±700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
 
     What each step of a trajectory waits for: all that can be known beforehand stays off the chain of operations from
     x through r and its powers to the result.
@@ -75,7 +87,7 @@ def exp(x: Any) -> Any:
 
 
 def expm1(x: Any) -> Any:
-    """e^x - 1 without loss of digits near 0."""
+    """e^x - 1; e^700 beyond 700."""
     y = exp(x) - 1.0
     s = smaller(larger(x, -0.35), 0.35)
     tail = 1 / 3628800 + s * (1 / 39916800 + s * (1 / 479001600 + s * (1 / 6227020800)))
@@ -85,9 +97,9 @@ def expm1(x: Any) -> Any:
 
 
 def log(x: Any) -> Any:
-    """ln x; NaN below zero, about -708 at 0 (so that v ln v is 0 at rest)."""
+    """ln x to 2 units; NaN below zero, ln 2.2e-308 = -708.4 from 0 to there, ln 2^1024 = 709.8 at infinity."""
     x = _quick(x)
-    y = larger(x, 2.2250738585072014e-308)
+    y = larger(x, TINY)
     i = bits(y) - 4604544271217802189  # sqrt(1/2): leaves a mantissa in [sqrt(1/2), sqrt(2))
     k = i >> 52
     m = real(bits(y) - (k << 52))
@@ -112,57 +124,70 @@ def rough_log(x: Any) -> Any:
 
 
 def log1p(x: Any) -> Any:
-    """ln(1 + x) without loss of digits near 0."""
-    u = 1.0 + x
-    return log(u) - ((u - 1.0) - x) / u
+    """ln(1 + x); NaN below -1, and at -1 and infinity what `log` gives at zero and infinity."""
+    finite = smaller(x, HUGE)
+    u = 1.0 + finite
+    return log(u) - ((u - 1.0) - finite) / larger(u, TINY)
 
 
 def power(x: Any, y: Any) -> Any:
-    """x^y for x >= 0."""
-    return exp(y * log(x))
+    """x^y to 5 + 2 |y ln|x|| units, of x < 0 for whole y below 2^50 and else NaN; y is finite.
+
+    Zero to a positive power is 0, to a negative one what 2.2e-308 gives. Beyond e^±700 it is these.
+    """
+    size, shifted = abs(x), y + ROUND
+    turned = select(abs((shifted - ROUND) - y) <= 0.0, select((bits(shifted) & 1) > 0, -1.0, 1.0), math.nan)
+    value = exp(y * log(size)) * select(x >= 0.0, 1.0, turned)
+    return select((size <= 0.0) & (y > 0.0), 0.0, value)
 
 
 def sinh(x: Any) -> Any:
-    """Hyperbolic sine without loss of digits near 0."""
+    """Hyperbolic sine; that of ±700 beyond."""
     e = expm1(abs(x))
     y = 0.5 * (e + e / (e + 1.0))
     return select(x >= 0.0, y, -y)
 
 
 def cosh(x: Any) -> Any:
-    """Hyperbolic cosine."""
+    """Hyperbolic cosine; that of ±700 beyond."""
     e = exp(abs(x))
     return 0.5 * (e + 1.0 / e)
 
 
 def tanh(x: Any) -> Any:
-    """Hyperbolic tangent without loss of digits near 0."""
+    """Hyperbolic tangent."""
     e = expm1(2.0 * smaller(abs(x), 20.0))
     y = e / (e + 2.0)
     return select(x >= 0.0, y, -y)
 
 
 def asinh(x: Any) -> Any:
-    """Inverse hyperbolic sine without loss of digits near 0."""
+    """Inverse hyperbolic sine; at infinity 710.5, as of 2^1024."""
     z = abs(x)
-    y = log1p(z + z * z / (1.0 + sqrt(1.0 + z * z)))
+    is_large = z > LARGE
+    y = log1p(select(is_large, z, z + z * z / (1.0 + sqrt(1.0 + z * z)))) + select(is_large, LN2, 0.0)
     return select(x >= 0.0, y, -y)
 
 
 def asinh_exp(x: Any, y: Any) -> Any:
-    """asinh(x e^y) without overflow."""
-    size = log(abs(x)) + y
-    small = asinh(exp(smaller(size, 20.0)))
-    z = select(size > 20.0, size + 0.6931471805599453, small)
-    return select(x >= 0.0, z, -z)
+    """asinh(x e^y) to 15 units, without overflow; below -1400 y counts as -1400."""
+    z = abs(x)
+    half = exp(0.5 * y)
+    product = (z * half) * half  # neither overflows nor vanishes unless x e^y does
+    near = log1p(product + product * product / (1.0 + sqrt(1.0 + product * product)))
+    value = select(product > LARGE, log(z) + y + LN2, near)
+    return select(x >= 0.0, value, -value)
 
 
-def sin(x: Any) -> Any:
-    """Sine; reduction by multiples of pi/2 in three parts, for |x| below 1e7 or so."""
+def _circular(x: Any, quarters: int) -> Any:
+    """Sine of an angle and some quarters of a turn, reduced by multiples of pi/2.
+
+    That is written in four parts, three of them with 29 bits: up to 2^24 times each they are exact.
+    """
     shifted = x * 0.6366197723675814 + ROUND
     n = shifted - ROUND
-    r = ((x - n * 1.5707963267341256) - n * 6.077100506303966e-11) - n * 2.0222662487959506e-21
-    quadrant = bits(shifted)
+    r = (((x - n * QUARTER[0]) - n * QUARTER[1]) - n * QUARTER[2]) - n * QUARTER[3]
+    quadrant = bits(shifted) + quarters
     z = r * r
     s = r + r * z * (
         -0.16666666666666632 + z * (0.00833333333332249 + z * (-0.0001984126982985795 + z * (
@@ -173,14 +198,20 @@ def sin(x: Any) -> Any:
             -2.7557314351390663e-07 + z * (2.087572321298175e-09 + z * -1.1359647557788195e-11))))
     )  # fmt: skip
     value = select((quadrant & 1) > 0, c, s)
-    return select((quadrant & 2) > 0, -value, value)
+    value = select((quadrant & 2) > 0, -value, value)
+    return select(abs(x) <= FARTHEST, value, math.nan)
+
+
+def sin(x: Any) -> Any:
+    """Sine for |x| up to 2.6e7; beyond of an angle within 4 units of x, and NaN beyond 2^45 (3.5e13)."""
+    return _circular(x, 0)
 
 
 def cos(x: Any) -> Any:
-    """Cosine."""
-    return sin(x + 1.5707963267948966)
+    """Cosine, as far and as near as `sin`."""
+    return _circular(x, 1)
 
 
 def sign(x: Any) -> Any:
     """-1, 0 or 1."""
-    return select(x > 0.0, 1.0, select(x < 0.0, -1.0, 0.0))
+    return select(x > 0.0, 1.0, select(x < 0.0, -1.0, x))

@@ -8,6 +8,8 @@ subexpressions of the rest are computed once.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import reduce
+from operator import and_, ge, gt, le, lt, or_
 from typing import Any
 
 import numpy as np
@@ -16,8 +18,11 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.expressions import ArrayFunction, occurrences
-from steadyslip.kernels.nodes import FUNCTIONS, Value, as_node, primitive, select
+from steadyslip.core.expressions import ArrayFunction, asinh_exp, occurrences
+from steadyslip.kernels.nodes import Node, Value, as_node, primitive, select
+
+SQUARED = 2**10
+"""Exponents up to which squares are multiplied; beyond these roundings add up to more than those of `power`."""
 
 
 class Constants:
@@ -201,13 +206,18 @@ class _Evaluation:
         return negative, value / _multiplied(below) if below else value
 
     def _power(self, base: Any, exponent: Any) -> Any:
-        if exponent.is_Integer and 0 < abs(int(exponent)) <= 8:
-            value = _multiplied([self.value(base)] * abs(int(exponent)))
-            return value if exponent > 0 else 1.0 / value
-        if abs(exponent) == sp.Rational(1, 2):
-            root = primitive("sqrt", self.value(base))
-            return root if exponent > 0 else 1.0 / root
-        return primitive("power", self.value(base), self.value(exponent))
+        """Squares for whole exponents, a root besides for halves of odd ones: right for negative numbers too."""
+        value = self.value(base)
+        twice = 2.0 * float(exponent) if exponent.is_Number else 0.5
+        if not (twice.is_integer() and abs(twice) <= 2 * SQUARED):
+            return primitive("power", value, self.value(exponent))
+        whole, half = divmod(abs(int(twice)), 2)
+        factors = [primitive("sqrt", value)] if half else []
+        while whole:
+            factors += [value] if whole & 1 else []
+            whole >>= 1
+            value = value * value if whole else value
+        return _multiplied(factors) if twice > 0 else 1.0 / _multiplied(factors)
 
     def _piecewise(self, e: sp.Piecewise) -> Any:
         value: Any = np.nan
@@ -219,37 +229,40 @@ class _Evaluation:
     def _condition(self, c: Any) -> Any:
         if c in (sp.true, sp.false):
             return bool(c)
-        if c.is_Symbol:
-            return self.value(c)
-        if isinstance(c, Relational):
+        if isinstance(c, Relational) and isinstance(c.lhs, sp.Expr):
             left, right = (self.value(side) for side in (c.lhs, c.rhs))
-            compared = {"<": lambda: left < right, "<=": lambda: left <= right, ">": lambda: left > right,
-                        ">=": lambda: left >= right, "==": lambda: (left <= right) & (left >= right),
-                        "!=": lambda: (left < right) | (left > right)}  # fmt: skip
-            return compared[c.rel_op]()
-        parts = [as_node(self._condition(part), "bool") for part in c.args]
-        if isinstance(c, sp.Not):
-            return ~parts[0]
-        value = parts[0]
-        for part in parts[1:]:
-            value = value & part if isinstance(c, sp.And) else value | part
-        return value
+            if c.rel_op in ("==", "!="):
+                equal = as_node((left <= right) & (left >= right), "bool")
+                return equal if c.rel_op == "==" else ~equal
+            return _COMPARED[c.rel_op](left, right)
+        if type(c) not in _JOINED:
+            raise NotAvailable(
+                f"the equations contain the condition {c}, which cannot be compiled; a law that is to move may use "
+                "comparisons, and And, Or, Not, Xor, Implies, Equivalent and ITE of them"
+            )
+        return _JOINED[type(c)](*(as_node(self._condition(part), "bool") for part in c.args))
 
     def _called(self, e: sp.Expr) -> Any:
-        name = type(e).__name__
         arguments = [self.value(argument) for argument in e.args]
-        if name == "Abs":
+        if isinstance(e, sp.Abs):
             return abs(arguments[0])
-        if name == "tan":
+        if isinstance(e, sp.tan):
             return primitive("sin", *arguments) / primitive("cos", *arguments)
-        if name == "DiracDelta":
+        if isinstance(e, sp.DiracDelta):
             return 0.0  # the derivative of sign, but for one point
-        if name not in FUNCTIONS:
+        if type(e) not in _FUNCTIONS:
             raise NotAvailable(
-                f"the equations contain {name}(...), which cannot be compiled; a law that is to move may use "
-                f"{', '.join(FUNCTIONS)}, tan, abs, powers and Piecewise"
+                f"the equations contain {type(e).__name__}(...), which cannot be compiled; a law that is to move may "
+                f"use {', '.join(_FUNCTIONS.values())}, tan, abs, powers and Piecewise"
             )
-        return primitive(name, *arguments)
+        return primitive(_FUNCTIONS[type(e)], *arguments)
+
+
+def _differ(first: Node, *others: Node) -> Node:
+    """Whether an odd number of conditions holds."""
+    for other in others:
+        first = (first | other) & ~(first & other)
+    return first
 
 
 def _multiplied(factors: Sequence[Any]) -> Any:
@@ -261,3 +274,22 @@ def _multiplied(factors: Sequence[Any]) -> Any:
 
 def _is_number(e: sp.Expr) -> bool:
     return bool(e.is_Number)
+
+
+_FUNCTIONS = {
+    sp.exp: "exp", sp.log: "log", sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh", sp.asinh: "asinh",
+    asinh_exp: "asinh_exp", sp.sin: "sin", sp.cos: "cos", sp.sign: "sign",
+}  # fmt: skip
+_COMPARED: dict[str, Callable[[Any, Any], Any]] = {"<": lt, "<=": le, ">": gt, ">=": ge}
+_JOINED: dict[type, Callable[..., Node]] = {
+    sp.And: lambda *parts: reduce(and_, parts),
+    sp.Or: lambda *parts: reduce(or_, parts),
+    sp.Not: lambda part: ~part,
+    sp.Xor: _differ,
+    sp.Ne: _differ,
+    sp.Implies: lambda cause, effect: ~cause | effect,
+    sp.Equivalent: lambda *parts: reduce(and_, parts) | ~reduce(or_, parts),
+    sp.Eq: lambda left, right: ~_differ(left, right),
+    sp.ITE: lambda condition, yes, no: (condition & yes) | (~condition & no),
+}
+"""Conditions of conditions; `Eq` and `Ne` of two of them, not of numbers."""

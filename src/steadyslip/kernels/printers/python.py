@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from steadyslip.kernels import primitives
 from steadyslip.kernels.nodes import PRIMITIVES, Node, Program
 from steadyslip.kernels.printers.text import Writer
@@ -19,7 +21,8 @@ _OF_INTEGERS = {"shl": "<<", "shr": ">>"}
 
 def function(program: Program, steppable: bool = False) -> Callable[[Any, float, Any], None]:
     """A program as a Python function, its lines at hand for debuggers if it is to be `steppable`."""
-    known = {name: getattr(primitives, name) for name in (*PRIMITIVES, "bits", "real", "as_float")}
+    known = {name: _as_numpy(getattr(primitives, name)) for name in PRIMITIVES} | {"float64": np.float64}
+    known |= {name: getattr(primitives, name) for name in ("bits", "real", "as_float")}
     found: dict[str, Any] = {}
     source, file = text(program), f"<program {next(_numbers)}: {program.name}>"
     if steppable:
@@ -27,6 +30,11 @@ def function(program: Program, steppable: bool = False) -> Callable[[Any, float,
     exec(compile(source, file, "exec"), known | {"math": math}, found)
     made: Callable[[Any, float, Any], None] = found[program.name]
     return made
+
+
+def _as_numpy(primitive: Callable[..., Any]) -> Callable[..., np.float64]:
+    """The same with NumPy's numbers, which can be divided by zero, as those of a record."""
+    return lambda *given: np.float64(primitive(*given))
 
 
 def text(program: Program) -> str:
@@ -42,6 +50,7 @@ class _Python(Writer):
         )
 
     def select(self, condition: str, value: str, other: str) -> str:
+        value, other = (f"float64({one})" if one == "0.0" else one for one in (value, other))  # may be divided by
         return f"({value} if {condition} else {other})"
 
     def operation(self, node: Node, arguments: Sequence[str]) -> str:

@@ -25,21 +25,47 @@ export function rough_log(x) {
   return ((HALVES[1] - 0x3ff00000) * 4294967296 + HALVES[0]) * 1.539095918623324e-16 + 0.02983;
 }
 
-/** ln x; NaN below zero, about -708 at 0. @param {number} x */
-export const log = (x) => (x >= 0 ? Math.log(x > 2.2250738585072014e-308 ? x : 2.2250738585072014e-308) : NaN);
+const TINY = 2 ** -1022, LARGE = 2 ** 500, FARTHEST = 2 ** 45; // as in the kernels
 
-export const abs = Math.abs, sqrt = Math.sqrt, log1p = Math.log1p, sinh = Math.sinh, cosh = Math.cosh, tanh = Math.tanh;
-export const asinh = Math.asinh, sin = Math.sin, cos = Math.cos, sign = Math.sign, power = Math.pow;
+export const abs = Math.abs, sqrt = Math.sqrt, tanh = Math.tanh, sign = Math.sign;
+
+/** ln x; NaN below zero, and finite at both ends. @param {number} x */
+export const log = (x) => (x >= 0 ? Math.log(Math.min(Math.max(x, TINY), Number.MAX_VALUE)) : NaN);
+
+/** ln(1 + x), as finite as log. @param {number} x */
+export const log1p = (x) => (x > -1 && x < LARGE ? Math.log1p(x) : log(1 + x));
+
+/** x^y; within e^±700 but for zero to a positive power. @param {number} x @param {number} y */
+export function power(x, y) {
+  if (x === 0 && y > 0) return 0;
+  const size = Math.min(Math.max(Math.max(Math.abs(x), TINY) ** y, exp(-700)), exp(700)); // NaN stays NaN
+  return x < 0 ? (Number.isInteger(y) ? (y % 2 ? -size : size) : NaN) : size;
+}
 
 /** e^x - 1; saturates as exp does. @param {number} x */
 export const expm1 = (x) => Math.expm1(x > 700 ? 700 : x);
 
+/** Saturates as exp does. @param {number} x */
+export const sinh = (x) => Math.sinh(Math.min(Math.max(x, -700), 700));
+
+/** Saturates as exp does. @param {number} x */
+export const cosh = (x) => Math.cosh(Math.min(Math.abs(x), 700));
+
+/** Inverse hyperbolic sine, as finite as log. @param {number} x */
+export const asinh = (x) => (Math.abs(x) > LARGE ? Math.sign(x) * (log(Math.abs(x)) + Math.LN2) : Math.asinh(x));
+
 /** asinh(x e^y) without overflow. @param {number} x @param {number} y */
 export function asinh_exp(x, y) {
-  const size = log(Math.abs(x)) + y;
-  const z = size > 20 ? size + 0.6931471805599453 : Math.asinh(exp(size));
+  const size = Math.abs(x), half = exp(y / 2), product = size * half * half;
+  const z = product > LARGE ? log(size) + y + Math.LN2 : Math.asinh(product);
   return x >= 0 ? z : -z;
 }
+
+/** Sine; NaN where turns cannot be counted. @param {number} x */
+export const sin = (x) => (Math.abs(x) <= FARTHEST ? Math.sin(x) : NaN);
+
+/** Cosine; NaN where turns cannot be counted. @param {number} x */
+export const cos = (x) => (Math.abs(x) <= FARTHEST ? Math.cos(x) : NaN);
 
 /** The smaller of two; the first where the second is NaN, as in Python. @param {number} a @param {number} b */
 export const smaller = (a, b) => (b < a ? b : a);

@@ -2,6 +2,7 @@
 
 from . import figures as figures, testing as testing, units as units
 from .core.errors import (
+    IllPosedWarning as IllPosedWarning,
     NoSteadySliding as NoSteadySliding,
     NotAvailable as NotAvailable,
     NotKeptWarning as NotKeptWarning,

@@ -297,7 +297,14 @@ def test_delayed_damping_that_outweighs_what_acts_at_once_is_ill_posed():
         assert np.isfinite(ss.growth_rate(machine)) == posed
         found = ss.analyze(machine)
         assert found.reason.startswith("the equations are ill-posed") != posed
+        if not posed:
+            assert "late (by drive.delay)" in found.reason
+            assert "friction" not in found.reason
+            with pytest.warns(ss.IllPosedWarning, match="this rig has no rightmost eigenvalue"):
+                assert np.all(np.isnan(ss.eigenvalues(machine)))
         json.loads(found.to_json())
+    with pytest.warns(ss.IllPosedWarning, match="1 of 2 rigs have no rightmost"):
+        ss.eigenvalues(replace(base, drive=replace(base.drive, kd=0.9)), {"drive.kd": [0.9, 1.1]})
     (edge,) = ss.boundary(replace(base, drive=replace(base.drive, kd=0.9)), "drive.kd", between=(0.5, 3.0))
     assert (edge.kind, edge.value) == ("ill-posed", pytest.approx(1.0, rel=1e-12))
 

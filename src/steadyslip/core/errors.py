@@ -136,6 +136,10 @@ class OutOfRangeWarning(UserWarning):
     """Some rigs of an array have no answer: their numbers leave the range of floating point."""
 
 
+class IllPosedWarning(UserWarning):
+    """Some rigs have no rightmost eigenvalue: their equations are ill-posed, so that infinitely many grow."""
+
+
 class NotKeptWarning(UserWarning):
     """Machine code cannot be kept, so that every process compiles it anew."""
 

@@ -32,6 +32,9 @@ GOOD = 1e-6
 """Share of an eigenvalue that its error may be; beyond it the eigenvalue is computed anew with many digits."""
 _NOISE = np.finfo(float).eps
 _LAST = 8 * _NOISE  # relative rounding of what a few operations make of the machine's numbers
+_BESIDE = 1 + 64 * _NOISE  # times an eigenvalue: a place beside it, where a double one has a slope as well
+_FIRST = 2.0  # times an error to first order: what others nearby may add
+_TRIALS = 4  # of other last digits of the machine's numbers, which exp(−(v/v_s)²), say, makes the more of
 _ALIKE = 100.0  # times the least singular value of a matrix, its rounding included, up to which others vanish with it
 _SWEEPS = 3  # of rows and columns towards one size
 _APART = 0.3  # rad by which the argument of the determinant may be off at a place; a lost eigenvalue makes more than 1
@@ -134,37 +137,53 @@ def _coefficient_errors(point: OperatingPoint, s: ComplexArray) -> Array:
     """What the last digits of the coefficients of the characteristic polynomial do to its roots; zero without one."""
     if not is_written_out(point.model):
         return np.zeros(len(s))
-    c = characteristic(point)
+    c, moved = characteristic(point), characteristic(_retold(point))
     power = np.arange(c.shape[-1])
+    s = s * _BESIDE
     with np.errstate(all="ignore"):
         logs = np.log(np.abs(c)) + power * np.log(np.abs(s))[:, None]  # powers may leave the range of floating point
         terms = np.exp(logs - np.max(logs, axis=1, keepdims=True)) * np.sign(c) * (s / np.abs(s))[:, None] ** power
-        return _spread(s, np.abs(s) * _LAST * np.sum(np.abs(terms), axis=1) / np.abs(terms @ power))
+        wrong = _LAST + np.max(np.abs(moved / np.where(c != 0, c, 1.0) - (c != 0)), axis=0)
+        return _spread(s, np.abs(s) * (np.abs(terms) @ wrong) / np.abs(terms @ power))
+
+
+def _retold(point: OperatingPoint) -> OperatingPoint:
+    """The same rig some times with other last digits."""
+    chance = np.random.default_rng(0)
+    last = 1 + _LAST * chance.choice([-0.5, 0.5], (len(point.arguments), _TRIALS))
+    return point.with_arguments([a * own for a, own in zip(point.arguments, last, strict=True)], (_TRIALS,))
 
 
 @dataclass(frozen=True, eq=False)
 class _Matrix:
-    """M(s) of one rig: the coefficients (n, n, k) before each product of a power of s and of exp(−s delay)."""
+    """M(s) of one rig: the coefficients (n, n, k) before each product of a power of s and of exp(−s delay), and how far
+    the last digits of the rig's numbers move them."""
 
     powers: Array
     late: Array
     entries: Array
-    model: Model
+    wrong: Array
 
     @classmethod
     def of(cls, point: OperatingPoint) -> _Matrix:
         powers, function = matrix_function(point.model)
         table = np.array(powers, dtype=float).reshape(len(powers), -1)
         size = len(characteristic_rows(point.model))
-        entries = np.array([float(np.asarray(e)) for e in point.evaluate(function)]).reshape(size, size, len(powers))
-        return cls(table[:, 0], table[:, 1:] @ delays_of(point), entries, point.model)
+        shape = size, size, len(powers)
+        entries = np.array([float(np.asarray(e)) for e in point.evaluate(function)])
+        values = np.array([float(np.asarray(a)) for a in (*point.arguments, *point.steady)])
+        last = np.random.default_rng(0).choice([-_LAST / 2, _LAST / 2], (len(values), _TRIALS))
+        others = function.rows((values[:, None] * (1 + last)).T)
+        with np.errstate(invalid="ignore"):
+            wrong = _LAST * np.abs(entries) + np.max(np.abs(others - entries), axis=0)
+        return cls(table[:, 0], table[:, 1:] @ delays_of(point), entries.reshape(shape), wrong.reshape(shape))
 
     @property
     def finite(self) -> bool:
         return bool(np.all(np.isfinite(self.entries)))
 
     def even(self, s: ComplexArray) -> tuple[ComplexArray, Array, ComplexArray]:
-        """M at places (p,), sizes of its terms, dM/ds, each (p, n, n) with rows and columns of one size."""
+        """M at places (p,), how wrong its entries may be, and dM/ds, (p, n, n) each; rows and columns of one size."""
         place, top = s[:, None], np.max(self.powers)
         size = np.maximum(np.abs(place), 1.0)  # all is divided by its highest power, which may leave floating point
         unit, late = place / size, np.exp(-place * self.late)
@@ -179,16 +198,16 @@ class _Matrix:
             columns = columns / np.max(sizes * rows[:, :, None] * columns[:, None, :], axis=1)
         units = rows[:, :, None] * columns[:, None, :]
         whole, slope = (np.einsum("ijk,pk->pij", self.entries, f) * units for f in (factor, steeper))
-        return whole, sizes * units, slope
+        return whole, np.einsum("ijk,pk->pij", self.wrong, np.abs(factor)) * units, slope
 
     def errors(self, s: ComplexArray) -> Array:
         """How far each of these is from an eigenvalue of the matrix; inf where that cannot be said."""
         with np.errstate(all="ignore"):
-            whole, sizes, slope = self.even(s)
-            good = np.all(np.isfinite(whole) & np.isfinite(sizes) & np.isfinite(slope), axis=(1, 2))
+            whole, wrong, slope = self.even(s * _BESIDE)
+            good = np.all(np.isfinite(whole) & np.isfinite(wrong) & np.isfinite(slope), axis=(1, 2))
             found = np.full(len(s), np.inf)
             for i in np.flatnonzero(good):
-                found[i] = _distance(whole[i], sizes[i], slope[i])
+                found[i] = _distance(whole[i], wrong[i], slope[i])
         return _spread(s, found)
 
     def has_all(self, s: ComplexArray) -> bool:
@@ -199,12 +218,12 @@ class _Matrix:
         logs = np.log(size)
         omega = np.exp(np.linspace(np.min(logs) - 2, np.max(logs) + 2, _PLACES * len(s) + 3))
         with np.errstate(all="ignore"):
-            whole, sizes, _ = self.even(1j * omega)
-            if not (np.all(np.isfinite(whole)) and np.all(np.isfinite(sizes))):
+            whole, wrong, _ = self.even(1j * omega)
+            if not (np.all(np.isfinite(whole)) and np.all(np.isfinite(wrong))):
                 return False
             left, singular, right = np.linalg.svd(whole)
-            rounding = np.abs(left[:, :, -1])[:, None, :] @ sizes @ np.abs(right[:, -1, :])[:, :, None]
-            clear = len(self.entries) * _NOISE * rounding[:, 0, 0] < _APART * singular[:, -1]
+            rounding = np.abs(left[:, :, -1])[:, None, :] @ wrong @ np.abs(right[:, -1, :])[:, :, None]
+            clear = rounding[:, 0, 0] < _APART * singular[:, -1]
             sign, _ = np.linalg.slogdet(whole)
             apart = 1j * omega[:, None] - s
             turned = sign * np.conj(np.prod(apart / np.abs(apart), axis=1))
@@ -213,15 +232,14 @@ class _Matrix:
         return len(turned) > len(s) and bool(np.all(off < _APART))
 
 
-def _distance(whole: ComplexArray, sizes: Array, slope: ComplexArray) -> float:
+def _distance(whole: ComplexArray, wrong: Array, slope: ComplexArray) -> float:
     """By how much s must change for a matrix to be singular, rounding included."""
     left, singular, right = np.linalg.svd(whole)
     u, v = np.abs(left[:, -1]), np.abs(right[-1])
-    noise = float(u @ sizes @ v) * _LAST
-    least = float(singular[-1]) + noise
+    least = float(singular[-1] + u @ wrong @ v)
     alike = int(np.sum(singular <= _ALIKE * least))  # a space of as many dimensions goes to zero
     steep = np.linalg.svd(left[:, -alike:].conj().T @ slope @ right[-alike:].conj().T, compute_uv=False)
-    return least / float(steep[-1]) if steep[-1] > 0 else np.inf
+    return _FIRST * least / float(steep[-1]) if steep[-1] > 0 else np.inf
 
 
 def _spread(s: ComplexArray, errors: Array) -> Array:
@@ -231,7 +249,7 @@ def _spread(s: ComplexArray, errors: Array) -> Array:
     """
     size = np.maximum(np.abs(s), np.finfo(float).tiny)
     best = np.array(errors)
-    apart = np.sort(np.maximum(np.abs(s[:, None] - s[None, :]), _NOISE * size[:, None]), axis=1)
+    apart = np.sort(np.maximum(np.abs(s[:, None] - s[None, :]), (_BESIDE - 1) * size[:, None]), axis=1)
     with np.errstate(all="ignore"):
         for many in range(2, len(s) + 1):
             moved = (np.log(errors) + np.sum(np.log(apart[:, 1:many]), axis=1)) / many

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from steadyslip.core.questions import question
@@ -11,7 +12,7 @@ from steadyslip.linear.argument import UNKNOWN
 from steadyslip.linear.polynomials import damping_measures, is_hurwitz
 from steadyslip.linear.roots import Array, ComplexArray, roots
 from steadyslip.model.eigenvalues import eigenvalues_of
-from steadyslip.model.linearisation import is_written_out
+from steadyslip.model.linearisation import delays_of_terms, is_written_out
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi
 
@@ -59,6 +60,21 @@ def is_ill_posed(point: OperatingPoint) -> NDArray[np.bool_]:
         return ill_posed(characteristic(point))
     c, _ = quasi(point)
     return np.asarray(ill_posed(c[..., 0, :]) | (_counts(point) == sums.INFINITE))
+
+
+def outweighing_delays(point: OperatingPoint) -> tuple[str, ...]:
+    """Names of the delays by which a single rig is ill-posed; none where it is not, or would be without them.
+
+    Of the highest derivative, that of bodies without mass, what is delayed outweighs what acts at once.
+    """
+    c, _ = quasi(point)
+    if not point.model.delays or ill_posed(c[0]) or _counts(point) != sums.INFINITE:
+        return ()
+    top = int(np.flatnonzero(np.any(c != 0, axis=0))[-1])
+    late = [delay for delay, own in zip(delays_of_terms(point.model), c[:, top], strict=True) if own != 0]
+    return tuple(
+        name for name, symbol in point.model.parameters.items() if any(sp.sympify(d).has(symbol) for d in late)
+    )
 
 
 def ill_posed(c: Array) -> NDArray[np.bool_]:

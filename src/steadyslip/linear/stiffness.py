@@ -8,6 +8,7 @@ to rounding (tests).
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from steadyslip.core.errors import InternalError
+from steadyslip.core.errors import IllPosedWarning, InternalError
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
@@ -125,14 +126,29 @@ def eigenvalues(rig: Slider | Machine, vary: Vary | None = None) -> Any:
     ndarray or xarray.DataArray, shape (..., n), complex
         1/s, sorted by falling real part; NaN where steady sliding does not exist or numbers leave the range of
         floating point (see `stability`), and for the root that a rig lacks when its mass is zero. With a delay, which
-        makes infinitely many, the rightmost, as many as there are without it; NaN where it is ill-posed.
+        makes infinitely many, the rightmost, as many as there are without it; NaN, with an `IllPosedWarning`, where
+        infinitely many grow: on a body without mass, what acts late outweighs what acts at once.
     """
     point = operating_point(rig, vary)
 
     def kernel(part: OperatingPoint) -> ComplexArray:
         return spectrum(part)
 
-    return point.wrap(in_chunks(point, kernel), "eigenvalues", "1/s", ("mode",))
+    found = in_chunks(point, kernel)
+    if point.model.delays and np.any(lost := np.all(np.isnan(found), axis=-1)):
+        _warn_of_delays(int(np.count_nonzero(lost & is_ill_posed(point) & point.exists)), point.size)
+    return point.wrap(found, "eigenvalues", "1/s", ("mode",))
+
+
+def _warn_of_delays(count: int, size: int) -> None:
+    """Say to the caller how many rigs have no rightmost eigenvalue."""
+    if count:
+        which = f"{count} of {size} rigs have" if size > 1 else "this rig has"
+        message = (
+            f"{which} no rightmost eigenvalue (NaN): on a body without mass, what follows velocity late outweighs what "
+            "follows it at once, so that infinitely many grow; give that body a mass, or damping that acts at once"
+        )
+        warnings.warn(message, IllPosedWarning, stacklevel=4)
 
 
 @checked()

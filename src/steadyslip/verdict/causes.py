@@ -13,8 +13,9 @@ import numpy as np
 from steadyslip.linear.cubic import coefficients, hopf_line
 from steadyslip.linear.response import Response, has_closed_form, response_numbers
 from steadyslip.linear.roots import quietly
+from steadyslip.linear.spectrum import outweighing_delays
 from steadyslip.linear.stiffness import stiffness_polynomials
-from steadyslip.model.point import operating_point
+from steadyslip.model.point import OperatingPoint, operating_point
 
 if TYPE_CHECKING:
     from steadyslip.verdict.findings import Findings
@@ -99,9 +100,26 @@ def _why_none_in_general(analysis: Findings) -> str:
     return ""
 
 
+LATE = (
+    "the equations are ill-posed: on a body without mass, what follows velocity late (by {delays}) outweighs what "
+    "follows it at once, so that ever faster oscillations grow; give that body a mass, or make what acts late smaller "
+    "than the damping that acts at once"
+)
+"""What is said where a delay makes the equations ill-posed."""
+
+
+def why_late(point: OperatingPoint) -> str:
+    """That delays make the equations of a single rig ill-posed; empty where they do not."""
+    delays = outweighing_delays(point)
+    return LATE.format(delays=" and ".join(delays)) if delays else ""
+
+
 @quietly
 def why_ill_posed(analysis: Findings) -> str:
     """What makes the equations ill-posed: friction that falls at once, or a contact that takes too much."""
+    late = why_late(operating_point(analysis.rig, branch=analysis.branch))
+    if late:
+        return late
     known = _response(analysis)
     if known is not None:
         numbers = known.as_dict()

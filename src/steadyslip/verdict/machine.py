@@ -22,6 +22,7 @@ from steadyslip.model.point import operating_point
 from steadyslip.model.range import require_range
 from steadyslip.model.sliding import SteadyMachine, steady_machine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
+from steadyslip.verdict.causes import why_late
 from steadyslip.verdict.export import common_numbers, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
@@ -156,7 +157,7 @@ PHRASES = {
 def _reason(found: MachineAnalysis) -> str:
     """What grows, or how near the nearest edge is, in one sentence."""
     if found.growth_rate == math.inf:
-        return PHRASES["are ill-posed"]
+        return why_late(operating_point(found.rig)) or PHRASES["are ill-posed"]
     if found.on_edge:
         return PHRASES["on edge"]
     first = next((one for one in found.margins if one.edge is not None), None)

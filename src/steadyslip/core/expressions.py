@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+import mpmath
 import numpy as np
 import sympy as sp
 
@@ -91,6 +92,17 @@ _PLAIN: dict[str, Any] = {
 """The same for Python's numbers, which raise where NumPy's become inf or NaN."""
 
 
+_PRECISE: dict[str, Any] = {
+    "exp": mpmath.exp, "log": mpmath.log, "sin": mpmath.sin, "cos": mpmath.cos, "tan": mpmath.tan,
+    "sinh": mpmath.sinh, "cosh": mpmath.cosh, "tanh": mpmath.tanh, "arcsin": mpmath.asin, "arccos": mpmath.acos,
+    "arctan": mpmath.atan, "arctan2": mpmath.atan2, "arcsinh": mpmath.asinh, "arccosh": mpmath.acosh,
+    "arctanh": mpmath.atanh, "sign": mpmath.sign, "sqrt": mpmath.sqrt, "nan": mpmath.nan, "inf": mpmath.inf,
+    "asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y)), "mpf": mpmath.mpf,
+    **{name: _PLAIN[name] for name in ("absolute", "square", "logical_not", "maximum", "minimum", "where")},
+}  # fmt: skip
+"""The same for numbers of mpmath."""
+
+
 def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
     """All parts of expressions, and how often each is needed if every part is computed once."""
     found: dict[sp.Basic, int] = {}
@@ -106,10 +118,12 @@ def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
 class _Text:
     """Expressions as lines of Python for NumPy; what occurs several times is computed once."""
 
-    def __init__(self, names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Basic]) -> None:
+    def __init__(
+        self, names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Basic], number: Callable[[Any], str]
+    ) -> None:
         self.lines: list[str] = []
         self._known: dict[sp.Basic, str] = dict(names)
-        self._count = occurrences(expressions)
+        self._count, self._number = occurrences(expressions), number
         self.results = [self._of(expression) for expression in expressions]
 
     def _of(self, e: Any) -> str:
@@ -124,7 +138,7 @@ class _Text:
 
     def _composed(self, e: Any) -> str:
         if e.is_Number or e.is_NumberSymbol:
-            return _number(e)
+            return self._number(e)
         if e.is_Add:
             return f"({self._sum(e)})"
         if e.is_Mul:
@@ -198,6 +212,14 @@ def _number(e: Any) -> str:
     return value if value[0] != "-" else f"({value})"
 
 
+def _precise_number(e: Any) -> str:
+    if e.is_Integer:
+        return f"mpf({int(e)})"
+    if e.is_Rational:
+        return f"(mpf({e.p})/{e.q})"
+    return f"mpf('{e.evalf(60) if e.is_NumberSymbol else float(e)!r}')"
+
+
 class ArrayFunction:
     """A function of the arguments' values that returns the values of all expressions.
 
@@ -211,10 +233,7 @@ class ArrayFunction:
     """
 
     def __init__(self, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> None:
-        names = {symbol: f"p{i}" for i, symbol in enumerate(arguments)}
-        written = _Text(names, [sp.sympify(e) for e in expressions])
-        body = [*written.lines, f"return [{', '.join(written.results)}]"]
-        code = compile(f"def function({', '.join(names.values())}):\n    " + "\n    ".join(body), "<equations>", "exec")
+        code = _compiled(arguments, expressions, _number)
         self._arrays, self._numbers = (_made(code, world) for world in (_WORLD, _PLAIN))
 
     def __call__(self, *values: Any) -> list[Any]:
@@ -244,6 +263,29 @@ def _made(code: Any, world: Mapping[str, Any]) -> Callable[..., list[Any]]:
     exec(code, own)
     function: Callable[..., list[Any]] = own["function"]
     return function
+
+
+class PreciseFunction:
+    """The same to as many digits as mpmath works with: a function of numbers of mpmath that returns such numbers.
+
+    Raises
+    ------
+    NotAvailable
+        If an expression has a function in it that NumPy does not have.
+    """
+
+    def __init__(self, arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr]) -> None:
+        self._function = _made(_compiled(arguments, expressions, _precise_number), _PRECISE)
+
+    def __call__(self, *values: Any) -> list[Any]:
+        return [mpmath.mpmathify(one) for one in self._function(*values)]
+
+
+def _compiled(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr], number: Callable[[Any], str]) -> Any:
+    names = {symbol: f"p{i}" for i, symbol in enumerate(arguments)}
+    written = _Text(names, [sp.sympify(e) for e in expressions], number)
+    body = [*written.lines, f"return [{', '.join(written.results)}]"]
+    return compile(f"def function({', '.join(names.values())}):\n    " + "\n    ".join(body), "<equations>", "exec")
 
 
 def replaced(e: sp.Expr, found: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:

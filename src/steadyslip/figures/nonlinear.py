@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
 
 _MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN)}
-_COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY}
+_COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY, "not decided": BLACK}
 _AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY,
           "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
 _UNDECIDED = ("xx", "++", "oo")
@@ -80,7 +80,12 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
         ax.axhline(drive / speed, **line)
     kind = branch.onset.kind
     mark: dict[str, Any] = {"color": _COLOURS[kind], "marker": "o", "linestyle": "none"}
-    ax.plot([(branch.onset.value - origin) / factor], [onset_speed / speed], label=f"{kind} onset", **mark)
+    ax.plot(
+        [(branch.onset.value - origin) / factor],
+        [onset_speed / speed],
+        label=branch.onset.title,
+        **mark,
+    )
     seen: set[str] = set()
     for point in (*branch.special, *(branch.doubled.special if branch.doubled else ())):
         symbol, colour = _MARKS[point.kind]

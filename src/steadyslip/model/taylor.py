@@ -7,9 +7,9 @@ equation then stays short and so do its derivatives; nothing has to be solved fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 import sympy as sp
@@ -23,6 +23,13 @@ from steadyslip.model.point import OperatingPoint
 
 Index = tuple[int, ...]
 """(equation, variable, ...), variables in rising order."""
+Entry = tuple[Index, Array, Array]
+"""A derivative: where it stands, its values (m,) and their errors (m,)."""
+EPS = float(np.finfo(float).eps)
+PATTERNS = 4
+"""Signs with which all numbers of a rig are moved by one rounding, to see how far derivatives move."""
+OPERATIONS = 4
+"""In a row that an entry takes on the average: each rounds by half of `EPS` at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +44,17 @@ class System:
         How many of them have a time derivative (the first ones).
     entries : tuple of (Index, ...)
         For orders one, two and three: where derivatives do not vanish.
+    expressions : tuple of sympy.Expr
+        These derivatives in steady sliding, in order.
+    function : ArrayFunction
+        Of them.
     """
 
     model: Model
     unknowns: tuple[sp.Symbol, ...]
     dynamic: int
     entries: tuple[tuple[Index, ...], ...]
+    expressions: tuple[sp.Expr, ...]
     function: ArrayFunction
 
     def place(self, symbol: sp.Symbol) -> int:
@@ -87,8 +99,8 @@ def system(model: Model) -> System:
                 if value != 0:
                     entries[order - 1].append((row, *index))
                     expressions[order - 1].append(value)
-    function = model.function(e for part in expressions for e in part)
-    return System(model, tuple(unknowns), len(variables), tuple(map(tuple, entries)), function)
+    flat = tuple(e for part in expressions for e in part)
+    return System(model, tuple(unknowns), len(variables), tuple(map(tuple, entries)), flat, model.function(flat))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,57 +109,70 @@ class Taylor:
 
     Attributes
     ----------
-    gradient : ndarray (m, n, n)
-    second, third : list of (Index, ndarray (m,))
+    gradient, gradient_error : ndarray (m, n, n)
+        Errors are what rounding makes of all numbers, those of the rig included.
+    second, third : list of Entry
     mass : ndarray (n,)
         Ones for equations with a time derivative, zeros for the others.
     """
 
     system: System
     gradient: Array
-    second: list[tuple[Index, Array]]
-    third: list[tuple[Index, Array]]
+    gradient_error: Array
+    second: list[Entry]
+    third: list[Entry]
     mass: Array
+
+    def sizes(self) -> Taylor:
+        """The same with the absolute values of higher derivatives."""
+        second, third = ([(at, np.abs(e), error) for at, e, error in part] for part in (self.second, self.third))
+        return replace(self, second=second, third=third)
+
+    def errors(self) -> Taylor:
+        """The same with the errors of higher derivatives in their place."""
+        second, third = ([(at, error, error) for at, _, error in part] for part in (self.second, self.third))
+        return replace(self, second=second, third=third)
 
     def quadratic(self, u: Array, v: Array) -> Array:
         """Second derivative applied to two directions (m, n), symmetric."""
         out: Array = np.zeros_like(u * v)
-        for (row, j, k), value in self.second:
+        for (row, j, k), value, _ in self.second:
             out[:, row] += value * (u[:, j] * v[:, k] + (u[:, k] * v[:, j] if j != k else 0))
         return out
 
     def cubic(self, u: Array, v: Array, w: Array) -> Array:
         """Third derivative applied to three directions (m, n), symmetric."""
         out: Array = np.zeros_like(u * v * w)
-        for (row, *index), value in self.third:
-            for a, b, c in _arrangements(*index):
+        for (row, *index), value, _ in self.third:
+            for a, b, c in arrangements(*index):
                 out[:, row] += value * u[:, a] * v[:, b] * w[:, c]
         return out
 
 
 @lru_cache(maxsize=1024)
-def _arrangements(i: int, j: int, k: int) -> tuple[Index, ...]:
-    return tuple({(i, j, k), (i, k, j), (j, i, k), (j, k, i), (k, i, j), (k, j, i)})
+def arrangements(*index: int) -> tuple[Index, ...]:
+    """Every order of some variables, once."""
+    return tuple(set(permutations(index)))
 
 
 def taylor(point: OperatingPoint) -> Taylor:
     """Derivatives of every rig of an operating point (flat arrays) in its steady sliding."""
     found = system(point.model)
-    stresses = [np.atleast_1d(np.asarray(one, dtype=float)) for one in point.steady]
-    numbers = found.function(*map(np.asarray, point.arguments), *stresses)
-    size = max([1, *(np.size(x) for x in numbers)])
-    columns = [np.broadcast_to(np.asarray(x, dtype=float), (size,)) for x in numbers]
-    n = len(found.unknowns)
-    gradient = np.zeros((size, n, n))
-    first, second, third = (len(part) for part in found.entries)
-    for (row, j), column in zip(found.entries[0], columns, strict=False):
-        gradient[:, row, j] = column
+    arguments = [np.atleast_1d(np.asarray(one, dtype=float)) for one in (*point.arguments, *point.steady)]
+    signs = np.random.default_rng(0).choice((-1.0, 1.0), (PATTERNS, len(arguments)))
+    moved = 1.0 + EPS * np.concatenate([np.zeros((1, len(arguments))), signs])
+    numbers = found.function(*(factor[:, None] * one for factor, one in zip(moved.T, arguments, strict=True)))
+    shape = np.broadcast_shapes((PATTERNS + 1, 1), *(np.shape(one) for one in numbers))
+    entries: list[Entry] = []
+    for place, number in zip((place for part in found.entries for place in part), numbers, strict=True):
+        whole = np.broadcast_to(np.asarray(number, dtype=float), shape)
+        error = np.max(np.abs(whole[1:] - whole[0]), axis=0) + OPERATIONS * EPS * np.abs(whole[0])
+        entries.append((place, whole[0], error))
+    n, first, second = len(found.unknowns), *(len(part) for part in found.entries[:2])
+    gradient = np.zeros((2, shape[1], n, n))
+    for (row, j), *both in entries[:first]:
+        gradient[:, :, row, j] = both
     mass = np.zeros(n)
     mass[: found.dynamic] = 1.0
-    return Taylor(
-        found,
-        gradient,
-        list(zip(found.entries[1], columns[first : first + second], strict=True)),
-        list(zip(found.entries[2], columns[first + second : first + second + third], strict=True)),
-        mass,
-    )
+    values, errors = gradient
+    return Taylor(found, values, errors, entries[first : first + second], entries[first + second :], mass)

@@ -147,7 +147,7 @@ def _onset(rig: Slider, distances: tuple[Margin, ...], branch: int) -> Onset | N
         if margin.parameter == name:
             edges = [e for e in margin.edges if e.kind == "oscillatory" and e.stable != "neither"]
             if edges:
-                with suppress(NotAvailable):  # lost in rounding
+                with suppress(NotAvailable):  # with a delay
                     return onset_at(rig, min(edges, key=lambda e: abs(e.value - margin.value)), branch)
     return None
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError
+from steadyslip.core.errors import NoSteadySliding, ParameterError
 from steadyslip.core.pictures import draw
 from steadyslip.core.telling import shown
 from steadyslip.linear import formula as linear_formula
@@ -121,10 +121,7 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
 def _onset(machine: Machine, distances: Sequence[Margin]) -> Onset | None:
     """What happens at the oscillatory edge that is nearest, of all parameters."""
     nearest = oscillatory_edge(distances)
-    try:
-        return None if nearest is None else onset_at(machine, nearest)
-    except NotAvailable:  # lost in rounding
-        return None
+    return None if nearest is None else onset_at(machine, nearest)
 
 
 def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:

@@ -28,6 +28,7 @@ _ONSETS = {
     "subcritical": "on the stable side of the edge in stiffness an unstable oscillation surrounds steady sliding, the "
     "smaller the nearer the edge; larger kicks do not die out",
     "degenerate": "at the edge in stiffness, small oscillations neither grow nor decay to lowest order",
+    "not decided": "at the edge in stiffness, what tells whether oscillation begins small is lost in rounding",
 }
 
 BEYOND = {

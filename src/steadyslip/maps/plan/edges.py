@@ -17,9 +17,9 @@ from steadyslip.linear.response import has_closed_form
 from steadyslip.linear.stable_values import edge_along, intervals_along, is_own_stiffness, name_along, stable_intervals
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
-from steadyslip.maps.plan.measures import ONSET, Measure, Output, block_of
+from steadyslip.maps.plan.measures import Measure, Output, block_of
 from steadyslip.model.point import Vary, operating_point
-from steadyslip.nonlinear.onset.hopf import onset_map, parameter_along
+from steadyslip.nonlinear.onset.hopf import KINDS, onset_map, parameter_along
 from steadyslip.protocol import Protocol
 
 
@@ -166,7 +166,7 @@ class OnsetKind(Along, name="onset"):
         full = self.name_of(rig)
         edge = "stiffness" if self.is_own(rig) else full
         return (
-            Output("onset", "1", "kind of onset", ONSET),
+            Output("onset", "1", "kind of onset", KINDS),
             Output("onset_edge", "Pa/m" if self.is_own(rig) else self.unit(rig)[1], f"{edge} at the oscillatory edge"),
             Output("onset_coefficient", "1/s", "cubic coefficient of the onset"),
         )

@@ -41,8 +41,6 @@ SECONDS_OF_DELAY = 1e-2  # to count infinitely many roots
 PROBES = 64
 NOT_DONE = -1
 
-ONSET = ("none", "supercritical", "subcritical", "degenerate")
-
 
 @dataclass(frozen=True)
 class Output:

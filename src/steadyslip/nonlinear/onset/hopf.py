@@ -25,18 +25,21 @@ from steadyslip.core.telling import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.linear_sets import linear_sets
 from steadyslip.linear.polynomials import stable_set
-from steadyslip.linear.roots import quietly
 from steadyslip.linear.search import Boundary
 from steadyslip.linear.stiffness import in_chunks, stiffness_polynomials
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, require_range
-from steadyslip.model.taylor import Taylor, taylor
+from steadyslip.nonlinear.onset.coefficient import Cubic, coefficients
+from steadyslip.nonlinear.onset.digits import coefficient as in_digits
 
 Array = np.ndarray
-ROUNDING = 1e-9
-"""c1 below this share of the terms that it is the sum of cannot be told from zero."""
+TRUSTED = 1e-6
+"""Error of c1, as a share of it, above which it is computed once more with more digits."""
+WEAK = 1e-9
+"""Share of c1 in the terms that it is the sum of, down to which motion in sixteen digits sees it."""
+UNDECIDED = "not decided"
 
 
 @dataclass(frozen=True)
@@ -52,11 +55,15 @@ class Onset(Displayed):
         Its value at the edge, SI units.
     unit : str
     kind : str
-        ``supercritical``, ``subcritical`` or ``degenerate``.
+        ``supercritical``, ``subcritical``, ``degenerate`` (`coefficient` vanishes in exact arithmetic) or ``not
+        decided`` (it is below its `error`).
     coefficient : float
-        c1, growth rate of amplitude per squared amplitude of ln v, 1/s; of a machine that at `contact`.
+        c1, growth rate of amplitude per squared amplitude of ln v, 1/s; of a machine that at `contact`. NaN beyond
+        floating point.
+    error : float
+        By how much rounding may have changed it, that of the rig's own numbers included, 1/s.
     share : float
-        |c1| as a share of the terms that it is the sum of; below 1e-9 it is zero to within rounding: degenerate.
+        |c1| as a share of the terms that it is the sum of.
     angular_frequency : float
         rad/s.
     growth_slope : float
@@ -77,6 +84,7 @@ class Onset(Displayed):
     unit: str
     kind: str
     coefficient: float
+    error: float
     share: float
     angular_frequency: float
     growth_slope: float
@@ -84,6 +92,21 @@ class Onset(Displayed):
     stable: str
     contact: str = ""
     shares: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def has_sign(self) -> bool:
+        """Whether the cubic coefficient is known to be of one sign."""
+        return self.kind in ("supercritical", "subcritical")
+
+    @property
+    def is_weak(self) -> bool:
+        """Whether motion in ordinary numbers does not see the cubic coefficient, or nobody knows its sign."""
+        return not (self.has_sign and self.share > WEAK)
+
+    @property
+    def title(self) -> str:
+        """The kind with its noun."""
+        return "onset of a kind not decided" if self.kind == UNDECIDED else f"{self.kind} onset"
 
     @property
     def normalised(self) -> float:
@@ -95,7 +118,7 @@ class Onset(Displayed):
 
         Lowest order: the error grows with the distance from the edge.
         """
-        if self.kind == "degenerate":
+        if not self.has_sign:
             return np.full(np.shape(value), np.nan)[()]
         with np.errstate(invalid="ignore"):
             squared = -self.growth_slope * (np.asarray(value, dtype=float) - self.value) / self.coefficient
@@ -121,11 +144,15 @@ class Onset(Displayed):
 
     def __str__(self) -> str:
         edge = shown(self.value, self.unit, 6, self.rig.area_of(self.along))
-        lines = [f"{self.kind} onset at {self.along} = {edge}", f"  {self.meaning}"]
+        lines = [f"{self.title} at {self.along} = {edge}", f"  {self.meaning}"]
         where = f" at {self.contact}" if self.contact else ""
-        size = f"{self.normalised:.4g} of the frequency per squared amplitude of ln v{where}"
+        size = f"{self.normalised:.4g}{self._within()} of the frequency per squared amplitude of ln v{where}"
         lines.append(f"  cubic coefficient {size}, period {shown(2 * np.pi / self.angular_frequency, 's')}")
         return "\n".join(lines)
+
+    def _within(self) -> str:
+        """The error of the coefficient in words, where it matters."""
+        return f" ± {self.error / self.angular_frequency:.2g}" if self.kind == UNDECIDED else ""
 
 
 MEANINGS = {
@@ -133,8 +160,9 @@ MEANINGS = {
     "this says nothing about large kicks",
     "subcritical": "just on the stable side a small unstable oscillation surrounds steady sliding, "
     "and a small kick is enough to throw it out; farther from the edge this says nothing",
-    "degenerate": "the cubic coefficient vanishes to rounding: at the edge small oscillations neither grow nor decay "
-    "to lowest order, and larger ones decide",
+    "degenerate": "the cubic coefficient vanishes: at the edge small oscillations neither grow nor decay to lowest "
+    "order, and larger ones decide",
+    UNDECIDED: "the cubic coefficient is smaller than what rounding of the numbers may have made of it",
 }
 
 
@@ -164,8 +192,7 @@ def hopf(rig: Slider | Machine, along: str = "stiffness", *, branch: int = 0) ->
 
     Notes
     -----
-    First Lyapunov coefficient by projection on the critical eigenvectors (Kuznetsov, Elements of Applied
-    Bifurcation Theory, eq. 5.62), for the Model as a differential-algebraic system; theory 6 has closed forms.
+    First Lyapunov coefficient as in `steadyslip.nonlinear.onset.coefficient`; theory 6 has closed forms.
     """
     name = parameter_along(rig, along)
     edges = [edge for edge in boundary(rig, name, branch=branch) if edge.stable != "neither"]
@@ -189,38 +216,27 @@ def parameter_along(rig: Slider | Machine, along: str) -> str:
 
 
 def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
-    """Kind of onset at an oscillatory edge found before.
-
-    Raises
-    ------
-    NotAvailable
-        If the numbers of the rig are so far apart that rounding hides it.
-    """
+    """Kind of onset at an oscillatory edge found before."""
     name = edge.parameter
     point = _flat(rig, name, [edge.value], branch)
-    found = coefficients(point, np.array([edge.angular_frequency]))
-    if not np.isfinite(found["c1"][0]):
-        where = f"{name} = {shown(edge.value, edge.unit, area=rig.area_of(name))}"
-        raise NotAvailable(
-            f"the kind of onset at {where} cannot be told: the numbers of this rig are so far apart that it is lost in "
-            "rounding, or beyond floating point"
-        )
+    found, kind = onsets(point, np.array([edge.angular_frequency]), name)
     names = [contact.name for contact in point.model.contacts]
-    most = int(found["contact"][0])
+    most = int(found.contact[0])
     return Onset(
         rig=rig,
         along=name,
         value=edge.value,
         unit=edge.unit,
-        kind=str(kinds(found)[0]),
-        coefficient=float(found["c1"][0]),
-        share=float(found["share"][0]),
+        kind=str(kind[0]),
+        coefficient=float(found.c1[0]),
+        error=float(found.error[0]),
+        share=float(found.share[0]),
         angular_frequency=edge.angular_frequency,
         growth_slope=_growth_slope(rig, name, edge, branch),
-        stress_ratio=float(found["stress_ratio"][0]),
+        stress_ratio=float(found.stress_ratio[0]),
         stable=edge.stable,
         contact=names[most],
-        shares=dict(zip(names, map(float, found["shares"][0]), strict=True)) if names[most] else {},
+        shares=dict(zip(names, map(float, found.shares[0]), strict=True)) if names[most] else {},
     )
 
 
@@ -242,14 +258,28 @@ def _growth_slope(rig: Slider | Machine, name: str, edge: Boundary, branch: int)
     return float((-(slope @ powers) / down).real)
 
 
-def kinds(found: dict[str, Array]) -> Array:
-    """Words for coefficients."""
-    named = np.where(found["c1"] < 0, "supercritical", "subcritical").astype(object)
-    named[~(found["share"] > ROUNDING)] = "degenerate"
-    return named
+def onsets(point: OperatingPoint, omega: Array, along: str) -> tuple[Cubic, Array]:
+    """Cubic coefficients of rigs on an oscillatory edge (flat, m), and in words the kinds of onset (m,).
+
+    Where rounding may have changed a coefficient by more than `TRUSTED` of it, it is computed with more digits, the
+    edge being found anew along the parameter `along`.
+    """
+    found = coefficients(point, omega)
+    c1, error = found.c1.copy(), found.error.copy()
+    name = along if along in point.model.parameters else "slider.stiffness"  # k where the axial one is given
+    for i in np.flatnonzero(~(error <= TRUSTED * np.abs(c1))):
+        own = point.part(np.array([i]))
+        exact = in_digits(own, name, float(omega[i]), int(found.contact[i]), found.vector[i], float(error[i]))
+        if exact is not None:
+            c1[i], error[i] = exact
+    kind = np.where(c1 < 0, "supercritical", "subcritical").astype(object)
+    kind[~(np.abs(c1) > error)] = UNDECIDED
+    kind[(c1 == 0) & (error == 0)] = "degenerate"
+    return replace(found, c1=c1, error=error), kind
 
 
-NO_EDGE, SUPERCRITICAL, SUBCRITICAL, DEGENERATE = range(4)
+KINDS = ("none", "supercritical", "subcritical", "degenerate", UNDECIDED)
+"""Kinds of onset of many rigs, by the numbers that stand for them."""
 
 
 def onset_map(
@@ -268,8 +298,8 @@ def onset_map(
     Returns
     -------
     dict of str to ndarray or xarray.DataArray
-        ``kind`` (0 where there is no such edge, 1 supercritical, 2 subcritical, 3 degenerate),
-        ``edge`` (SI; of the gain kp for a rig without spring) and ``coefficient`` (c1, 1/s), both NaN there.
+        ``kind`` (place in `KINDS`, ``none`` where there is no such edge), ``edge`` (SI; of the gain kp for a rig
+        without spring) and ``coefficient`` (c1, 1/s), both NaN there.
 
     Raises
     ------
@@ -307,105 +337,13 @@ def _onsets(point: OperatingPoint, name: str) -> Array:
     nearest = np.argmin(distance, axis=1)
     rows = np.flatnonzero(usable.any(axis=1))
     result = np.full((count, 3), np.nan)
-    result[:, 0] = NO_EDGE
+    result[:, 0] = KINDS.index("none")
     if len(rows):
         flat = [np.broadcast_to(a, point.shape).reshape(-1)[rows] if np.ndim(a) else a for a in arguments]
         flat[place] = edges[rows, nearest[rows]]
         at_edge = replace(point, arguments=tuple(flat), shape=(len(rows),))
-        numbers = coefficients(at_edge, frequencies[rows, nearest[rows]])
-        words = np.array(["", "supercritical", "subcritical", "degenerate"])
-        known = np.isfinite(numbers["c1"])
-        kind = np.argmax(kinds(numbers)[:, None] == words, axis=1)
-        result[rows, 0] = np.where(known, kind, NO_EDGE)
-        result[rows, 1] = np.where(known, flat[place], np.nan)
-        result[rows, 2] = numbers["c1"]
+        numbers, kind = onsets(at_edge, frequencies[rows, nearest[rows]], name)
+        result[rows, 0] = [KINDS.index(one) for one in kind]
+        result[rows, 1] = flat[place]
+        result[rows, 2] = numbers.c1
     return result.reshape(*point.shape, 3)
-
-
-@quietly
-def coefficients(point: OperatingPoint, omega: Array) -> dict[str, Array]:
-    """First Lyapunov coefficients of rigs on an oscillatory edge.
-
-    Parameters
-    ----------
-    point : OperatingPoint
-        Flat arrays, (m,).
-    omega : ndarray (m,)
-        Angular frequency there, rad/s.
-
-    Returns
-    -------
-    dict
-        ``c1`` (1/s), ``share`` (|c1| over the terms that it is the sum of), ``stress_ratio`` (Pa, of machines N), each
-        (m,); NaN where they are lost in rounding or leave the range of floating point. ``contact``: number of the one
-        where slip oscillates most, as a share of its velocity, to whose ln v amplitudes refer; ``shares``
-        (m, contacts): amplitude of ln v at each over that.
-    """
-    expansion = taylor(point)
-    size = max(len(omega), len(expansion.gradient))
-    omega = np.broadcast_to(omega, (size,))
-    contacts = point.model.contacts
-    wanted = [point.model.steady[contact.velocity] for contact in contacts] + [contact.area for contact in contacts]
-    numbers = [np.broadcast_to(one, (size,)) for one in point.evaluate(point.model.function(wanted))]
-    return _projected(expansion, omega, *np.split(np.stack(numbers, axis=1), 2, axis=1))
-
-
-def _projected(expansion: Taylor, omega: Array, speeds: Array, areas: Array) -> dict[str, Array]:
-    """The same from Taylor terms, steady slip rates and areas of the contacts (m, contacts)."""
-    n = len(expansion.mass)
-    gradient = np.broadcast_to(expansion.gradient, (len(omega), n, n))
-    mass = np.diag(expansion.mass)
-    rows, columns = _equilibrated(np.abs(gradient) + omega[:, None, None] * mass)
-
-    def scaled(matrix: Array) -> Array:
-        return np.asarray(rows[:, :, None] * matrix * columns[:, None, :])
-
-    def solve(matrix: Array, right: Array) -> Array:
-        """matrix⁻¹ right, in scaled rows and columns; NaN where rounding has made the matrix singular."""
-        balanced = scaled(matrix)
-        singular = ~np.all(np.isfinite(balanced), axis=(1, 2))
-        balanced = np.where(singular[:, None, None], np.eye(n), balanced)
-        singular |= np.linalg.cond(balanced) > 1 / np.finfo(float).eps
-        balanced = np.where(singular[:, None, None], np.eye(n), balanced)
-        found: Array = columns * np.linalg.solve(balanced, (rows * right)[:, :, None])[:, :, 0]
-        return np.where(singular[:, None], np.nan, found)
-
-    critical = scaled(gradient - 1j * omega[:, None, None] * mass)
-    beyond = ~np.all(np.isfinite(critical), axis=(1, 2))  # of floating point
-    left, _, right = np.linalg.svd(np.where(beyond[:, None, None], np.eye(n), critical))
-    q = columns * right[:, -1].conj()
-    p = rows * left[:, :, -1]
-    place, model = expansion.system.place, expansion.system.model
-    v, spring = ([place(getattr(one, what)) for one in model.contacts] for what in ("velocity", "spring"))
-    relative = q[:, v] / speeds
-    most = np.argmax(np.abs(relative), axis=1)
-    rows_of = np.arange(len(q))
-    q = q * (0.5 / relative[rows_of, most])[:, None]
-    p = p / np.sum(p.conj() * (q @ mass), axis=1)[:, None].conj()
-    steady = -solve(gradient.astype(complex), expansion.quadratic(q, q.conj()))
-    double = solve(2j * omega[:, None, None] * mass - gradient, expansion.quadratic(q, q))
-    terms = [
-        0.5 * np.sum(p.conj() * part, axis=1)
-        for part in (
-            expansion.cubic(q, q, q.conj()),
-            2 * expansion.quadratic(q, steady),
-            expansion.quadratic(q.conj(), double),
-        )
-    ]
-    c1 = np.where(beyond, np.nan, np.real(sum(terms)))
-    with np.errstate(all="ignore"):
-        share = np.abs(c1) / sum(np.abs(term) for term in terms)
-        shares = np.abs(relative) / np.abs(relative[rows_of, most])[:, None]
-    pull = 2 * np.abs(q[:, spring]) * (1.0 if model.is_slider else areas)
-    return {"c1": c1, "share": share, "stress_ratio": pull[rows_of, most], "contact": most, "shares": shares}
-
-
-def _equilibrated(size: Array) -> tuple[Array, Array]:
-    """Factors for rows and columns that bring the largest entries near one: units must not decide pivots."""
-    rows, columns = np.ones(size.shape[:2]), np.ones(size.shape[:2])
-    for _ in range(6):
-        scaled = rows[:, :, None] * size * columns[:, None, :]
-        rows = rows / np.sqrt(np.maximum(scaled.max(axis=2), 1e-300))
-        scaled = rows[:, :, None] * size * columns[:, None, :]
-        columns = columns / np.sqrt(np.maximum(scaled.max(axis=1), 1e-300))
-    return rows, columns

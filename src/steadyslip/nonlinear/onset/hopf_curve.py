@@ -27,7 +27,8 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import characteristic, in_range
 from steadyslip.nonlinear.continuation import Failure, Point, Track, turned_round
-from steadyslip.nonlinear.onset.hopf import coefficients, kinds, parameter_along
+from steadyslip.nonlinear.onset.coefficient import coefficients
+from steadyslip.nonlinear.onset.hopf import onsets, parameter_along
 
 Array = np.ndarray
 DECADES = 6.0
@@ -70,7 +71,7 @@ class HopfCurve(ReadOnly):
     coefficient : ndarray (n,)
         Cubic coefficient c1 of the onset (1/s), see `steadyslip.hopf`.
     kind : ndarray of str (n,)
-        ``supercritical``, ``subcritical`` or ``degenerate``.
+        As `Onset.kind`.
     is_edge : ndarray of bool (n,)
         False where another eigenvalue is unstable anyway, so that stability does not change.
     special : tuple of SpecialPoint
@@ -306,23 +307,22 @@ def _described(
     u = np.array([point.u for point in points])
     values = plane.values(u)
     first, second, omega = plane.parameters(u)
-    found = coefficients(values, omega)
-    kind = kinds(found)
+    found, kind = onsets(values, omega, plane.names[1])
     growth = roots(characteristic(values))
     beside = np.where(np.abs(np.abs(growth.imag) - omega[:, None]) < 1e-6 * omega[:, None], -np.inf, growth.real)
     is_edge = np.max(np.where(np.isnan(beside), -np.inf, beside), axis=1) <= 0
 
     def measure(point: Point) -> float:
         at = point.u[None]
-        return float(coefficients(plane.values(at), plane.parameters(at)[2])["c1"][0])
+        return float(coefficients(plane.values(at), plane.parameters(at)[2]).c1[0])
 
     def named(point: Point) -> dict[str, float]:
         return dict(zip(plane.names, map(float, plane.parameters(point.u)[:2]), strict=True))
 
     special = []
-    c1 = found["c1"]
+    c1, signs = found.c1, {"supercritical", "subcritical"}
     for i in range(len(points) - 1):
-        if c1[i] * c1[i + 1] < 0 and "degenerate" not in (kind[i], kind[i + 1]):
+        if {kind[i], kind[i + 1]} == signs:
             try:
                 pair = curve.located(points[i], points[i + 1], measure, float(c1[i]), float(c1[i + 1]))
             except Failure:

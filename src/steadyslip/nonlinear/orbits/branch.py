@@ -211,7 +211,7 @@ class CycleBranch(Displayed):
         area = self._area("value")
         edge = shown(self.onset.value, self.unit, 6, area)
         drops, drop_unit = ("stress_drop", "Pa") if isinstance(self.rig, Slider) else ("force_drop", "N")
-        lines = [f"cycles along {self.along} from a {self.onset.kind} onset at {edge}: {len(self.cycles)} cycles"]
+        lines = [f"cycles along {self.along} from the {self.onset.title} at {edge}: {len(self.cycles)} cycles"]
         if self.cycles:
             v = self["peak_velocity"], self["lowest_velocity"]
             period, drop = self["period"], self[drops]

@@ -147,7 +147,7 @@ class Tracer:
         tangent = np.append(start / np.hypot(flow.scales, steady), [0.0, 0.0])
         first = shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent))
         away = abs(onset.coefficient / onset.growth_slope) * amplitude**2 / self.unit_of_value
-        if onset.kind != "degenerate" and first.rounding > HIDDEN * away:
+        if not onset.is_weak and first.rounding > HIDDEN * away:
             raise Failure("its distance from the edge is lost in rounding")
         return shooting, first
 
@@ -365,7 +365,7 @@ class Tracer:
 
     def _attracts(self, cycle: Cycle) -> bool:
         """Whether all multipliers lie inside the unit circle; by the kind of onset where that is too close to tell."""
-        if self.onset.kind == "degenerate" and abs(cycle.growth - 1) < IMPRECISE:
+        if self.onset.is_weak and abs(cycle.growth - 1) < IMPRECISE:
             return False
         if cycle.amplitude < SMALL and abs(cycle.growth - 1) < UNRESOLVED:
             return self.onset.kind == "supercritical"
@@ -393,7 +393,7 @@ class Tracer:
             return self._ended("unbounded" if fast and not bounded else "precision"), True
         if cycle.growth > TOO_UNSTABLE:
             return ENDS["growth"], True
-        if self.onset.kind == "degenerate" and fast and not bounded:
+        if self.onset.is_weak and fast and not bounded:
             return self._ended("unbounded"), True
         longer = np.log(cycle.period / before.cycle.period)
         further = abs(cycle.value - before.cycle.value) / (abs(before.cycle.value) or 1.0)

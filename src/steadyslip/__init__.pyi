@@ -207,6 +207,7 @@ from .nonlinear import (
     Basin as Basin,
     Cycle as Cycle,
     CycleBranch as CycleBranch,
+    FrequencyResponse as FrequencyResponse,
     HopfCurve as HopfCurve,
     KickMargin as KickMargin,
     Onset as Onset,
@@ -219,6 +220,7 @@ from .nonlinear import (
     hopf_curve as hopf_curve,
     margin_to_kick as margin_to_kick,
     orbit as orbit,
+    response as response,
     threshold as threshold,
     threshold_map as threshold_map,
 )
@@ -234,6 +236,7 @@ from .protocol import (
     DisturbanceStep as DisturbanceStep,
     DisturbanceTable as DisturbanceTable,
     Hold as Hold,
+    InjectionHarmonic as InjectionHarmonic,
     InjectionPulse as InjectionPulse,
     InjectionRamp as InjectionRamp,
     InjectionStep as InjectionStep,

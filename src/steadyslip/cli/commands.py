@@ -379,6 +379,41 @@ def threshold(
     give(found, wanted, as_json, partial(write_thresholds, source=rig))
 
 
+@app.command()
+def response(
+    rig: RigFile,
+    changes: Changes = None,
+    swings: Annotated[
+        str, typer.Option("--input", help="what swings: normal-stress, drive-velocity, push or injection")
+    ] = "normal-stress",
+    answers: Annotated[
+        str | None, typer.Option("--output", help="observable that answers: friction, shear-stress, v, guide.friction")
+    ] = None,
+    on: Annotated[str | None, typer.Option(help="of a machine: the contact or body on which the input acts")] = None,
+    periods: Annotated[tuple[str, str], typer.Option(help="shortest and longest, such as 0.1s 1000s")] = (
+        "0.1 s", "1000 s",
+    ),
+    points: Annotated[int, typer.Option(min=2, max=1000, help="periods from the one to the other")] = 41,
+    amplitudes: Annotated[
+        list[str] | None, typer.Option("--amplitude", help="simulate it, such as '1 MPa'; repeatable")
+    ] = None,
+    limits: Annotated[
+        bool, typer.Option("--limits", help="amplitudes up to which it is linear and from which sliding is lost")
+    ] = False,
+    files: Annotated[
+        list[Path] | None, typer.Option("-o", help="write .csv, .html, or a Bode plot: .png, .svg or .pdf; repeatable")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:  # fmt: skip
+    """Gain and phase of steady sliding under an input that swings: exact for small amplitudes, simulated for large."""
+    from steadyslip.files.output import check_output
+    from steadyslip.nonlinear.commands import ANSWERED, response_of_file, write_response
+
+    check_output(files or (), ANSWERED)
+    found = response_of_file(rig, changes or (), periods, points, amplitudes or (), swings, answers, on, limits)
+    give(found, files or (), as_json, partial(write_response, source=rig))
+
+
 @app.command("map")
 def map_(
     source: Annotated[Path, typer.Argument(metavar="RIG", help="rig file with a table [map], or a map (.zarr)")],

@@ -19,6 +19,7 @@ from steadyslip.figures.experiments.corners import corner
 from steadyslip.figures.experiments.fits import fit, steps
 from steadyslip.figures.experiments.populations import population
 from steadyslip.figures.experiments.records import record
+from steadyslip.figures.forced import frequency_response
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.machine_verdict import eigenvalue_plane, machine_verdict, mode_shape, stable_ranges
 from steadyslip.figures.machines import machine_sketch
@@ -30,7 +31,7 @@ from steadyslip.figures.tolerances import tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
-from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
+from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, HopfCurve
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "cycle_branch",
     "eigenvalue_plane",
     "fit",
+    "frequency_response",
     "history",
     "hopf_curve",
     "kicks",
@@ -79,6 +81,7 @@ register_figures(History, history=history, phase=phase_plane)
 register_figures(CycleBranch, branch=cycle_branch)
 register_figures(HopfCurve, curve=hopf_curve)
 register_figures(Basin, basin=basin)
+register_figures(FrequencyResponse, response=frequency_response)
 register_figures(Record, record=record)
 register_figures(Fit, fit=fit, steps=steps, corner=corner)
 register_figures(Draws, corner=corner)

@@ -1,10 +1,11 @@
-"""Beyond small perturbations: kind of onset, stick-slip cycles, and the kick that steady sliding survives.
+"""Beyond small perturbations: onset, stick-slip cycles, kicks that are survived, answers to what swings for ever.
 
 Knows stability and motion; no records of experiments, no maps, no words of the verdict.
 """
 
 from __future__ import annotations
 
+from steadyslip.nonlinear.forced import FrequencyResponse, response
 from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
 from steadyslip.nonlinear.kicks.brackets import threshold_map
 from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold
@@ -18,6 +19,7 @@ __all__ = [
     "Basin",
     "Cycle",
     "CycleBranch",
+    "FrequencyResponse",
     "HopfCurve",
     "KickMargin",
     "Onset",
@@ -30,6 +32,7 @@ __all__ = [
     "hopf_curve",
     "margin_to_kick",
     "orbit",
+    "response",
     "threshold",
     "threshold_map",
 ]

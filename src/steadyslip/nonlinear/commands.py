@@ -10,9 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from steadyslip.core.errors import NotAvailable, ParameterError
+import numpy as np
+
+from steadyslip.core.errors import NotAvailable, ParameterError, Problem, QuantityError
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
+from steadyslip.core.quantities import parse
 from steadyslip.core.telling import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
@@ -20,6 +23,7 @@ from steadyslip.files.standalone import write_page
 from steadyslip.linear.boundary import margins, oscillatory_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.nonlinear.forced import FrequencyResponse, amplitude_unit, response
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.kicks import kick_problems
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
@@ -29,6 +33,7 @@ from steadyslip.nonlinear.orbits.cycles import cycles
 
 ENDINGS = (".nc", ".csv", ".html", *FIGURES)
 KICKED = (".html", *FIGURES)
+ANSWERED = (".csv", ".html", *FIGURES)
 
 
 def cycles_of_file(
@@ -151,3 +156,46 @@ def write_thresholds(thresholds: Thresholds, path: Path, source: Path | None = N
     writers = {".html": lambda p: write_page(thresholds, p, "Kicks", source=source)}
     write_by_ending(path, writers, lambda: thresholds.basin.plot())
     return path.suffix.lower() != ".html" and thresholds.basin.interrupted
+
+
+def response_of_file(
+    path: str | os.PathLike[str], changes: Iterable[str], periods: tuple[str, str], points: int,
+    amplitudes: Iterable[str], input: str, output: str | None, on: str | None, limits: bool,
+) -> FrequencyResponse:  # fmt: skip
+    """`steadyslip.response` for the rig of a file, between two periods.
+
+    Raises
+    ------
+    ParameterError
+        If a period or amplitude is no quantity of its kind.
+    """
+    rig = read_rig(path, changes)
+    low, high = (_quantity("--periods", text, "s") for text in periods)
+    if not 0 < low < high:
+        raise ParameterError(
+            [Problem("--periods", f"got {periods[0]} {periods[1]}; allowed: a time > 0, and a longer one")]
+        )
+    unit = amplitude_unit(rig, input, on)
+    sizes = [_quantity("--amplitude", text, unit) for text in amplitudes]
+    return response(
+        rig, np.geomspace(low, high, points), input=input, output=output, on=on, amplitudes=sizes, limits=limits
+    )
+
+
+def _quantity(option: str, text: str, unit: str) -> float:
+    try:
+        return parse(text, unit)
+    except QuantityError as error:
+        raise ParameterError([Problem(option, str(error))]) from error
+
+
+def write_response(found: FrequencyResponse, path: Path, source: Path | None = None) -> None:
+    """Write columns, a document or a figure, by the ending of the name.
+
+    Raises
+    ------
+    NotAvailable
+        If the ending is none of these, or the file cannot be written.
+    """
+    writers = {".csv": found.to_csv, ".html": lambda p: write_page(found, p, "Response", source=source)}
+    write_by_ending(path, writers, lambda: found.plot()[0])

@@ -68,6 +68,10 @@ class InjectionRamp(StressRamp, OnPores, name="injection-ramp"):
     """The pressure around a contact with pore fluid changes at a constant rate for some time and stays so."""
 
 
+class InjectionHarmonic(Harmonic, OnPores, name="injection-harmonic"):
+    """The pressure around a contact with pore fluid oscillates."""
+
+
 class InjectionTable(StressTable, OnPores, name="injection-table"):
     """A measured pressure around a contact with pore fluid: linear between samples, constant before and after."""
 

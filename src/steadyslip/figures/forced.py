@@ -1,0 +1,66 @@
+"""Answers to what swings for ever: gain and phase over the period (a Bode plot)."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from steadyslip.core.telling import shown
+from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, display_unit, labelled
+
+if TYPE_CHECKING:
+    from steadyslip.nonlinear import FrequencyResponse
+
+_MARKS = ("o", "s", "^", "D", "v")
+
+
+def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
+    """Draw gain and phase of small amplitudes as lines, of large ones as marks, and the shift of the mean of those.
+
+    Parameters
+    ----------
+    found : FrequencyResponse
+    ax : sequence of matplotlib.axes.Axes, optional
+        For gain and phase, and for the shift of the mean where there are amplitudes.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    count = 3 if found.amplitudes.size else 2
+    if ax is None:
+        from matplotlib import pyplot as plt
+
+        _, ax = plt.subplots(count, 1, figsize=(6.4, 2.3 * count), layout="constrained", sharex=True)
+    axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
+    unit = "1" if found.units[0] == found.units[1] else f"{found.units[1]}/({found.units[0]})"
+    for one, values, label in zip(axes, (found.gain, found.phase), ("small amplitudes", None), strict=False):
+        one.plot(found.periods, values, color=BLACK, label=label)
+    shifts = np.abs(found.shift[np.isfinite(found.shift)])
+    factor, shift_unit = display_unit(found.units[1], float(np.max(shifts, initial=0.0)))
+    rows = zip(found.amplitudes, cycle((BLUE, VERMILION, GREEN, ORANGE)), cycle(_MARKS), strict=False)
+    for j, (amplitude, colour, mark) in enumerate(rows):
+        style = {"color": colour, "marker": mark, "linestyle": "none", "fillstyle": "none", "markersize": 5}
+        for one, values in zip(axes, (found.gains[j], found.phases[j], found.shift[j] / factor), strict=True):
+            one.plot(found.periods, values, **style)
+        axes[0].plot([], [], **style, label=f"amplitude {shown(amplitude, found.units[0])}")
+        if np.any(lost := ~np.isfinite(found.gains[j])):
+            place = np.full(np.count_nonzero(lost), np.min(found.gain))
+            axes[0].plot(found.periods[lost], place, "x", color=colour, label="no answer of that period")
+    if found.resonance is not None:
+        for one in axes:
+            one.axvline(found.resonance[0], color=GREY, linestyle=":", linewidth=1)
+    axes[0].set_xscale("log")
+    axes[0].set_yscale("log")
+    for one in axes[1:]:
+        one.set_xscale("log")
+    axes[0].set_ylabel(f"gain ({unit})")
+    axes[1].set_ylabel("phase (deg)")
+    if count == 3:
+        axes[2].set_ylabel(labelled("shift of the mean", shift_unit))
+    axes[-1].set_xlabel("period (s)")
+    axes[0].set_title(f"{found.output.replace('_', ' ')} under {found.input.replace('_', ' ')}", fontsize="medium")
+    axes[0].legend(fontsize="small")
+    return axes

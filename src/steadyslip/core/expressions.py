@@ -96,8 +96,8 @@ _PRECISE: dict[str, Any] = {
     "exp": mpmath.exp, "log": mpmath.log, "sin": mpmath.sin, "cos": mpmath.cos, "tan": mpmath.tan,
     "sinh": mpmath.sinh, "cosh": mpmath.cosh, "tanh": mpmath.tanh, "arcsin": mpmath.asin, "arccos": mpmath.acos,
     "arctan": mpmath.atan, "arctan2": mpmath.atan2, "arcsinh": mpmath.asinh, "arccosh": mpmath.acosh,
-    "arctanh": mpmath.atanh, "sign": mpmath.sign, "sqrt": mpmath.sqrt, "nan": mpmath.nan, "inf": mpmath.inf,
-    "asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y)), "mpf": mpmath.mpf,
+    "arctanh": mpmath.atanh, "sign": mpmath.sign, "sqrt": mpmath.sqrt, "power": mpmath.power,
+    "nan": mpmath.nan, "inf": mpmath.inf, "asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y)), "mpf": mpmath.mpf,
     **{name: _PLAIN[name] for name in ("absolute", "square", "logical_not", "maximum", "minimum", "where")},
 }  # fmt: skip
 """The same for numbers of mpmath."""

@@ -9,6 +9,7 @@ import steadyslip as ss
 from dimensionless import A, unit_rig
 from onsets_at_random import alike, compared
 from scaled_machines import ALONG, built
+from steadyslip.core import expressions as expressions_module
 from steadyslip.core.expressions import ArrayFunction, PreciseFunction, asinh_exp
 from steadyslip.nonlinear.onset import hopf as onset_module
 from steadyslip.nonlinear.onset.coefficient import even_scales
@@ -78,6 +79,7 @@ def test_maps_and_curves_tell_what_is_not_decided():
 
 
 def test_equations_are_evaluated_to_many_digits():
+    assert expressions_module._PRECISE.keys() >= expressions_module._WORLD.keys()
     x, y = sp.symbols("x y")
     expressions = [x ** sp.Rational(1, 3) / 3, sp.exp(-x) - 1, asinh_exp(x, y), sp.pi * x**2,
                    sp.Piecewise((sp.log(x), x > 0), (y, True)), sp.Max(x, y, 1)]  # fmt: skip

@@ -71,6 +71,28 @@ def test_a_body_without_mass_between_springs_is_no_state():
         ss.state_space(nut(), inputs=["nut.push"])
 
 
+@pytest.mark.parametrize("stiff", [1e5, 1e16, 1e26])
+def test_a_state_space_has_the_eigenvalues_of_its_machine_or_is_refused(stiff):
+    """Whichever link is the stiff one: beside bodies with mass, beside one without, with a dashpot or without."""
+    refused = 0
+    for machine, name in ((two_mass(), "screw"), (nut(), "screw"), (nut(0.01), "screw"), (nut(0.01), "bracket")):
+        stiffened = machine.with_values({f"links.{name}.stiffness": stiff})
+        right = ss.eigenvalues(stiffened)
+        right = right[~np.isnan(right)]
+        assert len(right) == len(ss.eigenvalues(machine)[~np.isnan(ss.eigenvalues(machine))])
+        try:
+            found = np.linalg.eigvals(ss.state_space(stiffened).A)
+        except ss.NotAvailable:
+            with pytest.raises(ss.NotAvailable, match=rf"links\.{name}\.stiffness = 1e\+\d\d N/m is the largest"):
+                ss.state_space(stiffened)
+            refused += 1
+            continue
+        assert len(found) == len(right)
+        apart = np.abs(found[:, None] - right[None, :])
+        assert np.all(np.min(apart, axis=0) <= 1e-6 * np.abs(right))
+    assert refused == {1e5: 0, 1e16: refused, 1e26: 4}[stiff]
+
+
 def test_a_little_damping_makes_it_one():
     system, s = ss.state_space(nut(damping=0.01)), 0.3 + 2j
     assert "nut.x" in system.state_names

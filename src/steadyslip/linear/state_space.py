@@ -12,13 +12,14 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable, UnknownNameError
 from steadyslip.core.options import checked
+from steadyslip.linear.pencil import GOOD, checked_spectrum
 from steadyslip.linear.roots import Array
 from steadyslip.linear.spectrum import is_ill_posed
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model
 from steadyslip.model.descriptor import Matrices, blocks_of, described
-from steadyslip.model.point import operating_point
+from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.range import beyond_range, require_range
 from steadyslip.model.sliding import explain_absence, steady_state
 
@@ -48,7 +49,8 @@ def state_matrices(
         If an output or input is unknown.
     NotAvailable
         If the problem is ill-posed: the balances cannot be solved for their unknowns; if an input would have to be
-        differentiated; or if numbers leave the range of floating point.
+        differentiated; if numbers leave the range of floating point, or if rounding would take some of the rig's
+        eigenvalues from A.
     """
     point = operating_point(rig)
     model = point.model
@@ -72,7 +74,36 @@ def state_matrices(
     blocks = blocks_of(point, outputs, known)
     if not all(np.all(np.isfinite(block)) for block in blocks):
         raise beyond_range(point)
-    return described(model, known, blocks).solved(outputs, inputs)
+    found = described(model, known, blocks).solved(outputs, inputs)
+    _require_eigenvalues(point, found.a)
+    return found
+
+
+def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
+    """Refuse a state matrix that rounding leaves without some of the eigenvalues of the rig.
+
+    Raises
+    ------
+    NotAvailable
+        Naming the largest stiffness.
+    """
+    right = checked_spectrum(point)
+    own = np.linalg.eigvals(a)
+    apart = np.abs(own[:, None] - right.values[None, :])
+    allowed = GOOD * np.abs(right.values) + right.errors
+    if right.values.size == own.size and (not own.size or np.all(np.min(apart, axis=0) <= allowed)):
+        return
+    rates = np.abs(right.values)
+    stiff = max(point.model.with_role("stiffness"), key=lambda name: float(point.named()[name]), default="")
+    which = (
+        f"; {stiff} = {float(point.named()[stiff]):.4g} {point.model.roles[stiff].unit} is the largest" if stiff else ""
+    )
+    raise NotAvailable(
+        "no state matrix in double precision has the eigenvalues of this rig, which lie between "
+        f"{np.min(rates, initial=np.inf):.3g} and {np.max(rates, initial=0.0):.3g} 1/s: rounding of the largest hides "
+        f"the least{which}; lower what is as good as rigid, raise masses and dampings that are as good as none, or "
+        "take eigenvalues, which tells them all"
+    )
 
 
 def _usual_outputs(model: Model) -> tuple[str, ...]:
@@ -115,7 +146,8 @@ def state_space(
     UnknownNameError
         If an output or input is unknown.
     NotAvailable
-        If the rig has a delay, the problem is ill-posed, or numbers leave the range of floating point.
+        If the rig has a delay, the problem is ill-posed, numbers leave the range of floating point, or lie so far
+        apart that rounding would take some of the rig's eigenvalues from the state matrix.
     """
     from scipy.signal import StateSpace
 

@@ -1,8 +1,7 @@
-"""The numbers of Dupont & Bapna (1994) beside ours.
+"""The equations of Dupont & Bapna (1994), evaluated with the paper's parameters, beside ours.
 
-Each number of the paper (or of its equations, evaluated to 18 digits) stands beside ours, which comes from
-the Model's critical stiffness, eigenvalues and boundaries, or from simulated motion, and not from the closed
-forms of `steadyslip.paper`.
+The paper prints one such number only. Ours come from the Model's critical stiffness, eigenvalues and boundaries, or
+from simulated motion, and not from the closed forms of `steadyslip.paper`.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from steadyslip.units import deg
 
 @dataclass(frozen=True)
 class PaperNumber:
-    """One number of the paper beside ours.
+    """One equation or figure of the paper in numbers, beside ours.
 
     Attributes
     ----------
@@ -34,7 +33,9 @@ class PaperNumber:
         Equation or figure of the paper.
     quantity, unit : str
     expected, found : float
-        The equation's number, and ours by the general route.
+        The equation evaluated to 18 digits (of a figure, what its parameters say), and ours by the general route.
+    printed : str
+        The number as the paper prints it; empty where it prints none.
     """
 
     source: str
@@ -42,6 +43,7 @@ class PaperNumber:
     unit: str
     expected: float
     found: float
+    printed: str = ""
 
     @property
     def difference(self) -> float:
@@ -54,6 +56,7 @@ class PaperNumber:
             self.source,
             self.quantity,
             self.unit,
+            self.printed,
             f"{self.expected:.14g}",
             f"{self.found:.14g}",
             f"{self.difference:.1e}",
@@ -65,7 +68,7 @@ class PaperTable:
     """Rows of `paper_table`; prints itself, and as Markdown or CSV."""
 
     rows: tuple[PaperNumber, ...]
-    header = ("source", "quantity", "unit", "paper", "steadyslip", "relative difference")
+    header = ("source", "quantity", "unit", "printed", "equation", "steadyslip", "relative difference")
 
     def __iter__(self) -> Iterator[PaperNumber]:
         return iter(self.rows)
@@ -90,7 +93,7 @@ class PaperTable:
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(self.header)
         for row in self.rows:
-            writer.writerow([*row.cells()[:3], repr(row.expected), repr(row.found), repr(row.difference)])
+            writer.writerow([*row.cells()[:4], repr(row.expected), repr(row.found), repr(row.difference)])
         return text.getvalue()
 
 
@@ -114,7 +117,7 @@ _M_STAR = 0.01
 
 @lru_cache(maxsize=1)
 def paper_table() -> PaperTable:
-    """The paper's numbers beside ours, with the relative difference of each."""
+    """The paper's equations in numbers beside ours, with the relative difference of each."""
     rows = [
         PaperNumber("eq. 25", _at("k_cr", -45), "Pa/m", _STIFFNESS, float(critical_stiffness(paper_rig(-45 * deg))))
     ]
@@ -133,7 +136,7 @@ def paper_table() -> PaperTable:
     lock_up = next(edge.value for edge in boundary(paper_rig(), "contact.angle") if edge.kind == "lock-up")
     rows.append(PaperNumber("eq. 27", "lock-up angle", "deg", _LOCK_UP, lock_up / deg))
     crossing = mass.mass_of_equal_stiffness(paper_rig(), figures.ANGLES)
-    rows.append(PaperNumber("eq. 30", "m*_cr1", "1", _MASS_1, crossing))
+    rows.append(PaperNumber("eq. 30", "m*_cr1", "1", _MASS_1, crossing, printed="0.0036"))
     rows += [
         PaperNumber("eq. 31", _at("m*_cr2", angle), "1", value, mass.mass_of_no_stiffness(paper_rig(), angle * deg))
         for angle, value in _MASS_2.items()

@@ -14,6 +14,7 @@ package, and the command line's help, stay quick.
 """
 
 from importlib import import_module
+from typing import Any
 
 import lazy_loader
 
@@ -21,5 +22,12 @@ from steadyslip.core import pages, pictures
 
 pictures.figures_from(lambda: import_module("steadyslip.figures"))  # the one place that knows both
 pages.pages_from(lambda: import_module("steadyslip.reports"))
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-__version__ = "0.1.0"
+_public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":  # takes some 10 ms, which imports and help do without
+        from steadyslip.core.version import version
+
+        return version()
+    return _public(name)

@@ -1,12 +1,15 @@
 """What is shipped: the source distribution holds every file that its own README names."""
 
 import re
+import shutil
 import subprocess
 import tarfile
 import tomllib
 from pathlib import Path
 
 import pytest
+
+from steadyslip.core.version import RELEASE, digest
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,6 +36,22 @@ def test_what_git_has_is_shipped(shipped):
     if listed.returncode:
         pytest.skip("not a checkout")
     assert {name for name in listed.stdout.splitlines() if not name.startswith(".")} <= shipped
+
+
+def test_wheel_and_source_distribution_are_the_program_of_the_checkout(tmp_path):
+    """Also where there is no version control, which nothing asks."""
+    from hatchling.builders.sdist import SdistBuilder
+    from hatchling.builders.wheel import WheelBuilder
+
+    (source,) = SdistBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+    shutil.unpack_archive(source, tmp_path / "source", filter="data")
+    (unpacked,) = (tmp_path / "source").iterdir()
+    (wheel,) = WheelBuilder(str(unpacked)).build(directory=str(tmp_path), versions=["standard"])
+    shutil.unpack_archive(wheel, tmp_path / "wheel", "zip")
+    own = digest(ROOT / "src" / "steadyslip")
+    assert digest(unpacked / "src" / "steadyslip") == own
+    assert digest(tmp_path / "wheel" / "steadyslip") == own
+    assert Path(wheel).name.startswith(f"steadyslip-{RELEASE}-")
 
 
 def test_oldest_pins_are_the_declared_floors():

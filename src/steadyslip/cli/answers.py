@@ -9,6 +9,8 @@ from typing import Any
 
 import typer
 
+from steadyslip.core.version import stamped
+
 
 def say(text: str) -> None:
     """Print an answer; that it cannot be written is an error like any other."""
@@ -19,8 +21,8 @@ def say(text: str) -> None:
 
 
 def say_json(data: Any) -> None:
-    """Print an answer for other programs."""
-    say(json.dumps(data, indent=2, allow_nan=False))
+    """Print an answer for other programs, an object with the version that gave it."""
+    say(json.dumps(stamped(data), indent=2, allow_nan=False))
 
 
 def give(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]) -> None:

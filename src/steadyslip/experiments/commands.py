@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.version import stamped
 from steadyslip.experiments.answers.laws import LawComparison
 from steadyslip.experiments.answers.population import Population
 from steadyslip.experiments.answers.uncertainty import Draws
@@ -63,7 +64,7 @@ def write_population(found: Population, path: Path) -> None:
     """
 
     def as_text(target: Path) -> None:
-        target.write_text(json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        target.write_text(json.dumps(stamped(found.to_dict()), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
     def as_page(target: Path) -> None:
         write_page(found, target, "Population")

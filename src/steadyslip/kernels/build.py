@@ -31,6 +31,7 @@ from typing import Any, cast
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, NotKeptWarning
+from steadyslip.core.version import RELEASE
 from steadyslip.files.inputs import is_private
 from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 from steadyslip.kernels import linking
@@ -148,9 +149,7 @@ def cache_folder() -> Path | None:
 @lru_cache(maxsize=1)
 def _surroundings() -> str:
     """Everything but the assembly that machine code depends on."""
-    from steadyslip import __version__
-
-    return "\n".join([__version__, sys.version, np.__version__, *linking.surroundings()])
+    return "\n".join([RELEASE, sys.version, np.__version__, *linking.surroundings()])
 
 
 def _key(source: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from steadyslip.core.errors import unknown_name
 from steadyslip.core.results import ReadOnly
+from steadyslip.core.version import version
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.events import AnyEvent
@@ -44,6 +45,8 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     velocities : tuple of float
         Lowest and highest velocity of the run, m/s, which lie between samples as a rule; of a machine a dict, slip
         rates by contact.
+    version : str
+        Of the program that computed it.
     """
 
     rig: Slider | Machine
@@ -58,6 +61,7 @@ class HistoryData(ReadOnly, Mapping[str, np.ndarray]):
     steps: int
     rejected: int
     velocities: tuple[float, float] | dict[str, tuple[float, float]]
+    version: str = field(default_factory=version, repr=False)
 
     def __getitem__(self, name: str) -> np.ndarray:
         try:

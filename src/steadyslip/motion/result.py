@@ -14,6 +14,7 @@ from steadyslip.core.errors import ParameterError, Problem, unknown_name
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.telling import shown
+from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.motion import store
@@ -65,6 +66,8 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         if arrests:
             lines.append(f"arrests         {arrests}")
         lines.append(f"solver          {self.method}, rtol {self.rtol:g}, {self.steps} steps, {self.rejected} rejected")
+        if other := of_another(self.version):
+            lines.append(f"version         {other}")
         return "\n".join(lines)
 
     @property
@@ -140,6 +143,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         """Status and events as plain numbers and words, for JSON; samples are in the files."""
         last = {name: float(values[-1]) for name, values in self.data.items() if len(values)}
         return {
+            "version": self.version,
             "status": self.status,
             **({"contact": self.contact or None} if isinstance(self.rig, Machine) else {}),
             "end": self.end,

@@ -42,7 +42,6 @@ def to_dataset(history: HistoryData) -> Any:
     """See `History.to_xarray`."""
     import xarray as xr
 
-    from steadyslip import __version__
     from steadyslip.files.specifications import rig_to_text
 
     variables = {
@@ -70,7 +69,7 @@ def to_dataset(history: HistoryData) -> Any:
         "rejected": history.rejected,
         "lowest_velocity": lowest,
         "peak_velocity": highest,
-        "steadyslip": __version__,
+        "steadyslip": history.version,
     }
     return xr.Dataset(variables, coords={"time": ("time", history.data["t"], {"units": "s"})}, attrs=attributes)
 
@@ -154,6 +153,7 @@ def read(path: str | PathLike[str]) -> dict[str, Any]:
         "events": tuple(events),
         **{name: attributes[name] for name in ("status", "end", "method", "rtol", "steps", "rejected")},
         "velocities": velocities,
+        "version": attributes["steadyslip"],
     }
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from steadyslip.core.areas import total
 from steadyslip.core.telling import shown
+from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import Ramped, may_be_ramp
 from steadyslip.experiments.numerics.splitting import displacement_noise
@@ -102,6 +103,8 @@ def warnings(fit: FitNumbers) -> list[str]:
     found += _untold_ramps(fit)
     if fit.plan.drive == "measured":
         found += [text for part in fit.comparison.parts if (text := _noisy_drive(fit, part))]
+    if other := of_another(fit.version):
+        found.append(f"{other}; fit anew to compare it with fits of this one")
     return found
 
 

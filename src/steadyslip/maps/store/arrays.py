@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.version import of_another
 from steadyslip.files.inputs import UnreadableFile, check_room, inside, read_bytes
 from steadyslip.files.specifications import rig_from_text
 from steadyslip.machine.machine import Machine
@@ -318,13 +319,12 @@ class Store:
         NotAvailable
             Saying what differs.
         """
-        from steadyslip import __version__
-
-        found = []
-        if self.version != __version__:
-            found.append(f"steadyslip: was {self.version}, is {__version__}")
-        found += differences(self.definition, json.loads(json.dumps(plan.definition())))
-        if found:
+        if other := of_another(self.version):
+            raise NotAvailable(
+                f"{str(self.path)!r} was {other}; chunks of two programs are not mixed. Give another name, or delete "
+                "the map to have it computed anew; what it holds can be opened as it is"
+            )
+        if found := differences(self.definition, json.loads(json.dumps(plan.definition()))):
             lines = "\n".join(f"  {line.replace('map.rig.', '')}" for line in found)
             raise NotAvailable(
                 f"{str(self.path)!r} holds another map; its chunks are not mixed with new ones. What changed:\n"

@@ -15,6 +15,7 @@ from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.telling import percent, shown, shown_range
+from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.maps.store.arrays import Store
@@ -198,6 +199,8 @@ class MapResult(Displayed):
         lines = [self._store.layout.title]
         state = "complete" if done == count else f"{done} of {count} chunks; run it again for the rest"
         lines.append(f"  {'in ' + str(self.path):<22}  {state}")
+        if other := of_another(self._store.version):
+            lines.append(f"  {'version':<22}  {other}")
         statistics = self.statistics()
         width = max([24, *(len(name) + 2 for name in statistics)])
         for name, found in statistics.items():
@@ -229,6 +232,7 @@ class MapResult(Displayed):
             if unit != self.unit(name)
         }
         return {
+            "version": self._store.version,
             "path": str(self.path),
             "dims": dict(zip(self.dims, self.shape, strict=True)),
             "parameters": {name: self.unit(name) for name in self.parameters},

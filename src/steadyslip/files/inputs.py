@@ -82,8 +82,8 @@ def read_bytes(path: str | PathLike[str], most: int, *, links: bool = True, priv
     return content
 
 
-def check_file(path: str | PathLike[str], most: int) -> None:
-    """Refuse what `read_bytes` would, before another library opens it by its name.
+def check_file(path: str | PathLike[str], most: int) -> int:
+    """The size of a file; refuses what `read_bytes` would, before another library opens it by its name.
 
     Raises
     ------
@@ -96,6 +96,7 @@ def check_file(path: str | PathLike[str], most: int) -> None:
         raise UnreadableFile(name, _reason(error)) from error
     check_kind(name, found)
     _check_size(name, found.st_size, most)
+    return found.st_size
 
 
 def inside(root: Path, key: str) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,8 @@ ROLES = {
     "normal": "Pa",
 }
 """What columns may be, with SI units; displacement and velocity are those of the load point."""
+
+MOST_LISTED = 40  # names in a message
 
 _WORDS = {
     "s": ("sec", "secs", "second", "seconds"),
@@ -66,6 +68,13 @@ class Column:
     factor: float
     force: bool = False
     place: int = 0
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names for a message, which nobody reads beyond some dozens."""
+    every = list(names)
+    more = [f"and {len(every) - MOST_LISTED} more"] if len(every) > MOST_LISTED else []
+    return ", ".join([*every[:MOST_LISTED], *more])
 
 
 def split_name(name: str) -> tuple[str, str | None]:
@@ -245,7 +254,7 @@ def _preferred(role: str, candidates: list[int], names: Sequence[str]) -> list[i
 
 
 def _missing(role: str, names: Sequence[str]) -> str:
-    return f"no column for it; the file has {', '.join(map(repr, names))}; name it with {role}=NAME"
+    return f"no column for it; the file has {listed(map(repr, names))}; name it with {role}=NAME"
 
 
 def _with_unit(
@@ -288,5 +297,5 @@ def required(columns: Mapping[str, Column], names: Sequence[str]) -> list[Proble
     if "friction" not in columns and not {"shear", "normal"} <= set(columns):
         lacking = [role for role in ("shear", "normal") if role not in columns]
         message = f"no column for friction, nor for {' and '.join(lacking)} to compute it from; the file has "
-        problems.append(Problem("friction", message + f"{', '.join(map(repr, names))}; name it with friction=NAME"))
+        problems.append(Problem("friction", message + f"{listed(map(repr, names))}; name it with friction=NAME"))
     return problems

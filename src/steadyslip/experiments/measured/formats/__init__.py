@@ -8,15 +8,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, SteadyslipError
 from steadyslip.experiments.measured.formats.table import Table
 from steadyslip.experiments.measured.formats.text import read_text
+from steadyslip.files.apart import Ended, call
 from steadyslip.files.inputs import check_file
 
 __all__ = ["FORMATS", "Table", "read_columns"]
 
 MOST_BINARY = 2**31  # bytes of a file
+SHORT_TEXT = 2**20  # bytes of a text that is read without a process of its own: its own size bounds what it takes
+SECONDS, BYTES_A_SECOND, MOST_SECONDS = 10.0, 2**20, 85.0
+"""Processor time to read a file: at first, and for its bytes; the slowest, a workbook of noise, takes half as long."""
+MOST_SAID = 300  # characters of what a library says
 FORMATS = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("HDF5", "hdf5")),
     ".nc": ("netCDF", "netcdf"),
@@ -31,6 +38,8 @@ FORMATS = {
 def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = False) -> Table:
     """Read a file by its ending; text unless that is known.
 
+    Whatever a library of others reads, and long texts, are read in a process of its own with limits.
+
     Raises
     ------
     NotAvailable
@@ -39,21 +48,38 @@ def read_columns(path: Path, table: str | None = None, skip_bad_lines: bool = Fa
         If lines are damaged.
     """
     ending = path.suffix.lower()
-    if ending not in FORMATS:
+    size = check_file(path, MOST_BINARY)
+    if ending not in FORMATS and size <= SHORT_TEXT:
         return read_text(path, skip_bad_lines)
-    kind, module = FORMATS[ending]
-    reader: Callable[[Path, str | None], Table] = import_module(f"{__name__}.{module}").read
-    check_file(path, MOST_BINARY)
+    seconds = min(SECONDS + size / BYTES_A_SECOND, MOST_SECONDS)
     try:
+        about, (values, lines) = call(__name__, "read_here", (str(path), table, skip_bad_lines), seconds)
+    except Ended as error:
+        raise NotAvailable(f"cannot read {str(path)!r}: {error}") from error
+    except MemoryError as error:
+        raise NotAvailable(f"cannot read {str(path)!r}: it does not fit into memory") from error
+    return Table(about["names"], values, lines, about["units"], about["notes"])
+
+
+def read_here(name: str, table: str | None, skip_bad_lines: bool) -> tuple[dict[str, Any], list[Array]]:
+    """The same in this process, as plain data and arrays: names, units and notes, values and lines."""
+    path = Path(name)
+    ending = path.suffix.lower()
+    found = _by_library(path, table, *FORMATS[ending]) if ending in FORMATS else read_text(path, skip_bad_lines)
+    return {"names": found.names, "units": found.units, "notes": found.notes}, [found.values, found.lines]
+
+
+def _by_library(path: Path, table: str | None, kind: str, module: str) -> Table:
+    try:
+        reader: Callable[[Path, str | None], Table] = import_module(f"{__name__}.{module}").read
         return reader(path, table)
-    except SteadyslipError:
+    except (SteadyslipError, MemoryError):
         raise
     except ImportError as error:
         package = error.name or "another package"
         raise NotAvailable(
             f"{str(path)!r}: this format needs the package {package}; install steadyslip[lab]"
         ) from error
-    except MemoryError as error:
-        raise NotAvailable(f"cannot read {str(path)!r}: it does not fit into memory") from error
     except Exception as error:  # the readers of foreign formats raise whatever a damaged file brings about
-        raise NotAvailable(f"cannot read {str(path)!r} as {kind}: {type(error).__name__}: {error}") from error
+        why = " ".join(str(error).split())[:MOST_SAID]
+        raise NotAvailable(f"cannot read {str(path)!r} as {kind}: {type(error).__name__}: {why}") from error

@@ -2,125 +2,120 @@
 
 from __future__ import annotations
 
-import datetime
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from openpyxl import load_workbook
+from openpyxl.utils import get_column_letter
 
+from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.experiments.measured.columns import listed
 from steadyslip.experiments.measured.formats.moments import day, moment
 from steadyslip.experiments.measured.formats.numerals import either, marks_of, number
-from steadyslip.experiments.measured.formats.table import (
-    Table,
-    check_size,
-    chosen_part,
-    count_moments,
-    names_and_units,
-)
+from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, count_moments, names_and_units
+from steadyslip.experiments.measured.formats.workbook import CLOCK, DATE, FORMULA, MOMENT, Sheet, Workbook
 
-MOST_COLUMNS = 1000
 SPARSE = 0.05  # of the numbers of the fullest column: one of fewer belongs to something beside the record
 SHORT = 20  # rows: a sheet of fewer is none of a record
-Cells = list[Any]
+Stated = list[float | None]
 
 
 def read(path: Path, table: str | None) -> Table:
     """The sheet of that name, else the only one that has a record in it, or else any numbers."""
-    book = load_workbook(path, read_only=True, data_only=True)
-    try:
-        part = chosen_part(path, "sheet", table, book.sheetnames)
-        sheets = [sheet for sheet in book.worksheets if part is None or sheet.title == part]
-        found = {sheet.title: one for sheet in sheets if (one := _sheet(path, sheet)) is not None}
-    finally:
-        book.close()
+    with Workbook(path) as book:
+        part = chosen_part(path, "sheet", table, list(book.sheets))
+        names = list(book.sheets) if part is None else [part]
+        found = {name: one for name in names if (one := _table(path, book.sheet(name))) is not None}
     if not found:
         raise NotAvailable(f"{str(path)!r} has no columns of numbers in it")
     long = {name: one for name, one in found.items() if len(one.lines) >= SHORT}
     found = long or found
     if len(found) > 1:
-        raise NotAvailable(f"{str(path)!r} has numbers on several sheets; say which with table=: {', '.join(found)}")
-    ((name, sheet),) = found.items()
-    _check_formulas(path, name, sheet)
-    return sheet
+        raise NotAvailable(f"{str(path)!r} has numbers on several sheets; say which with table=: {listed(found)}")
+    return next(iter(found.values()))
 
 
-def _check_formulas(path: Path, sheet: str, found: Table) -> None:
+def _table(path: Path, sheet: Sheet) -> Table | None:
+    """The record on a sheet; None if there is none."""
+    known = {text: _stated(text) for text in set(sheet.texts)}
+    stated = [known[text] for text in sheet.texts]
+    sheet, stated, dropped = _without_side_tables(sheet, stated)
+    first = _first_row(sheet, stated)
+    if first is None:
+        return None
+    above = sheet.words_above(first)
+    fullest = max(map(len, above), default=0)
+    count = 1 + max([*sheet.places(first), *(k for cells in above if len(cells) == fullest for k in cells)])
+    lines = [[cells.get(k, "") for k in range(count)] for cells in above]
+    names, units = names_and_units([line for line in lines if sum(map(bool, line)) == fullest], count)
+    names = [name or _higher(lines, k) or str(k + 1) for k, name in enumerate(names)]
+    check_size(path, count * (len(sheet.lines) - first), rows=len(sheet.lines) - first)
+    values, kinds = sheet.dense(first, count)
+    texts: list[list[tuple[int, str]]] = [[] for _ in range(count)]
+    for row, k, text in zip(sheet.text_rows.tolist(), sheet.text_columns.tolist(), sheet.texts, strict=True):
+        if row >= first and k < count:
+            texts[k].append((row - first, text))
+    _check_formulas(path, names, values, texts)
+    marks, notes, fault = marks_of(names, ([text for _, text in own if _moment(text) is None] for own in texts))
+    if fault is not None:
+        raise ParameterError([Problem("file", fault)], title=str(path))
+    faults = 0
+    for k, own in enumerate(texts):
+        for row, text in own:
+            if (value := number(text, marks[k])) is None and (value := _moment(text)) is not None:
+                kinds[k, row] = MOMENT if day(text.strip()) is None else DATE
+            faults += value is None and text != FORMULA
+            values[k, row] = np.nan if value is None else value
+    notes += [f"{faults} cells that are no numbers were left empty"] if faults else []
+    if dropped:
+        letters = ", ".join(get_column_letter(k + 1) for k in dropped)
+        notes.append(f"columns of hardly any numbers were left out: {letters}")
+    found = Table(names, values, sheet.lines[first:], units, notes)
+    _count_all_moments(found, kinds)
+    return found
+
+
+def _check_formulas(path: Path, names: list[str], values: Array, texts: list[list[tuple[int, str]]]) -> None:
     """Refuse columns of formulas that were never computed: a program wrote them, and no spreadsheet has opened them."""
-    empty = [k for k, column in enumerate(found.values) if np.all(np.isnan(column))]
-    if not empty or not len(found.lines):
-        return
-    book = load_workbook(path, read_only=True)
-    try:
-        line = int(found.lines[0])
-        (cells,) = book[sheet].iter_rows(min_row=line, max_row=line, values_only=True, max_col=MOST_COLUMNS)
-    finally:
-        book.close()
-    names = [found.names[k] for k in empty if k < len(cells) and str(cells[k]).startswith("=")]
-    if names:
+    empty = [
+        name
+        for name, own, column in zip(names, texts, values, strict=True)
+        if own and own[0][1] == FORMULA and np.all(np.isnan(column)) and all(text == FORMULA for _, text in own)
+    ]
+    if empty:
         raise NotAvailable(
-            f"{str(path)!r}: {', '.join(map(repr, names))} holds formulas without their values; open the workbook in a "
+            f"{str(path)!r}: {', '.join(map(repr, empty))} holds formulas without their values; open the workbook in a "
             "spreadsheet program and save it"
         )
 
 
-def _sheet(path: Path, sheet: Any) -> Table | None:
-    rows, dropped = _without_side_tables(list(_rows(path, sheet)))
-    first = next((k for k, (_, cells) in enumerate(rows) if _is_numbers(cells)), None)
-    if first is None:
-        return None
-    above = [[_word(cell) for cell in cells] for _, cells in rows[:first]]
-    fullest = max((sum(map(bool, cells)) for cells in above), default=0)
-    heads = [cells for cells in above if sum(map(bool, cells)) == fullest]
-    written = [[k for k, cell in enumerate(cells) if cell not in (None, "")] for cells in (*heads, rows[first][1])]
-    count = max(max(places, default=0) for places in written) + 1
-    body = [(line, [*cells, *[None] * count][:count]) for line, cells in rows[first:]]
-    above, heads = ([[*cells, *[""] * count][:count] for cells in lines] for lines in (above, heads))
-    names, units = names_and_units(heads, count)
-    names = [name or _higher(above, k) or str(k + 1) for k, name in enumerate(names)]
-    texts = [
-        [cell for _, cells in body if isinstance(cell := cells[k], str) and _moment(cell) is None] for k in range(count)
-    ]
-    marks, notes, fault = marks_of(names, texts)
-    if fault is not None:
-        raise ParameterError([Problem("file", fault)], title=str(path))
-    values = np.full((count, len(body)), np.nan)
-    faults = 0
-    for i, (_, cells) in enumerate(body):
-        for k, cell in enumerate(cells):
-            value = _number(cell, marks[k])
-            faults += value is None
-            values[k, i] = np.nan if value is None else value
-    notes += [f"{faults} cells that are no numbers were left empty"] if faults else []
-    if dropped:
-        notes.append(f"columns of hardly any numbers were left out: {', '.join(dropped)}")
-    found = Table(names, values, np.array([line for line, _ in body]), units, notes)
-    _count_all_moments(found, [cells for _, cells in body])
-    return found
+def _without_side_tables(sheet: Sheet, stated: Stated) -> tuple[Sheet, Stated, list[int]]:
+    """The same without columns that have but a few numbers, beside those of a record; which had any."""
+    is_number = [value is not None or text == FORMULA for value, text in zip(stated, sheet.texts, strict=True)]
+    counts = sheet.counts(sheet.text_columns[np.array(is_number, dtype=bool)])
+    few = np.flatnonzero(counts < SPARSE * max(counts, default=0))
+    numbers = sheet.counts(sheet.text_columns[_finite(stated)])
+    dropped = [int(k) for k in few if numbers[k]]
+    if not dropped or max(counts) < SHORT:
+        return sheet, stated, []
+    sheet, left = sheet.without(few)
+    return sheet, [value for value, is_left in zip(stated, left, strict=True) if is_left], dropped
 
 
-def _without_side_tables(rows: list[tuple[int, Cells]]) -> tuple[list[tuple[int, Cells]], list[str]]:
-    """The same rows without columns that have but a few numbers, beside those of a record; which these are."""
-    width = max((len(cells) for _, cells in rows), default=0)
-    counts = [0] * width
-    for _, cells in rows:
-        for k, cell in enumerate(cells):
-            counts[k] += cell not in (None, "") and (_number(cell, None) is not None or str(cell).startswith("="))
-    few = {k for k, count in enumerate(counts) if count < SPARSE * max(counts)}
-    sparse = [k for k in sorted(few) if any(k < len(cells) and _number(cells[k], None) == _number(cells[k], None)
-              and _number(cells[k], None) is not None for _, cells in rows)]  # fmt: skip
-    if not sparse or max(counts) < SHORT:
-        return rows, []
-    kept = [(line, [None if k in few else cell for k, cell in enumerate(cells)]) for line, cells in rows]
-    return [row for row in kept if any(cell not in (None, "") for cell in row[1])], [_letter(k) for k in sparse]
+def _first_row(sheet: Sheet, stated: Stated) -> int | None:
+    """The first row that holds numbers and nothing else, two of them at least."""
+    is_number = np.array([value is not None for value in stated], dtype=bool)
+    is_other = ~is_number & np.array([text != FORMULA for text in sheet.texts], dtype=bool)
+    own, numbers, reals, others = (
+        np.bincount(rows, minlength=len(sheet.lines))
+        for rows in (sheet.rows, *(sheet.text_rows[which] for which in (is_number, _finite(stated), is_other)))
+    )
+    fitting = np.flatnonzero((own + numbers > 1) & (own + reals > 0) & (others == 0))
+    return int(fitting[0]) if len(fitting) else None
 
 
-def _letter(place: int) -> str:
-    from openpyxl.utils import get_column_letter
-
-    return str(get_column_letter(place + 1))
+def _finite(stated: Stated) -> Array:
+    return np.array([value is not None and value == value for value in stated], dtype=bool)
 
 
 def _higher(above: list[list[str]], place: int) -> str:
@@ -128,17 +123,16 @@ def _higher(above: list[list[str]], place: int) -> str:
     return next((cells[place] for cells in reversed(above) if cells[place]), "")
 
 
-def _count_all_moments(found: Table, body: list[Cells]) -> None:
+def _count_all_moments(found: Table, kinds: Array) -> None:
     """Make seconds of columns of times; dates in a column of their own belong to the clock beside them."""
-    columns = [[cell for cells in body if (cell := cells[k]) not in (None, "")] for k in range(len(found.names))]
-    moments = [k for k, cells in enumerate(columns) if cells and all(_is_moment(cell) for cell in cells[:2])]
-    days = [k for k in moments if all(_is_day(cell) for cell in columns[k])]
-    clocks = [k for k in moments if all(isinstance(cell, datetime.time) for cell in columns[k])]
+    own = [kind[np.isfinite(column)] for kind, column in zip(kinds, found.values, strict=True)]
+    moments = [k for k, kind in enumerate(own) if len(kind) and np.all(kind[:2] > 0)]
+    days = [k for k in moments if np.all(own[k] == DATE)]
+    clocks = [k for k in moments if np.all(own[k] == CLOCK)]
     if len(days) == 1 and len(clocks) == 1:
+        date, clock = found.names[days[0]], found.names[clocks[0]]
         found.values[clocks[0]] += found.values[days[0]]
-        found.notes.append(
-            f"the times in {found.names[clocks[0]]!r} are those of the dates in {found.names[days[0]]!r}"
-        )
+        found.notes.append(f"the times in {clock!r} are those of the dates in {date!r}")
         moments.remove(days[0])
     for k in moments:
         count_moments(found, k)
@@ -146,54 +140,9 @@ def _count_all_moments(found: Table, body: list[Cells]) -> None:
         found.drop(days)
 
 
-def _is_moment(cell: Any) -> bool:
-    return isinstance(cell, datetime.datetime | datetime.time) or (isinstance(cell, str) and _moment(cell) is not None)
-
-
-def _is_day(cell: Any) -> bool:
-    """Whether a cell is a date without a time of day."""
-    if isinstance(cell, str):
-        return day(cell.strip()) is not None
-    return isinstance(cell, datetime.datetime) and cell.time() == datetime.time()
-
-
-def _rows(path: Path, sheet: Any) -> Iterator[tuple[int, Cells]]:
-    """Rows that are not empty, with their numbers on the sheet; the size that a file declares is not believed."""
-    size = 0
-    for line, cells in enumerate(sheet.iter_rows(values_only=True, max_col=MOST_COLUMNS), start=1):
-        size += len(cells)
-        check_size(path, size)
-        if any(cell is not None and cell != "" for cell in cells):
-            yield line, list(cells)
-
-
-def _word(cell: Any) -> str:
-    return "" if cell is None else str(cell).strip()
-
-
-def _is_numbers(cells: Cells) -> bool:
-    """Whether a row holds numbers and nothing else, two of them at least."""
-    numbers = [_number(cell, None) for cell in cells if cell is not None]
-    return len(numbers) > 1 and all(n is not None for n in numbers) and any(n == n for n in numbers if n is not None)
-
-
-def _number(cell: Any, mark: str | None) -> float | None:
-    """The number in a cell, text with this decimal mark or any; NaN for an empty one, None for anything else."""
-    match cell:
-        case None:
-            return float("nan")
-        case bool():
-            return None
-        case int() | float():
-            return float(cell)
-        case datetime.datetime():
-            return cell.replace(tzinfo=datetime.UTC).timestamp()
-        case datetime.time():
-            return 3600.0 * cell.hour + 60.0 * cell.minute + cell.second + 1e-6 * cell.microsecond
-        case datetime.timedelta():
-            return cell.total_seconds()
-    text = str(cell).strip()
-    found = either(text) if mark is None else number(text, mark)
+def _stated(text: str) -> float | None:
+    """The number or moment that a text states, with whichever decimal mark; NaN if that there is none, None else."""
+    found = either(text)
     return _moment(text) if found is None else found
 
 

@@ -13,17 +13,40 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
 
 MOST_DATASETS = 10_000
+MOST_LINKS = 16  # one after another
 COLUMN_NAMES = ("columns", "column_names", "names", "header", "channels")
 
 
 def read(path: Path, table: str | None) -> Table:
     """Numeric datasets of a file, or below one of its groups."""
     with h5py.File(path, "r") as file:
-        if table is None:
-            return from_vectors(path, _named(path, _datasets(path, file)))
-        if table not in file:
+        group = file if table is None else member(file, table)
+        if group is None:
             chosen_part(path, "group", table, _groups(file))
-        return from_vectors(path, _named(path, _datasets(path, file[table])))
+        return from_vectors(path, _named(path, _datasets(path, group)))
+
+
+def member(group: Any, name: str, links: int = MOST_LINKS) -> Any:
+    """An object below a group of the same file, by names joined by ``/``; None if that leads to no place in it."""
+    for part in name.strip("/").split("/"):
+        link = group.get(part, getlink=True) if isinstance(group, h5py.Group) else None
+        if isinstance(link, h5py.SoftLink) and links:
+            group = member(group.file if link.path.startswith("/") else group, link.path, links - 1)
+        elif isinstance(link, h5py.HardLink):
+            group = group[part]
+        else:
+            return None
+    return group
+
+
+def numbers_in(path: Path, items: Iterable[Any]) -> None:
+    """Refuse datasets that hold more than a record may, or whose numbers are in another file."""
+    size = 0
+    for item in items:
+        if item.is_virtual or item.external:
+            raise NotAvailable(f"dataset {item.name!r} takes its numbers from another file; copy them into this one")
+        size += (item.size or 0) * -(-item.dtype.itemsize // 8)  # whatever a row consists of
+        check_size(path, size, "; name a group with table=")
 
 
 def _named(path: Path, found: Iterable[tuple[str, tuple[Any, str | None]]]) -> dict[str, tuple[Any, str | None]]:
@@ -49,16 +72,17 @@ def _datasets(path: Path, group: Any) -> Iterator[tuple[str, tuple[Any, str | No
     chosen = {name: item for name, item in items.items() if isinstance(item, h5py.Dataset)}
     if len(chosen) > MOST_DATASETS:
         raise NotAvailable(f"the file has {len(chosen)} datasets; allowed: up to {MOST_DATASETS}")
-    check_size(path, sum(item.size or 0 for item in chosen.values()), "; name a group with table=")
+    chosen = {name: item for name, item in chosen.items() if item.dtype.kind in "iufV"}
+    numbers_in(path, chosen.values())
     for name, item in chosen.items():
-        if item.is_virtual or item.external:
-            raise NotAvailable(f"dataset {name!r} takes its numbers from another file; copy them into this one")
         raw = item.attrs.get("units", item.attrs.get("unit"))
         unit = raw.decode() if isinstance(raw, bytes) else None if raw is None else str(raw)
         if item.dtype.names:
+            rows = item[()]
             for column in item.dtype.names:
-                yield f"{name}/{column}", (np.asarray(item[column]), None)
-        elif item.dtype.kind in "iuf":
+                if rows.dtype[column].base.kind in "iuf":
+                    yield f"{name}/{column}", (rows[column], None)
+        else:
             numbers = np.asarray(item[()])
             if names := _names_of_columns(item):
                 columns = numbers.T if numbers.shape[1] == len(names) else numbers

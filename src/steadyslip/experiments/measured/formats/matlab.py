@@ -7,6 +7,8 @@ structures, ``p(2)`` is the second, as in MATLAB; where each holds a name and on
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,10 +17,20 @@ import numpy as np
 from scipy.io import loadmat, whosmat
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.formats.table import Table, check_apart, check_size, chosen_part, from_vectors
+from steadyslip.experiments.measured.formats.table import (
+    MOST_VALUES,
+    Table,
+    check_apart,
+    check_size,
+    chosen_part,
+    from_vectors,
+)
+from steadyslip.files.inputs import read_bytes
 
 DEEPEST = 8
 MOST_MEMBERS = 100_000
+HEAD, TAG, PACKED = 128, 8, 15  # bytes of the file's head and of the tag before an element; what a packed one is tagged
+BYTES, ONE_PIECE = 8, 2**20  # of a number; of what is unpacked at a time
 CLASS = "MATLAB_class"
 NAMES, UNITS = ("name", "label", "channel", "title"), ("unit", "units", "dimension")
 Numbers = dict[str, tuple[Any, str | None]]
@@ -28,8 +40,10 @@ def read(path: Path, table: str | None) -> Table:
     """Numeric vectors of a file, or of one of its variables: ``p1``, ``p1.data`` within a structure, ``p(2)``."""
     try:
         check_size(path, sum(math.prod(shape) for _, shape, _ in whosmat(path)))
+        _check_unpacked(path)
         found = loadmat(path, squeeze_me=True, struct_as_record=True)
-        variables = {name: _plain(value, DEEPEST) for name, value in found.items() if not name.startswith("__")}
+        left = Left(path)
+        variables = {name: _plain(value, DEEPEST, left) for name, value in found.items() if not name.startswith("__")}
     except NotImplementedError:  # version 7.3
         variables = _of_version_73(path)
         if not variables:  # HDF5 of another program
@@ -55,15 +69,55 @@ def _is_inside(name: str, part: str) -> bool:
 # -- what is in a file, in Python's terms
 
 
-def _plain(value: Any, deep: int) -> Any:
+class Left:
+    """How many members of structures and cells, and numbers, a file may still have."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.members, self.numbers = path, 0, 0
+
+    def take(self, members: int, numbers: int = 0) -> None:
+        """Count some more.
+
+        Raises
+        ------
+        NotAvailable
+            If these are too many.
+        """
+        self.members += members
+        self.numbers += numbers
+        if self.members > MOST_MEMBERS:
+            raise NotAvailable(f"{str(self.path)!r} has more members of structures and cells than {MOST_MEMBERS}")
+        check_size(self.path, self.numbers)
+
+
+def _check_unpacked(path: Path) -> None:
+    """Refuse a file of MATLAB's version 5 to 7 whose packed variables unpack to more than a record."""
+    size, place = 0, HEAD
+    content = read_bytes(path, BYTES * MOST_VALUES)
+    order = "<" if content[HEAD - 2 : HEAD] == b"IM" else ">"
+    while place + TAG <= len(content):
+        kind, length = struct.unpack_from(f"{order}II", content, place)
+        packed: bytes | memoryview = memoryview(content)[place + TAG : place + TAG + length]
+        place += TAG + length
+        if kind != PACKED:
+            continue
+        unpacking = zlib.decompressobj()
+        while packed and not unpacking.eof:
+            part = unpacking.decompress(packed, ONE_PIECE)
+            packed = unpacking.unconsumed_tail
+            check_size(path, (size := size + len(part)) // BYTES)
+
+
+def _plain(value: Any, deep: int, left: Left) -> Any:
     """What SciPy read, in dictionaries and lists."""
     array = np.asarray(value)
     if not deep or array.dtype.kind not in "OV":
         return str(value) if array.dtype.kind == "U" and array.size == 1 else array
+    left.take(array.size * max(len(array.dtype.names or ()), 1))
     if not array.dtype.names:
         own = array.ravel().tolist()
-        return _plain(own[0], deep - 1) if array.ndim == 0 else [_plain(one, deep - 1) for one in own]
-    members = [{field: _plain(one[field], deep - 1) for field in array.dtype.names} for one in array.ravel()]
+        return _plain(own[0], deep - 1, left) if array.ndim == 0 else [_plain(one, deep - 1, left) for one in own]
+    members = [{field: _plain(one[field], deep - 1, left) for field in array.dtype.names} for one in array.ravel()]
     return members[0] if array.size == 1 else members
 
 
@@ -71,34 +125,37 @@ def _of_version_73(path: Path) -> dict[str, Any]:
     """Variables of a file of version 7.3; none if another program wrote it."""
     import h5py
 
+    from steadyslip.experiments.measured.formats.hdf5 import member
+
     with h5py.File(path, "r") as file:
-        own = {name: item for name, item in file.items() if not name.startswith("#")}
+        own = {name: item for name in file if not name.startswith("#") and (item := member(file, name)) is not None}
         if not any(CLASS in item.attrs for item in own.values()):
             return {}
-        sizes: list[int] = []
-        file.visititems(lambda _, item: sizes.append(item.size or 0) if isinstance(item, h5py.Dataset) else None)
-        check_size(path, sum(sizes))
-        return {name: _unfolded(file, item, DEEPEST) for name, item in own.items()}
+        left = Left(path)
+        return {name: _unfolded(item, DEEPEST, left) for name, item in own.items()}
 
 
-def _unfolded(file: Any, item: Any, deep: int) -> Any:
+def _unfolded(item: Any, deep: int, left: Left) -> Any:
     """An object of an HDF5 file as what it was in MATLAB, whose matrices lie there with rows for columns."""
     import h5py
 
+    from steadyslip.experiments.measured.formats.hdf5 import member, numbers_in
+
     if isinstance(item, h5py.Group):
-        fields = {name: _unfolded(file, one, deep - 1) for name, one in item.items()} if deep else {}
-        folded = [name for name, one in item.items() if isinstance(one, h5py.Dataset) and CLASS not in one.attrs]
+        left.take(len(item))
+        own = {name: one for name in item if deep and (one := member(item, name)) is not None}
+        fields = {name: _unfolded(one, deep - 1, left) for name, one in own.items()}
+        folded = [name for name, one in own.items() if isinstance(one, h5py.Dataset) and CLASS not in one.attrs]
         sizes = {len(fields[name]) for name in folded if isinstance(fields.get(name), list)}
         if not folded or len(sizes) != 1 or len(folded) != len(fields):
             return fields
         members = [dict(zip(fields, values, strict=True)) for values in zip(*fields.values(), strict=True)]
         return members[0] if len(members) == 1 else members
-    if item.is_virtual or item.external:
-        raise NotAvailable(f"{item.name!r} takes its numbers from another file; copy them into this one")
+    numbers_in(left.path, [item])
     if h5py.check_ref_dtype(item.dtype) is not None:
-        if item.size > MOST_MEMBERS:
-            raise NotAvailable(f"{item.name!r} has {item.size} members; allowed: up to {MOST_MEMBERS}")
-        return [_unfolded(file, file[one], deep - 1) for one in item[()].ravel()] if deep else []
+        left.take(item.size)
+        return [_unfolded(item.file[one], deep - 1, left) for one in item[()].ravel()] if deep else []
+    left.take(1, item.size * -(-item.dtype.itemsize // BYTES))
     numbers = np.squeeze(np.asarray(item[()]).T)
     kind = item.attrs.get(CLASS, b"")
     if "MATLAB_empty" in item.attrs:

@@ -12,12 +12,14 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.columns import known_unit
+from steadyslip.experiments.measured.columns import known_unit, listed
 from steadyslip.experiments.measured.formats.moments import from_the_first
 
 ENDED = 0.03  # of a column: what the last block of an acquisition may lack in some
-MOST_VALUES = 2**26
-"""Numbers of a file."""
+MOST_VALUES, MOST_ROWS = 40_000_000, 10_000_000
+"""Numbers of a file and of a column: what a gigabyte of memory has room for with the copies that cleaning makes."""
+FEW_VALUES, VALUES_A_BYTE = 2**20, 16
+"""Numbers that any file may hold, and more for each of its bytes: noise of a measured row takes one, however packed."""
 MISSING = {
     "", "nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "nat", "#n/a", "-nan", "missing",
     "#div/0!", "#value!", "#ref!", "#num!", "#name?", "#null!", "*", "**", "***", "?", ".",
@@ -58,10 +60,16 @@ class Table:
         self.values = self.values[keep]
 
 
-def check_size(path: Path, size: int, remedy: str = "") -> None:
-    """Refuse more numbers than a record may have, before they are read."""
-    if size > MOST_VALUES:
-        raise NotAvailable(f"{str(path)!r} has {size} numbers; allowed: up to {MOST_VALUES}{remedy}")
+def check_size(path: Path, size: int, remedy: str = "", rows: int = 0) -> None:
+    """Refuse more numbers than a record may have, or than a file of so many bytes holds, before they are read."""
+    if size > MOST_VALUES or rows > MOST_ROWS:
+        most = f"{MOST_VALUES} in all, {MOST_ROWS} in a column"
+        raise NotAvailable(f"{str(path)!r} has {max(size, rows)} numbers; allowed: up to {most}{remedy}")
+    held = path.stat().st_size
+    if size > FEW_VALUES + VALUES_A_BYTE * held:
+        raise NotAvailable(
+            f"{str(path)!r} states {size} numbers in {held} bytes, which no measurement packs so{remedy}"
+        )
 
 
 def check_apart(path: Path, found: Sequence[str], kind: str) -> None:
@@ -80,7 +88,7 @@ def check_apart(path: Path, found: Sequence[str], kind: str) -> None:
         homes.setdefault(last, []).append(home if mark else "")
     shared = [parts for parts in homes.values() if len(parts) > 1]
     if shared and len(shared) == len(homes) and all(parts == shared[0] for parts in shared):
-        several = ", ".join(part or "the top" for part in shared[0])
+        several = listed(part or "the top" for part in shared[0])
         raise NotAvailable(
             f"{str(path)!r} has columns of the same names in several {kind}s; say which with table=: {several}"
         )
@@ -95,7 +103,7 @@ def chosen_part(path: Path, kind: str, table: str | None, parts: Sequence[str]) 
         If there is none of that name.
     """
     if table is not None and table not in parts:
-        raise NotAvailable(f"{str(path)!r} has no {kind} {table!r}; it has {', '.join(parts) or 'none'}")
+        raise NotAvailable(f"{str(path)!r} has no {kind} {table!r}; it has {listed(parts) or 'none'}")
     return table
 
 
@@ -126,8 +134,9 @@ def from_vectors(path: Path, found: Mapping[str, tuple[Any, str | None]], notes:
             for name, (one, unit) in vectors.items()
         }
     left = [name for name, (values, _) in vectors.items() if len(values) != usual]
-    said = [*notes, f"left out, not {usual} values long: {', '.join(left)}"] if left else list(notes)
+    said = [*notes, f"left out, not {usual} values long: {listed(left)}"] if left else list(notes)
     kept = {name: pair for name, pair in vectors.items() if name not in left}
+    check_size(path, usual * len(kept), rows=usual)
     return Table(
         list(kept), np.array([values for values, _ in kept.values()]), np.arange(1, usual + 1),
         [None if unit is None else known_unit(unit) for _, unit in kept.values()], said,

@@ -10,7 +10,7 @@ import numpy as np
 from nptdms import TdmsFile
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.experiments.measured.columns import guessed_role, split_name
+from steadyslip.experiments.measured.columns import guessed_role, listed, split_name
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, from_vectors
 
 UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")
@@ -48,7 +48,7 @@ def _of_a_record(path: Path, own: dict[str, list[Any]]) -> tuple[list[str], list
     if len(wanted) == 1:
         left = ", ".join(group for group in own if group not in wanted)
         return wanted, [f"group {wanted[0]!r}, the only one with friction or stress in it; left out: {left}"]
-    raise NotAvailable(f"{str(path)!r} has channels in several groups; say which with table=: {', '.join(own)}")
+    raise NotAvailable(f"{str(path)!r} has channels in several groups; say which with table=: {listed(own)}")
 
 
 def _role(name: str) -> str | None:

@@ -1,0 +1,52 @@
+"""Records of experiments: read them, fit rigs to them, say how sure that is and what follows for another rig.
+
+Knows no verdicts, maps or figures: fits come back as numbers and records.
+"""
+
+from .answers.laws import LawComparison, compare, compare_laws
+from .answers.population import Population, population
+from .answers.precision import Precision, best_protocol, precision
+from .answers.predict import Prediction, predict
+from .answers.profiles import Profile, profile
+from .answers.uncertainty import Draws, bootstrap, normal_draws, posterior
+from .answers.validation import CrossValidation, cross_validate
+from .fitting.fit import fit
+from .fitting.numbers import Estimate
+from .fitting.result import Fit, load_fit
+from .from_files import fit_files, population_files
+from .measured.read import read_record, record_from_arrays
+from .measured.record import Record
+from .spec import Spec, lab_rig, read_spec
+
+__all__ = [
+    "CrossValidation",
+    "Draws",
+    "Estimate",
+    "Fit",
+    "LawComparison",
+    "Population",
+    "Precision",
+    "Prediction",
+    "Profile",
+    "Record",
+    "Spec",
+    "best_protocol",
+    "bootstrap",
+    "compare",
+    "compare_laws",
+    "cross_validate",
+    "fit",
+    "fit_files",
+    "lab_rig",
+    "load_fit",
+    "normal_draws",
+    "population",
+    "population_files",
+    "posterior",
+    "precision",
+    "predict",
+    "profile",
+    "read_record",
+    "read_spec",
+    "record_from_arrays",
+]

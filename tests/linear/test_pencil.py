@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eig
 
 import steadyslip as ss
-from machines import rate_state, surface, two_blocks
+from machines import rate_state, stacked_pads, surface, two_blocks
 from steadyslip.linear import pencil, spectrum
 from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.roots import roots
@@ -100,6 +100,14 @@ def test_what_is_lost_or_wrong_is_noticed(monkeypatch):
         monkeypatch.setattr(pencil, "spectrum", lambda point, values=values: values)
         monkeypatch.setattr(pencil, "precise_eigenvalues", lambda *_: None)
         assert not checked(machine).decided, what
+
+
+@pytest.mark.campaign
+def test_one_stiff_link_among_many_hides_no_other():
+    """Pads that hold each other in so many ways that only numbers are there: as stiff as 1e9 N/m, a link is rigid."""
+    pads = stacked_pads(3)
+    rates = [ss.growth_rate(pads.with_values({"links.along-pad1.stiffness": k})) for k in (1e9, 1e14)]
+    assert rates[1] == pytest.approx(rates[0], rel=1e-6)
 
 
 def test_roots_under_a_delay_are_counted_by_the_argument(monkeypatch):

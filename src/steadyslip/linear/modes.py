@@ -15,8 +15,7 @@ from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
 from steadyslip.core.telling import percent, shown
 from steadyslip.laws.contact import Motion
-from steadyslip.linear.pencil import matrix_function
-from steadyslip.linear.spectrum import spectrum
+from steadyslip.linear.pencil import best_spectrum, matrix_function
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import NORMAL, Mechanism, Touch
 from steadyslip.model import Model
@@ -127,7 +126,7 @@ def modes(rig: Machine) -> tuple[Mode, ...]:
     point = operating_point(rig)
     if not point.exists:
         raise explain_absence(rig, point)
-    found = spectrum(point)
+    found = best_spectrum(point)
     return tuple(mode_of(rig, point, complex(s)) for s in found if np.isfinite(s) and s.imag >= 0)
 
 

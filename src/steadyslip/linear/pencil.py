@@ -103,6 +103,21 @@ def checked_spectrum(point: OperatingPoint) -> CheckedSpectrum:
     return _checked(point, matrix, better, errors, True)
 
 
+def best_spectrum(point: OperatingPoint) -> ComplexArray:
+    """As `spectrum`; of a single rig whose polynomial is too long to be written out, checked and if need be refined.
+
+    Its state matrix has stiffnesses of several links in one sum, so that the stiffest may hide the others.
+    """
+    found = spectrum(point)
+    if point.shape or point.model.delays or is_written_out(point.model):
+        return found
+    checked = checked_spectrum(point)
+    if not checked.refined:
+        return found
+    short = max(found.shape[-1] - len(checked.values), 0)
+    return np.append(checked.values, np.full(short, np.nan + 0j))
+
+
 def _checked(
     point: OperatingPoint, matrix: _Matrix, values: ComplexArray, errors: Array, refined: bool
 ) -> CheckedSpectrum:

@@ -19,7 +19,7 @@ from steadyslip.figures.experiments.corners import corner
 from steadyslip.figures.experiments.fits import fit, steps
 from steadyslip.figures.experiments.populations import population
 from steadyslip.figures.experiments.records import record
-from steadyslip.figures.forced import frequency_response
+from steadyslip.figures.forced import frequency_response, frozen_verdicts
 from steadyslip.figures.locus import root_locus
 from steadyslip.figures.machine_verdict import eigenvalue_plane, machine_verdict, mode_shape, stable_ranges
 from steadyslip.figures.machines import machine_sketch
@@ -31,7 +31,7 @@ from steadyslip.figures.tolerances import tolerances
 from steadyslip.machine.machine import Machine
 from steadyslip.maps import MapResult, Refined, Sensitivity
 from steadyslip.motion import History
-from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, HopfCurve
+from steadyslip.nonlinear import Basin, CycleBranch, FrequencyResponse, FrozenVerdicts, HopfCurve
 from steadyslip.verdict import Analysis, MachineAnalysis, Tolerated
 
 __all__ = [
@@ -44,6 +44,7 @@ __all__ = [
     "eigenvalue_plane",
     "fit",
     "frequency_response",
+    "frozen_verdicts",
     "history",
     "hopf_curve",
     "kicks",
@@ -82,6 +83,7 @@ register_figures(CycleBranch, branch=cycle_branch)
 register_figures(HopfCurve, curve=hopf_curve)
 register_figures(Basin, basin=basin)
 register_figures(FrequencyResponse, response=frequency_response)
+register_figures(FrozenVerdicts, verdicts=frozen_verdicts)
 register_figures(Record, record=record)
 register_figures(Fit, fit=fit, steps=steps, corner=corner)
 register_figures(Draws, corner=corner)

@@ -1,4 +1,4 @@
-"""Answers to what swings for ever: gain and phase over the period (a Bode plot)."""
+"""Answers to what is done to a rig: gain and phase over the period (a Bode plot), verdicts along a slow change."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steadyslip.core.telling import shown
 from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, display_unit, labelled
 
 if TYPE_CHECKING:
-    from steadyslip.nonlinear import FrequencyResponse
+    from steadyslip.nonlinear import FrequencyResponse, FrozenVerdicts
 
 _MARKS = ("o", "s", "^", "D", "v")
 
@@ -63,4 +63,46 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
     axes[-1].set_xlabel("period (s)")
     axes[0].set_title(f"{found.output.replace('_', ' ')} under {found.input.replace('_', ' ')}", fontsize="medium")
     axes[0].legend(fontsize="small")
+    return axes
+
+
+def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
+    """Draw growth rate over time, unstable moments shaded, and the slip rate of the motion beneath.
+
+    Parameters
+    ----------
+    found : FrozenVerdicts
+    ax : sequence of matplotlib.axes.Axes, optional
+        Two.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+    """
+    if ax is None:
+        from matplotlib import pyplot as plt
+
+        _, ax = plt.subplots(2, 1, figsize=(6.4, 4.8), layout="constrained", sharex=True)
+    axes = np.atleast_1d(np.asarray(ax, dtype=object)).reshape(-1)
+    factor, unit = display_unit("s", float(found.t[-1]))
+    t = found.t / factor
+    axes[0].plot(t, found.growth_rate, color=BLACK)
+    axes[0].axhline(0.0, color=GREY, linewidth=1)
+    for one in axes:
+        unstable = one.fill_between(
+            t, 0, 1, where=found.growth_rate > 0, transform=one.get_xaxis_transform(), facecolor="none", hatch="//",
+            edgecolor=VERMILION, linewidth=0, alpha=0.5,
+        )  # fmt: skip
+    unstable.set_label("steady sliding is unstable")
+    names = [name for name in found.run.data if name == "v" or name.endswith(".v")]
+    for name, colour in zip(names, cycle((BLUE, GREEN, ORANGE)), strict=False):
+        label = "slip rate" if name == "v" else name.removesuffix(".v")
+        axes[1].plot(found.run["t"] / factor, np.abs(found.run[name]), color=colour, label=label)
+    if np.isfinite(found.departure):
+        axes[1].axvline(found.departure / factor, color=BLACK, linestyle="--", linewidth=1, label="motion departs")
+    axes[1].set_yscale("log")
+    axes[0].set_ylabel("growth rate (1/s)")
+    axes[1].set_ylabel("velocity (m/s)")
+    axes[1].set_xlabel(labelled("time", unit))
+    axes[1].legend(fontsize="small")
     return axes

@@ -6,6 +6,7 @@ Knows stability and motion; no records of experiments, no maps, no words of the 
 from __future__ import annotations
 
 from steadyslip.nonlinear.forced import FrequencyResponse, response
+from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.kicks.basin import Basin, basin, orbit
 from steadyslip.nonlinear.kicks.brackets import threshold_map
 from steadyslip.nonlinear.kicks.threshold import KickMargin, Threshold, margin_to_kick, threshold
@@ -20,6 +21,7 @@ __all__ = [
     "Cycle",
     "CycleBranch",
     "FrequencyResponse",
+    "FrozenVerdicts",
     "HopfCurve",
     "KickMargin",
     "Onset",
@@ -28,6 +30,7 @@ __all__ = [
     "Threshold",
     "basin",
     "cycles",
+    "frozen_verdicts",
     "hopf",
     "hopf_curve",
     "margin_to_kick",

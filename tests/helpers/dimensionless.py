@@ -30,3 +30,11 @@ def y_of(run):
 def phi_of(run):
     """ln(v/v0)."""
     return np.log(run["v"])
+
+
+def two_states(kappa=0.08):
+    """Theory 4: β = (1, .84), ρ = .048; κ = k d_1/(aσ)."""
+    states = (ss.State(b=A, d_c=0.048), ss.State(b=0.84 * A, d_c=1.0))
+    law = ss.RateState(a=A, states=states, mu_ref=MU, v_ref=1.0, evolution=ss.Slip())
+    stiffness = kappa * A / 0.048
+    return ss.Slider(friction=law, contact=ss.Constant(preload=1.0), stiffness=stiffness, drive=ss.Steady(1.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import cycle, pairwise
+from itertools import cycle
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,8 @@ from steadyslip.machine.machine import Machine
 if TYPE_CHECKING:
     from steadyslip.nonlinear import Basin, CycleBranch, HopfCurve
 
-_MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN)}
+_MARKS = {"fold": ("D", ORANGE), "period doubling": ("s", VERMILION), "torus": ("^", GREEN),
+          "branch point": ("v", SKY)}  # fmt: skip
 _COLOURS = {"supercritical": BLUE, "subcritical": VERMILION, "degenerate": GREY, "not decided": BLACK}
 _AREAS = {"returns": "#FFFFFF", "oscillation": ORANGE, "blow-up": SKY, "contact lost": GREEN, "no solution": GREY,
           "undecided": YELLOW, "interrupted": BLACK}  # fmt: skip
@@ -111,24 +112,20 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
 def _velocities(
     branch: CycleBranch, ax: Axes, axis: tuple[float, float], speed: float, width: float, named: bool
 ) -> None:
-    """Stretches of equal stability, one line each; neighbours share their point, but across a gap of the branch.
+    """Stretches of equal stability, one line each, up to the special cycles at which they end.
 
     Where the block stops or turns round there is no lowest velocity to draw.
     """
-    stable = branch["stable"]
-    breaks = {0, len(stable), *branch.gaps}
-    cuts = sorted({*breaks, *(int(i) for i in np.flatnonzero(stable[1:] != stable[:-1]) + 1)})
     used: set[bool] = set()
-    for start, stop in pairwise(cuts):
-        part = slice(start if start in breaks else start - 1, stop)
-        good = bool(stable[start])
+    for stretch in branch.stretches:
+        good = stretch.stable
         style = {"color": BLUE if good else VERMILION, "linestyle": "-" if good else "--", "linewidth": width}
         name = ("stable cycle" if good else "unstable cycle") if named and good not in used else ""
         used.add(good)
+        x = (np.array([cycle.value for cycle in stretch.cycles]) - axis[0]) / axis[1]
         for quantity in ("peak_velocity", "lowest_velocity"):
-            velocity = np.where(branch[quantity][part] > 0, branch[quantity][part], np.nan)
-            x = (branch["value"][part] - axis[0]) / axis[1]
-            ax.plot(x, velocity / speed, label=name, **style)  # type: ignore[arg-type]
+            velocity = np.array([getattr(cycle, quantity) for cycle in stretch.cycles])
+            ax.plot(x, np.where(velocity > 0, velocity, np.nan) / speed, label=name, **style)  # type: ignore[arg-type]
             name = ""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import steadyslip as ss
-from dimensionless import MU, A, unit_rig
+from dimensionless import A, two_states, unit_rig
 from steadyslip.files.specifications import read_rig
 
 TESTS = Path(__file__).parents[2]
@@ -17,14 +17,6 @@ TESTS = Path(__file__).parents[2]
 
 def table(name):
     return list(csv.DictReader((TESTS / "reference" / name).read_text("utf-8").splitlines()))
-
-
-def two_states(kappa=0.08):
-    """Theory 4: β = (1, .84), ρ = .048; κ = k d_1/(aσ)."""
-    states = (ss.State(b=A, d_c=0.048), ss.State(b=0.84 * A, d_c=1.0))
-    law = ss.RateState(a=A, states=states, mu_ref=MU, v_ref=1.0, evolution=ss.Slip())
-    stiffness = kappa * A / 0.048
-    return ss.Slider(friction=law, contact=ss.Constant(preload=1.0), stiffness=stiffness, drive=ss.Steady(1.0))
 
 
 ROWS = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from itertools import pairwise
 from os import PathLike
 from typing import Any
@@ -19,8 +20,9 @@ from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, SpecialCycle, quantities
-from steadyslip.nonlinear.orbits.values import attracting, cycles_at
+from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
+from steadyslip.nonlinear.orbits.ranges import CycleChecks, Stretch, checks_of, stretches_of
+from steadyslip.nonlinear.orbits.values import CyclesAt, cycles_at, simulations
 
 Array = np.ndarray
 
@@ -41,10 +43,12 @@ class CycleBranch(Displayed):
     end : str
         Why the branch stops.
     doubled : CycleBranch or None
-        The branch of twice the period that begins at the first period doubling.
+        The cycles of twice the period that begin at the period doublings, of each of them in turn; its parts end at
+        another doubling, or in words.
     gaps : tuple of int
         Numbers of the cycles before which the branch is not continuous: a sheet broke off, and simulation found
-        another beyond it; 0 where nothing was found at the edge itself.
+        another beyond it; 0 where nothing was found at the edge itself. Of doubled cycles: where those of another
+        doubling begin.
     broken : tuple of str
         For each gap, why the sheet before it was not followed any further.
     steady : int
@@ -54,6 +58,10 @@ class CycleBranch(Displayed):
     contact : str
         Of a machine whose branch ends where a contact is lost, or with a blow-up: the contact that lifts off, or that
         is the fastest; else empty.
+    bounds : tuple of (End, End)
+        Where each part between two gaps begins and stops.
+    repeated : int
+        Number of cycles that were computed again with smaller errors per step, because a check failed.
     """
 
     rig: Slider | Machine = field(repr=False)
@@ -69,6 +77,8 @@ class CycleBranch(Displayed):
     steady: int = 0
     rtol: float | None = None
     contact: str = ""
+    bounds: tuple[tuple[End, End], ...] = field(default=(), repr=False)
+    repeated: int = 0
 
     def __len__(self) -> int:
         return len(self.cycles)
@@ -105,28 +115,29 @@ class CycleBranch(Displayed):
             return self.rig.area_of(self.along)
         return None
 
-    def at(self, value: float) -> tuple[Cycle, ...]:
+    def at(self, value: float) -> CyclesAt:
         """The cycles that exist at one value of the parameter, corrected to full precision.
 
-        If none of them attracts, on this branch or on those of its doublings, motions are simulated at the value, and
-        the stable cycle that one comes to, if it does, is the last: cycles of several slip events may lie on sheets of
-        their own, in windows among irregular motion.
+        If none of them attracts, those of twice the period and so on follow, until one does. If none of these does
+        either, motions are simulated at the value; the stable cycle that one comes to, if it does, is the last, and
+        ``simulated`` of what comes back says what each motion showed: cycles of several slip events may lie on sheets
+        of their own, in windows among irregular motion.
         """
-        found = self._followed(value)
-        levels, stable = self, any(cycle.stable for cycle in found)
-        while not stable and levels.doubled is not None:
-            levels = levels.doubled
-            stable = any(cycle.stable for cycle in levels._followed(value))
-        if stable:
-            return found
-        own = attracting(self.onset, self.steady, self.rtol, value, found)
-        return found if own is None else (*found, own)
+        found = list(self._followed(value))
+        branch = self.doubled
+        while not any(cycle.stable for cycle in found) and branch is not None:
+            found += branch._followed(value)
+            branch = branch.doubled
+        if any(cycle.stable for cycle in found):
+            return CyclesAt(found)
+        seen = simulations(self.onset, self.steady, self.rtol, value, found)
+        return CyclesAt([*found, *(one.cycle for one in seen if one.cycle is not None)], seen)
 
     def _followed(self, value: float) -> tuple[Cycle, ...]:
         """Those of the branch itself."""
-        return cycles_at(self.onset, self.steady, self.rtol, value, self._stretches())
+        return cycles_at(self.onset, self.steady, self.rtol, value, self._continuous())
 
-    def _stretches(self) -> list[list[Cycle]]:
+    def _continuous(self) -> list[list[Cycle]]:
         """Cycles from gap to gap, folds among them."""
         starts = (0, *self.gaps, len(self.cycles))
         folds = {point.index: point.cycle for point in self.special if point.kind == "fold"}
@@ -139,6 +150,21 @@ class CycleBranch(Displayed):
             found.append(stretch)
         return found
 
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Stretches of cycles of equal stability, in the order of the branch; they end at special cycles."""
+        return tuple(stretches_of(self.cycles, self.special, self.gaps, self.bounds))
+
+    @property
+    def stable_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Ranges of the parameter (SI units) in which cycles of the branch attract, in its order; they may overlap."""
+        return tuple(one.range for one in self.stretches if one.stable)
+
+    @property
+    def checks(self) -> CycleChecks:
+        """How well the cycles close, how well their multipliers are known, and what that does not decide."""
+        return checks_of(self.cycles, self.repeated)
+
     def to_xarray(self) -> Any:
         """An xarray.Dataset over ``point``."""
         import xarray as xr
@@ -147,6 +173,8 @@ class CycleBranch(Displayed):
         data = {name: ("point", self[name].astype(float), {"units": unit}) for name, unit in names.items()}
         data["stable"] = ("point", self["stable"], {})
         attributes = {"parameter": self.along, "end": self.end, "onset": self.onset.kind, "gaps": list(self.gaps)}
+        attributes["stable_ranges"] = [end for one in self.stable_ranges for end in one]
+        attributes["checks"] = str(self.checks)
         return xr.Dataset(data, attrs=attributes)
 
     def to_csv(self, path: str | PathLike[str]) -> None:
@@ -175,6 +203,7 @@ class CycleBranch(Displayed):
                 found["forces"] = forces
             found["amplitude"] = cycle.amplitude if np.isfinite(cycle.amplitude) else None
             found |= {"stable": cycle.stable, "start": cycle.start}
+            found |= {"closing": cycle.closing, "multiplier_error": cycle.multiplier_error}
             if cycle.contacts:
                 found |= {"contact": cycle.contact, "contacts": {n: _plain(one) for n, one in cycle.contacts.items()}}
             return found | {"multipliers": [[m.real, m.imag] for m in (complex(cycle.trivial), *cycle.multipliers)]}
@@ -186,6 +215,12 @@ class CycleBranch(Displayed):
             "end": self.end,
             **({"contact": self.contact} if self.contact else {}),
             "gaps": [{"before": i, "end": why} for i, why in zip(self.gaps, self.broken, strict=True)],
+            "stable_ranges": [list(one) for one in self.stable_ranges],
+            "stretches": [
+                {"stable": one.stable, "range": list(one.range), "ends": [end.kind for end in one.ends]}
+                for one in self.stretches
+            ],
+            "checks": str(self.checks),
             "cycles": [plain(cycle) for cycle in self.cycles],
             "special": [
                 {"kind": s.kind, "bracket": list(s.bracket), "precision": s.precision} | plain(s.cycle)
@@ -220,18 +255,19 @@ class CycleBranch(Displayed):
                 f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}{where}",
                 f"  period       {shown(float(period.min()), 's')} to {shown(float(period.max()), 's')}",
                 f"  {self._drop:<13}up to {shown(float(drop.max()), drop_unit, area=self._area(drops))}",
-                f"  stable       {_stretches(self)}",
+                f"  stable       {_stable(self)}",
             ]
         for point in self.special:
             lines.append(
                 f"  {point.kind} at {shown(point.cycle.value, self.unit, 7, area)} "
                 f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
             )
-        for i, why in zip(self.gaps, self.broken, strict=True):
-            before = shown(self.cycles[i - 1].value if i else self.onset.value, self.unit, area=area)
-            after = shown(self.cycles[i].value, self.unit, area=area)
-            lines += [f"  gap: at {before} {why};", f"    another sheet, found by simulation, from {after} on"]
+        for (_, stop), (begin, _), why in zip(self.bounds, self.bounds[1:], self.broken, strict=False):
+            before, after = (shown(end.value, self.unit, area=area) for end in (stop, begin))
+            how = "from the period doubling at" if begin.kind == "period doubling" else "found by simulation, from"
+            lines += [f"  gap: at {before} {why};", f"    another sheet, {how} {after} on"]
         lines.append(f"  ends: {self.end}")
+        lines += [f"  {self.checks}"] if self.cycles else []
         if self.doubled is not None:
             lines += ["twice the period:", *("  " + line for line in str(self.doubled).splitlines())]
         return "\n".join(lines)
@@ -243,16 +279,13 @@ def _plain(one: CycleRange) -> dict[str, float | None]:
     return {name: value if np.isfinite(value) else None for name, value in found.items()}
 
 
-def _stretches(branch: CycleBranch) -> str:
+def _stable(branch: CycleBranch) -> str:
     """Where along the branch cycles are stable, in words."""
-    stable = branch["stable"]
-    if stable.all():
+    if all(one.stable for one in branch.stretches):
         return "all"
-    if not stable.any():
-        return "none"
-    changes = np.flatnonzero(stable[1:] != stable[:-1]) + 1
-    pieces = np.split(np.arange(len(stable)), changes)
-    found = [piece for piece in pieces if stable[piece[0]]]
-    values, area = branch["value"], branch.rig.area_of(branch.along)
-    ends = [(float(values[p].min()), float(values[p].max())) for p in found]
-    return "; ".join(f"{shown(a, branch.unit, area=area)} to {shown(b, branch.unit, area=area)}" for a, b in ends)
+    area = branch.rig.area_of(branch.along)
+    return "; ".join(
+        f"{shown(one.range[0], branch.unit, area=area)} to {shown(one.range[1], branch.unit, area=area)}"
+        + (" (an end is not located)" if any(end.kind == "not located" for end in one.ends) else "")
+        for one in branch.stretches if one.stable
+    ) or "none"  # fmt: skip

@@ -25,6 +25,10 @@ def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
     return {name.replace("stress", "force"): (name, unit.replace("Pa", "N")) for name, unit in UNITS.items()}
 
 
+OPEN = 1e-4  # share of a cycle's size by which a motion may miss its start: an order below what Newton's method leaves
+UNCERTAIN = 3.0  # errors of multipliers other than the one along the motion are taken to be up to so many times larger
+
+
 @dataclass(frozen=True)
 class CycleRange(Displayed):
     """What slip at a contact of a machine passes through in a cycle.
@@ -82,6 +86,9 @@ class Cycle(Displayed):
         Of a machine: the contact that the cycle is counted at; else empty.
     contacts : dict of str to CycleRange
         Of a machine: all of them.
+    closing : float
+        Distance of the end of one period from its start, by an integration of the motion alone, as a share of the
+        cycle's size: logarithms of large states, shares of natural sizes of small ones.
     """
 
     value: float
@@ -99,12 +106,31 @@ class Cycle(Displayed):
     speed: float
     contact: str = ""
     contacts: Mapping[str, CycleRange] = field(default_factory=dict)
+    closing: float = 0.0
     _orbit: Orbit | None = field(default=None, repr=False)
 
     @property
     def growth(self) -> float:
         """Size of the largest multiplier: factor by which a small deviation grows in one period."""
         return max((abs(m) for m in self.multipliers), default=0.0)
+
+    @property
+    def multiplier_error(self) -> float:
+        """Relative error of the multipliers, estimated: by how much the one along the motion misses 1."""
+        return abs(self.trivial - 1)
+
+    @property
+    def decided(self) -> bool:
+        """Whether the largest multiplier is farther from 1 in size than its error."""
+        return abs(self.growth - 1) > UNCERTAIN * self.multiplier_error * self.growth
+
+    @property
+    def checked(self) -> str:
+        """Closing and multipliers of the cycle, in words."""
+        words = f"closes to {self.closing:.1g} of its size, multipliers to {self.multiplier_error:.1g}"
+        if not self.closing <= OPEN or not self.decided:
+            words += "; not decided: whether it " + ("attracts" if self.closing <= OPEN else "is a cycle")
+        return words
 
     @property
     def slip(self) -> float:
@@ -119,7 +145,7 @@ class SpecialCycle(Displayed):
     Attributes
     ----------
     kind : str
-        ``fold``, ``period doubling``, ``torus`` or ``range`` (the end of the range asked for).
+        ``fold``, ``period doubling``, ``torus``, or ``branch point`` (a multiplier passes 1 without a fold).
     cycle : Cycle
     bracket : tuple of float
         Values of the parameter on both sides (at a fold: of neighbouring cycles).
@@ -134,3 +160,24 @@ class SpecialCycle(Displayed):
     bracket: tuple[float, float]
     precision: float
     index: int = 0
+    _length: float = field(default=0.0, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a part of a branch that is continuous begins or stops.
+
+    Attributes
+    ----------
+    kind : str
+        ``onset``, ``edge`` (another at which cycles end in steady sliding), ``period doubling``, ``range`` (the limit
+        asked for), or ``last cycle`` (that could be followed, or that simulation found).
+    value : float
+        Of the parameter, SI units.
+    cycle : Cycle or None
+        The cycle there; None in steady sliding.
+    """
+
+    kind: str
+    value: float
+    cycle: Cycle | None = None

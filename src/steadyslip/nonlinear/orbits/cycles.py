@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,18 @@ from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset, hopf
 from steadyslip.nonlinear.orbits.branch import CycleBranch
-from steadyslip.nonlinear.orbits.cycle import Cycle
+from steadyslip.nonlinear.orbits.cycle import Cycle, End
+from steadyslip.nonlinear.orbits.doublings import doubled_sheets
 from steadyslip.nonlinear.orbits.flow import Flow
+from steadyslip.nonlinear.orbits.ranges import is_open, is_undecided
 from steadyslip.nonlinear.orbits.search import search_on
 from steadyslip.nonlinear.orbits.special import SMALL
-from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, Sheet, Tracer
+from steadyslip.nonlinear.orbits.tracer import INTERRUPTED, Sheet, Tracer, orbit_of
 
 Array = np.ndarray
 SMALLEST = 1e-12  # amplitude that differs from none by more than rounding
+FINER, FINEST = 1e-2, 1e-13  # share of the errors per step at which cycles are computed again; rounding allows no less
+MOST_REPEATED = 20  # cycles computed again: where more fail their checks, smaller errors per step are to be asked for
 LARGER = (1e-4, 1e-3, 1e-2, 1e-1)  # amplitudes to begin with where smaller cycles cannot be followed
 
 
@@ -92,8 +97,8 @@ def cycles(
     of the one before, and as a primitive cycle, which does not return earlier. Where the branch from the edge breaks
     off before it has crossed the unstable range (canards, sheets behind a subcritical onset), motions are simulated
     there; from the cycle that one comes to, if Newton's method confirms it, another sheet is followed both ways, and
-    joined if it meets the first (`CycleBranch.gaps`). The doubled branch is entered along the eigenvector of the
-    multiplier −1.
+    joined if it meets the first (`CycleBranch.gaps`). Cycles of twice the period are entered at each doubling along the
+    eigenvector of the multiplier −1, and followed to the doubling at which they end or until they cannot be followed.
     """
     onset = hopf(rig, along, branch=branch)
     flow = Flow(rig.with_values({onset.along: onset.value}), onset.along, branch, rtol, onset.contact)
@@ -104,24 +109,47 @@ def cycles(
 
 
 def _branch(tracer: Tracer, sheets: list[Sheet], rtol: float | None, doublings: int) -> CycleBranch:
-    """What comes back: sheets one after another, and the first branch of twice the period."""
+    """What comes back: sheets one after another, and the cycles of twice the period."""
     whole, gaps, ends = sheets[0], [], [sheets[0].end]
     for sheet in sheets[1:]:
         gaps.append(len(whole.known))
         ends.append(sheet.end)
         whole = whole.joined(sheet)
     doubled = None
-    flips = [point for point in whole.special if point.kind == "period doubling"]
+    flips = [point.cycle for point in whole.special if point.kind == "period doubling"]
     if flips and doublings > 0 and not tracer.interrupted:
-        doubled = _twice(tracer, flips[0].cycle, rtol, doublings - 1)
+        further = doubled_sheets(tracer, flips)
+        doubled = _branch(tracer, further, rtol, doublings - 1) if further[0].known or not tracer.interrupted else None
     if tracer.interrupted and doubled is None:
         ends[-1] = INTERRUPTED
     onset, flow = tracer.onset, tracer.flow
-    found = tuple(known.cycle for known in whole.known)
+    found, repeated = _repeated(tracer, [known.cycle for known in whole.known])
     return CycleBranch(
-        onset.rig, onset.along, onset.unit, onset, found, tuple(whole.special), ends[-1], doubled,
-        tuple(gaps), tuple(ends[:-1]), flow.branch, rtol, whole.contact,
+        onset.rig, onset.along, onset.unit, onset, tuple(found), tuple(whole.special), ends[-1], doubled,
+        tuple(gaps), tuple(ends[:-1]), flow.branch, rtol, whole.contact, tuple(sheet.bounds for sheet in sheets),
+        repeated,
     )  # fmt: skip
+
+
+def _repeated(tracer: Tracer, found: list[Cycle]) -> tuple[list[Cycle], int]:
+    """Cycles with those computed again, with smaller errors per step, that did not pass their checks; and how many."""
+    failing = [i for i, cycle in enumerate(found) if is_open(cycle) or is_undecided(cycle)][:MOST_REPEATED]
+    if not failing or tracer.interrupted:
+        return found, 0
+    flow, repeated = tracer.flow, 0
+    rtol = max(FINER * flow.options.rtol, FINEST)
+    try:
+        finer = Tracer(
+            Flow(flow.rig, flow.name, flow.branch, rtol, tracer.onset.contact), tracer.onset, tracer.limits, tracer.most
+        )
+        for i in failing:
+            with suppress(Failure, np.linalg.LinAlgError):
+                again = finer.resumed(orbit_of(found[i]), min(1.0, found[i].amplitude)).cycle
+                if max(again.closing, again.multiplier_error) < max(found[i].closing, found[i].multiplier_error):
+                    found[i], repeated = again, repeated + 1
+    except KeyboardInterrupt:
+        tracer.interrupted = True
+    return found, repeated
 
 
 def _from_the_edge(tracer: Tracer, amplitude: float | None) -> Sheet:
@@ -141,24 +169,17 @@ def _from_the_edge(tracer: Tracer, amplitude: float | None) -> Sheet:
 
 def _of_amplitude(tracer: Tracer, amplitude: float) -> Sheet:
     """The sheet that begins with the cycle of a small amplitude."""
+    onset = End("onset", tracer.onset.value)
     try:
         shooting, first = tracer.small(amplitude)
     except np.linalg.LinAlgError:
-        return Sheet(end="broke off: no small cycle was found at the edge, where numbers leave floating point")
+        why = "broke off: no small cycle was found at the edge, where numbers leave floating point"
+        return Sheet(end=why, begins=onset)
     except Failure as failure:
-        return Sheet(end=f"broke off: no small cycle was found at the edge ({failure})")
-    return tracer.followed(shooting, first, amplitude)
-
-
-def _twice(tracer: Tracer, flip: Cycle, rtol: float | None, doublings: int) -> CycleBranch | None:
-    try:
-        shooting, first, size = tracer.doubled(flip)
-    except (Failure, np.linalg.LinAlgError):
-        return None
-    except KeyboardInterrupt:
-        tracer.interrupted = True
-        return None
-    return _branch(tracer, [tracer.followed(shooting, first, size, twice=True)], rtol, doublings)
+        return Sheet(end=f"broke off: no small cycle was found at the edge ({failure})", begins=onset)
+    sheet = tracer.followed(shooting, first, amplitude)
+    sheet.begins = onset
+    return sheet
 
 
 def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) -> tuple[float, float]:

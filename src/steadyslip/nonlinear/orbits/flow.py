@@ -498,6 +498,18 @@ def states_between(runs: Runs, setting: FlowSetting, record: Array, at: Array) -
     return np.asarray(value + first * s * (1 - s) ** 2 - last * s**2 * (1 - s))
 
 
+def passages(runs: Runs, setting: FlowSetting, record: Array) -> tuple[Array, Array]:
+    """Times in a recorded run at which slip, speeding up, is as fast as the load point, and its acceleration there.
+
+    Both by linear interpolation between steps.
+    """
+    time, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + runs.size]
+    ahead = runs.field(setting, states)[0] @ setting.slip
+    i = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] > 0) & (np.diff(time) > 0))
+    slopes = (ahead[i + 1] - ahead[i]) / (time[i + 1] - time[i])
+    return time[i] - ahead[i] / slopes, slopes
+
+
 def _rows(inputs: Array, times: Array) -> Array:
     """One segment of constant inputs for each run, as kernels read it."""
     rows = np.zeros((len(times), 1, 9))  # start, end, jump, values, slopes

@@ -9,7 +9,7 @@ import numpy as np
 from steadyslip.kernels.layout import Recorded, Sampled
 from steadyslip.motion.engine import Outcome
 from steadyslip.nonlinear.orbits.cycle import Cycle, CycleRange
-from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, states_between
+from steadyslip.nonlinear.orbits.flow import FlowFailure, Runs, passages, states_between
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 
 Array = np.ndarray
@@ -80,13 +80,15 @@ def measured(shooting: Shooting, u: Array) -> Measured:
     trivial, others = shooting.multipliers(u)
     starts = orbit.period * (np.cumsum(shooting.fractions) - shooting.fractions)
     parts = orbit.period / PRIMES[::-1]
+    within = np.searchsorted(starts, parts * (1 + 4 * np.finfo(float).eps), side="right") - 1
     passed: list[list[tuple[Array, Array, Array]]] = []
-    back, visited, beginning = [], [], _Begin(shooting, orbit)
-    for state, begin, share in zip(orbit.states, starts, shooting.fractions, strict=True):
-        span = share * orbit.period
-        times = parts[(parts >= begin) & (parts < begin + span)] - begin
+    back, visited, ends, beginning = [], [], [], _Begin(shooting, orbit)
+    for k, state in enumerate(orbit.states):
+        span = shooting.fractions[k] * orbit.period
+        times = np.clip(parts[within == k] - starts[k], 0.0, span)
         outcome = flow.watched(setting, state, span, shooting.amplitude, times)
         beginning.look(outcome)
+        ends.append(outcome.state[0])
         visited.append(outcome.recorded[:, Recorded.STATE : Recorded.STATE + flow.size])
         passed.append(flow.at_contacts(setting, outcome))
         back.append(outcome.samples[0, :, Sampled.STATE : Sampled.STATE + flow.size])
@@ -99,6 +101,8 @@ def measured(shooting: Shooting, u: Array) -> Measured:
     ranges = [_range(*columns) for columns in each]
     own = ranges[flow.contact]
     names = [contact.name for contact in flow.reduction.model.contacts]
+    nexts = np.roll(orbit.states, -1, axis=0)
+    missed = np.abs(np.array(ends) - nexts) / np.hypot(flow.scales, nexts)
     away = (np.vstack(back)[::-1] - orbit.states[0]) / np.hypot(flow.scales, orbit.states[0])
     same = np.flatnonzero(np.abs(away).max(axis=1) < SAME * shooting.amplitude)
     cycle = Cycle(
@@ -117,6 +121,7 @@ def measured(shooting: Shooting, u: Array) -> Measured:
         speed=setting.speed,
         contact=names[flow.contact],
         contacts=dict(zip(names, ranges, strict=True)) if names[0] else {},
+        closing=float(np.max(missed)) / shooting.amplitude,
         _orbit=orbit,
     )
     extent = np.asarray(np.ptp(np.vstack(visited), axis=0))
@@ -135,14 +140,9 @@ class _Begin:
 
     def look(self, outcome: Outcome) -> None:
         """Passages in a part of it that was run through."""
-        flow, record = self.flow, outcome.recorded
-        times, states = record[:, Recorded.TIME], record[:, Recorded.STATE : Recorded.STATE + flow.size]
-        ahead = flow.field(self.setting, states)[0] @ self.setting.slip
-        passes = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] > 0) & (np.diff(times) > 0))
-        slopes = np.diff(ahead)[passes] / np.diff(times)[passes]
+        times, slopes = passages(self.flow, self.setting, outcome.recorded)
         if len(slopes) and slopes.max() > self.steepest:
-            i = int(passes[np.argmax(slopes)])
             self.steepest = float(slopes.max())
-            at = times[i] - ahead[i] * (times[i + 1] - times[i]) / (ahead[i + 1] - ahead[i])
-            state = states_between(flow, self.setting, record, np.array([at]))
+            at = times[[int(np.argmax(slopes))]]
+            state = states_between(self.flow, self.setting, outcome.recorded, at)
             self.orbit = Orbit(state, self.now.period, self.now.value, ONE, self.now.scales)

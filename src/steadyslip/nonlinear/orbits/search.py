@@ -9,13 +9,14 @@ from itertools import pairwise
 import numpy as np
 
 from steadyslip.nonlinear.continuation import Failure, turned_round
-from steadyslip.nonlinear.orbits.cycle import Cycle
+from steadyslip.nonlinear.orbits.cycle import Cycle, End
 from steadyslip.nonlinear.orbits.special import Known, lies_between
-from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Sheet, Tracer
+from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Sheet, Tracer, orbit_of
 from steadyslip.nonlinear.orbits.verify import cycle_near
 
 Array = np.ndarray
 SEEDS = (0.003, 0.03, 0.2, 0.6)  # where to simulate, on the way from where a sheet broke off to the end of the range
+AHEAD = 2.0  # natural sizes of slip by which a motion begins beside steady sliding
 PATIENCE = 12  # stretches of motion within which it has to come to a cycle
 
 
@@ -40,7 +41,7 @@ def search_on(tracer: Tracer, sheets: list[Sheet]) -> None:
         except KeyboardInterrupt:
             tracer.interrupted = True
             return
-        if seed is not None and not _met(sheets, seed):
+        if seed is not None and not met(sheets, seed):
             _add_sheet(tracer, sheets, seed, np.sign(limit - onset.value))
 
 
@@ -53,24 +54,19 @@ def _crossed(sheet: Sheet, tracer: Tracer) -> bool:
     return (sheet.known[-1].cycle.value < tracer.onset.value) == (tracer.onset.stable == "above")
 
 
-def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle], attracts: bool = False) -> Known | None:
-    """A cycle that motions at a value come to: from known cycles beside it, and from beside steady sliding.
-
-    With `attracts` only a stable one is taken, however close to another the motion comes on its way.
-    """
-    flow = tracer.flow
+def seed_at(tracer: Tracer, value: float, near: Sequence[Cycle]) -> Known | None:
+    """A cycle that motions at a value come to: from known cycles beside it, and from beside steady sliding."""
     try:
-        pushed = flow.ahead(value, 2.0)
+        starts = [orbit_of(cycle).states[0] for cycle in near] + [tracer.flow.ahead(value, AHEAD)]
     except Failure:
         return None
-    for state in (*(cycle._orbit.states[0] for cycle in near if cycle._orbit is not None), pushed):
-        found = cycle_near(flow, state, value, PATIENCE, attracts)
-        if found is None or found._orbit is None:
-            continue
-        try:
-            return tracer.resumed(found._orbit, 1.0)
-        except (Failure, np.linalg.LinAlgError):
-            continue
+    for state in starts:
+        found = cycle_near(tracer.flow, state, value, PATIENCE)
+        if found is not None:
+            try:
+                return tracer.resumed(orbit_of(found), 1.0)
+            except (Failure, np.linalg.LinAlgError):
+                continue
     return None
 
 
@@ -79,7 +75,7 @@ def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) ->
     forth = seed if seed.point.tangent[-1] * away > 0 else replace(seed, point=turned_round(seed.point))
     back = replace(forth, point=turned_round(forth.point))
     step = 0.1 * LARGEST_STEP
-    behind = tracer.followed(back.shooting, back, step, met=lambda known: _met(sheets, known))
+    behind = tracer.followed(back.shooting, back, step, met=lambda known: met(sheets, known))
     ahead = Sheet()
     if not tracer.interrupted:
         ahead = tracer.followed(forth.shooting, forth, step)
@@ -88,20 +84,21 @@ def _add_sheet(tracer: Tracer, sheets: list[Sheet], seed: Known, away: float) ->
     both = both.joined(ahead) if ahead.known else behind.reversed()
     near = behind.known[-1].cycle
     if behind.end == "" and behind.whole:  # met
-        _cut_back(sheets[-1], near)
+        cut_back(sheets[-1], near)
         sheets[-1] = sheets[-1].joined(both)
     elif behind.end.startswith("back") and abs(near.value / tracer.onset.value - 1) < 1e-3 and near.amplitude < 0.5:
+        both.begins = End("onset", tracer.onset.value)
         sheets[-1] = both
     else:
         sheets.append(both)
 
 
-def _met(sheets: list[Sheet], known: Known) -> bool:
+def met(sheets: list[Sheet], known: Known) -> bool:
     """Whether a cycle lies between two neighbours that are known."""
     return any(lies_between(a.cycle, b.cycle, known.cycle) for sheet in sheets for a, b in pairwise(sheet.known))
 
 
-def _cut_back(sheet: Sheet, meeting: Cycle) -> None:
+def cut_back(sheet: Sheet, meeting: Cycle) -> None:
     """Leave out what lies behind the place at which another sheet met this one."""
     for i in range(len(sheet.known) - 1):
         if lies_between(sheet.known[i].cycle, sheet.known[i + 1].cycle, meeting):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ MET = 2e-3  # difference of logarithms of period and velocities within which cyc
 BLURRED = 10.0  # so many times what a last step of Newton's method was
 ROUNDING = 1e-11  # such differences that are rounding anywhere
 FOLDED = 0.9  # largest multiplier below which no fold is believed: there it is one
+REAL = 1e-3  # share of its size that the imaginary part of a multiplier may be, of two that have just met
 SMALL = 1e-2  # amplitude below which multipliers within rounding of one are judged by the kind of onset
 
 
@@ -40,10 +41,12 @@ Made = Callable[[Shooting, Point], Known]
 
 
 def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCycle]:
-    """Folds, doublings and tori between two neighbouring points with the same unknowns.
+    """Folds, doublings and tori between two neighbouring points with the same unknowns, in their order.
 
-    Where both have the same value of the parameter but for rounding, as in a canard, multipliers are rounding too; they
-    change by factors from one point to the next, and no doublings or tori are read from them.
+    Where stability changes at none of these, as at cycles that are symmetric beyond a multiplier 1, the place is found
+    by the size of the largest multiplier. Where both have the same value of the parameter but for rounding, as in a
+    canard, multipliers are rounding too; they change by factors from one point to the next, and no doublings or tori
+    are read from them.
 
     Parameters
     ----------
@@ -62,8 +65,27 @@ def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCy
         kinds.append(("period doubling", lambda point: doubling(now.shooting.multipliers(point.u)[1])))
     if apart and min(turns) > -1 and turns[0] * turns[1] < 0:
         kinds.append(("torus", lambda point: torus(now.shooting.multipliers(point.u)[1])))
-    found = (_located(kind, before, now, measure, made, index) for kind, measure in kinds)
-    return [one for one in found if one is not None]
+    tried = [_located(kind, before, now, measure, made, index) for kind, measure in kinds]
+    found = [one for one in tried if one is not None]
+    growths = [known.cycle.growth for known in (before, now)]
+    changed = before.cycle.stable != now.cycle.stable and (growths[0] - 1) * (growths[1] - 1) < 0
+    if changed and not found and apart and min(known.cycle.amplitude for known in (before, now)) > SMALL:
+        tried = [_located("", before, now, lambda point: growth(now.shooting.multipliers(point.u)[1]), made, index)]
+        found = [replace(one, kind=_passing(one.cycle)) for one in tried if one is not None]
+    return sorted(found, key=lambda one: one._length)
+
+
+def growth(multipliers: Array) -> float:
+    """Logarithm of the size of the largest multiplier."""
+    return float(np.log(np.max(np.abs(multipliers))))
+
+
+def _passing(cycle: Cycle) -> str:
+    """Kind of a cycle at which a multiplier passes the unit circle: by the one that is nearest to it."""
+    nearest = min(cycle.multipliers, key=lambda m: abs(abs(m) - 1))
+    if abs(nearest.imag) > REAL * abs(nearest):
+        return "torus"
+    return "branch point" if nearest.real > 0 else "period doubling"
 
 
 def _located(
@@ -86,7 +108,7 @@ def _located(
         return None
     precision = max(abs(other - cycle.value) / size, abs(cycle.trivial - 1) * max(away), 1e-12)
     beside = (before.cycle.value, now.cycle.value) if kind == "fold" else (other, cycle.value)
-    return SpecialCycle(kind, cycle, (min(beside), max(beside)), float(precision), index)
+    return SpecialCycle(kind, cycle, (min(beside), max(beside)), float(precision), index, high.length)
 
 
 def doubling(multipliers: Array) -> float:
@@ -99,16 +121,18 @@ def torus(multipliers: Array) -> float:
 
     Next to one a pair cannot be told from two real multipliers.
     """
-    pairs = multipliers[np.abs(multipliers.imag) > 1e-3 * np.abs(multipliers)]
+    pairs = multipliers[np.abs(multipliers.imag) > REAL * np.abs(multipliers)]
     return float(np.max(np.abs(pairs) - 1, initial=-1.0))
+
+
+def looks(cycle: Cycle) -> Array:
+    """Logarithms of period and velocities, by which cycles are told from each other."""
+    lowest = np.arcsinh(cycle.lowest_velocity / cycle.speed)
+    return np.array([np.log(cycle.period), np.log(cycle.peak_velocity), lowest])
 
 
 def lies_between(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
     """Whether a cycle is one of those between two neighbours."""
-
-    def looks(one: Cycle) -> Array:
-        return np.array([np.log(one.period), np.log(one.peak_velocity), np.arcsinh(one.lowest_velocity / one.speed)])
-
     if not min(a.value, b.value) <= cycle.value <= max(a.value, b.value):
         return False
     share = (cycle.value - a.value) / (b.value - a.value) if b.value != a.value else 0.5

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError
+from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.core.telling import shown
+from steadyslip.linear.boundary import boundary
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.cycle import Cycle, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import UNCERTAIN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
@@ -66,7 +68,8 @@ class Sheet:
     """Cycles in the order in which they were followed, and special ones with their places among them.
 
     `whole` tells an end that lies in the matter from one where the cycles could not be followed any further; `contact`
-    is that of a machine which lifts off there, or is the fastest.
+    is that of a machine which lifts off there, or is the fastest. `begins` and `stops` are both ends where they are not
+    the first and last cycle; `beyond` is a cycle past the end that is none of the sheet.
     """
 
     known: list[Known] = field(default_factory=list)
@@ -74,18 +77,33 @@ class Sheet:
     end: str = ""
     whole: bool = False
     contact: str = ""
+    begins: End | None = None
+    stops: End | None = None
+    beyond: Known | None = None
+
+    @property
+    def bounds(self) -> tuple[End, End]:
+        """Where it begins and stops."""
+        ends = []
+        for end, i in ((self.begins, 0), (self.stops, -1)):
+            if end is None and self.known:
+                end = End("last cycle", self.known[i].cycle.value, self.known[i].cycle)
+            ends.append(end or self.begins or End("last cycle", np.nan))
+        return ends[0], ends[1]
 
     def reversed(self) -> Sheet:
         """The same cycles the other way round."""
         count = len(self.known)
         special = [replace(one, index=count - one.index) for one in reversed(self.special)]
-        return Sheet(self.known[::-1], special, self.end, self.whole, self.contact)
+        return Sheet(self.known[::-1], special, self.end, self.whole, self.contact, self.stops, self.begins)
 
     def joined(self, more: Sheet) -> Sheet:
         """This one, and another that begins where it ends."""
         count = len(self.known)
         special = [replace(one, index=one.index + count) for one in more.special]
-        return Sheet(self.known + more.known, self.special + special, more.end, more.whole, more.contact)
+        return Sheet(
+            self.known + more.known, self.special + special, more.end, more.whole, more.contact, self.begins, more.stops
+        )
 
 
 class Tracer:
@@ -151,24 +169,48 @@ class Tracer:
             raise Failure("its distance from the edge is lost in rounding")
         return shooting, first
 
-    def doubled(self, cycle: Cycle) -> tuple[Shooting, Point, float]:
-        """The first cycle of twice the period, along the eigenvector of the multiplier −1, and its distance."""
-        flow, orbit = self.flow, cycle._orbit
-        if orbit is None:
-            raise InternalError("orbit is not None")
-        setting, state = flow.setting(cycle.value), orbit.states[0]
+    def doubled(self, cycle: Cycle, size: float) -> Known:
+        """The cycle of twice the period, so far away in unknowns, along the eigenvector of the multiplier −1.
+
+        Raises
+        ------
+        Failure
+            If there is none, or it cannot be told from the cycle gone round twice.
+        """
+        flow, (vector, pieces) = self.flow, self.deviation(cycle, -1.0)
+        orbit = orbit_of(cycle)
+        shooting = self.shooting(np.tile(orbit.fractions, 2) / 2, scales=orbit.scales)
+        aside = [size * vector]
+        for piece in (*pieces, *pieces[:-1]):
+            aside.append(piece @ aside[-1])
+        states = np.tile(orbit.states, (2, 1)) + aside
+        tangent = np.zeros(states.size + 2)
+        tangent[: flow.size] = aside[0] / np.hypot(shooting.scales, orbit.states[0])
+        curve = shooting.curve()
+        guess = shooting.packed(replace(orbit, states=states, period=2 * cycle.period))
+        return self.known(shooting, curve.start(guess, tangent / curve.size(tangent)))
+
+    def deviation(self, cycle: Cycle, multiplier: complex) -> tuple[Array, Array]:
+        """Deviation (n,) from a cycle's start that a multiplier belongs to, and sensitivities of the segments.
+
+        It leaves slip at the load point's velocity, and is one unit of the unknowns large.
+
+        Raises
+        ------
+        Failure
+            If the motion cannot be run through.
+        """
+        flow, orbit = self.flow, orbit_of(cycle)
+        setting = flow.setting(cycle.value)
         _, pieces, _ = flow.run(setting, orbit.states, orbit.fractions * orbit.period)
         whole = np.linalg.multi_dot([*pieces[::-1], np.eye(flow.size)])
         roots, vectors = np.linalg.eig(whole * flow.scales[None, :] / flow.scales[:, None])
-        vector = np.real(vectors[:, int(np.argmin(np.abs(roots + 1)))])
-        rates, jacobian, _ = flow.field(setting, state[None])
-        gradient, along = setting.slip @ jacobian[0] * flow.scales, rates[0] / flow.scales
-        vector = vector - along * (gradient @ vector) / (gradient @ along)  # stay where v equals the drive
-        shooting, size = self.shooting(scales=orbit.scales), 1e-3
-        vector /= np.linalg.norm(vector * flow.scales / shooting.scales)
-        guess = Orbit((state + size * vector * flow.scales)[None], 2 * cycle.period, cycle.value)
-        tangent = np.append(vector * flow.scales / np.hypot(shooting.scales, state), [0.0, 0.0])
-        return shooting, shooting.curve().start(shooting.packed(guess), tangent / np.linalg.norm(tangent)), size
+        vector = np.real(vectors[:, int(np.argmin(np.abs(roots - multiplier)))]) * flow.scales
+        rates, jacobian, _ = flow.field(setting, orbit.states[:1])
+        gradient = setting.slip @ jacobian[0]
+        vector -= rates[0] * (gradient @ vector) / (gradient @ rates[0])
+        scales = flow.scales if orbit.scales is None else orbit.scales
+        return vector / np.max(np.abs(vector / np.hypot(scales, orbit.states[0]))), pieces
 
     def resumed(self, orbit: Orbit, amplitude: float, direction: Array | None = None, length: float = 0.0) -> Known:
         """An orbit as a point of the curve, its tangent along `direction` of first state, period and parameter.
@@ -209,14 +251,19 @@ class Tracer:
             self._add(sheet, start)
             for before, here in self._points(start, step):
                 if met is not None and met(here):
-                    sheet.end, sheet.whole = "", True
+                    sheet.end, sheet.whole, sheet.beyond = "", True, here
                     return sheet
                 sheet.end, keep = self._finished(before, here, sheet.known[0], twice)
+                if sheet.end == ENDS["steady"]:
+                    sheet.stops = self._other_edge([known.cycle for known in sheet.known[-2:]])
                 if sheet.end.startswith("end of the range"):
                     here = self._at_limit(before, here)
+                    sheet.stops = End("range", here.cycle.value, here.cycle)
                 if keep:
-                    sheet.special += changes(before, here, self.known, len(sheet.known))
+                    self._add_changes(sheet, before, here)
                     self._add(sheet, here)
+                else:
+                    sheet.beyond = here
                 if not sheet.end and _winds(sheet.special):
                     sheet.end = ENDS["winds"]
                 if not sheet.end and _retraces([known.cycle for known in sheet.known]):
@@ -245,6 +292,31 @@ class Tracer:
         except (Failure, np.linalg.LinAlgError) as failure:
             sheet.end = f"broke off: the equations of a cycle were not solved any further ({failure})"
         return sheet
+
+    def _add_changes(self, sheet: Sheet, before: Known, here: Known) -> None:
+        """Special cycles between two neighbours; where there are several, with a cycle between each two."""
+        for one in changes(before, here, self.known, len(sheet.known)):
+            last = sheet.special[-1] if sheet.special else None
+            if last is not None and last.index == len(sheet.known):
+                with suppress(Failure):
+                    self._add(sheet, self._on_the_way(before, here, 0.5 * (last._length + one._length)))
+            sheet.special.append(replace(one, index=len(sheet.known)))
+
+    def _on_the_way(self, before: Known, here: Known, length: float) -> Known:
+        """The cycle at a length of the curve between those of two neighbours.
+
+        Raises
+        ------
+        Failure
+            If it is not found.
+        """
+
+        def measure(point: Point) -> float:
+            return point.length - length
+
+        ends = measure(before.point), measure(here.point)
+        point = here.shooting.curve().located(before.point, here.point, measure, *ends, width=np.inf)[1]
+        return self.known(here.shooting, point)
 
     def _add(self, sheet: Sheet, known: Known) -> None:
         sheet.known.append(known)
@@ -367,7 +439,7 @@ class Tracer:
         """Whether all multipliers lie inside the unit circle; by the kind of onset where that is too close to tell."""
         if self.onset.is_weak and abs(cycle.growth - 1) < IMPRECISE:
             return False
-        if cycle.amplitude < SMALL and abs(cycle.growth - 1) < UNRESOLVED:
+        if cycle.amplitude < SMALL and abs(cycle.growth - 1) < max(UNRESOLVED, UNCERTAIN * cycle.multiplier_error):
             return self.onset.kind == "supercritical"
         return cycle.growth < 1
 
@@ -425,6 +497,22 @@ class Tracer:
         faster = setting.slip @ jacobian[0]
         return bool(faster @ rates[0] <= 0 and faster @ carried <= 0)
 
+    def _other_edge(self, last: list[Cycle]) -> End | None:
+        """The edge at which cycles that shrink to nothing end: that to which values of the last two lead."""
+        if len(last) < 2:
+            return None
+        sizes = [cycle.amplitude**2 for cycle in last]
+        slope = (last[1].value - last[0].value) / (sizes[0] - sizes[1])
+        ahead = last[1].value + slope * sizes[1]
+        try:
+            edges = boundary(self.onset.rig, self.onset.along, branch=self.flow.branch)
+        except NotAvailable:
+            return None
+        near = [edge.value for edge in edges if edge.kind == "oscillatory"]
+        edge = min(near, key=lambda value: abs(value - ahead), default=np.inf)
+        reach = abs(ahead - last[1].value) + abs(last[1].value - last[0].value)
+        return End("edge", edge) if abs(edge - ahead) <= reach else None
+
     def _at_limit(self, inside: Known, outside: Known) -> Known:
         """The cycle on the limit of the range."""
         low, high = self.limits
@@ -456,6 +544,13 @@ class Tracer:
         if point.tangent @ (curve.weights * close.tangent) < 0:
             point = replace(point, tangent=-point.tangent)
         return self.known(shooting, point)
+
+
+def orbit_of(cycle: Cycle) -> Orbit:
+    """The solution that a cycle was made of."""
+    if cycle._orbit is None:
+        raise InternalError("a cycle without its orbit; please report it")
+    return cycle._orbit
 
 
 def is_damped(rig: Slider | Machine) -> bool:

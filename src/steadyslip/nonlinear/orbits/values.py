@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from steadyslip.core.errors import InternalError, NotAvailable
+from steadyslip.core.telling import shown
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.flow import Flow
-from steadyslip.nonlinear.orbits.search import seed_at
-from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer
+from steadyslip.nonlinear.orbits.search import AHEAD, PATIENCE
+from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
+from steadyslip.nonlinear.orbits.verify import motion_from
 
+Array = np.ndarray
 MOST_STEPS_BETWEEN = 40
+ASIDE = 1e-2  # of the unknowns: how far from an unstable cycle a motion begins
 
 
 def tracer_of(onset: Onset, steady: int, rtol: float | None) -> Tracer:
@@ -41,15 +44,83 @@ def cycles_at(
     return tuple(found)
 
 
-def attracting(
+@dataclass(frozen=True)
+class Simulation:
+    """What a motion at one value of the parameter showed.
+
+    Attributes
+    ----------
+    start : str
+        Where it began, in words.
+    outcome : str
+        What it did, in words.
+    cycle : Cycle or None
+        The stable cycle that it comes to; None if it settles, ends, or does not repeat itself as far as it was run.
+    multiple : float
+        Period of that cycle over that of the unstable cycle beside which the motion began; NaN where there is none.
+    """
+
+    start: str
+    outcome: str
+    cycle: Cycle | None = None
+    multiple: float = np.nan
+
+    def __str__(self) -> str:
+        return f"motion from {self.start} {self.outcome}"
+
+
+class CyclesAt(tuple[Cycle, ...]):
+    """The cycles at one value of a parameter.
+
+    Attributes
+    ----------
+    simulated : tuple of Simulation
+        What motions showed that were simulated because no cycle of the branch or its doublings attracts; empty if one
+        does.
+    """
+
+    simulated: tuple[Simulation, ...]
+
+    def __new__(cls, cycles: Iterable[Cycle], simulated: Sequence[Simulation] = ()) -> CyclesAt:
+        """The cycles as a tuple, with what motions showed."""
+        made = super().__new__(cls, cycles)
+        made.simulated = tuple(simulated)
+        return made
+
+    def __str__(self) -> str:
+        lines = [
+            f"{'stable' if one.stable else 'unstable'} cycle of period {shown(one.period, 's')}; {one.checked}"
+            for one in self
+        ]
+        return "\n".join([*lines, *map(str, self.simulated)]) or "no cycle"
+
+
+def simulations(
     onset: Onset, steady: int, rtol: float | None, value: float, beside: Sequence[Cycle]
-) -> Cycle | None:  # fmt: skip
-    """The stable cycle that motions at a value come to, from steady sliding or known cycles; None if none does."""
-    try:
-        found = seed_at(tracer_of(onset, steady, rtol), value, beside, attracts=True)
-    except NotAvailable:
-        return None
-    return found.cycle if found is not None and found.cycle.stable else None
+) -> list[Simulation]:  # fmt: skip
+    """Motions at a value from beside unstable cycles and steady sliding, until one comes to a stable cycle."""
+    tracer, found = tracer_of(onset, steady, rtol), list[Simulation]()
+    for cycle in (*beside, None):
+        try:
+            state, start = _start(tracer, value, cycle)
+            seen = motion_from(tracer.flow, state, value, PATIENCE, attracts=True)
+        except (Failure, np.linalg.LinAlgError) as failure:
+            found.append(Simulation("beside a cycle" if cycle else "beside steady sliding", f"cannot begin: {failure}"))
+            continue
+        multiple = np.nan if cycle is None or seen.cycle is None else seen.cycle.period / cycle.period
+        times = f", {multiple:.4g} times that of the unstable cycle" if np.isfinite(multiple) else ""
+        found.append(Simulation(start, seen.words + times, seen.cycle, multiple))
+        if seen.cycle is not None:
+            break
+    return found
+
+
+def _start(tracer: Tracer, value: float, cycle: Cycle | None) -> tuple[Array, str]:
+    """State at which a motion begins, and words for it."""
+    if cycle is None:
+        return tracer.flow.ahead(value, AHEAD), "beside steady sliding"
+    orbit, vector = orbit_of(cycle), tracer.deviation(cycle, cycle.multipliers[0])[0]
+    return orbit.states[0] + ASIDE * vector, f"beside the unstable cycle of period {shown(cycle.period, 's')}"
 
 
 def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | None:
@@ -66,13 +137,10 @@ def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | 
 
 def _reached(tracer: Tracer, start: Cycle, end: Cycle, value: float) -> Cycle:
     """Follow the cycles from one known to another until the value is passed; the cycle there."""
-    if start._orbit is None:
-        raise InternalError("start._orbit is not None")
-    if end._orbit is None:
-        raise InternalError("end._orbit is not None")
-    first = tracer.shooting(scales=start._orbit.scales)
-    ends = [first.packed(replace(c._orbit, states=c._orbit.states[:1])) for c in (start, end) if c._orbit is not None]
-    here = tracer.resumed(start._orbit, min(1.0, start.amplitude), ends[1] - ends[0])
+    orbits = orbit_of(start), orbit_of(end)
+    first = tracer.shooting(scales=orbits[0].scales)
+    ends = [first.packed(replace(orbit, states=orbit.states[:1])) for orbit in orbits]
+    here = tracer.resumed(orbits[0], min(1.0, start.amplitude), ends[1] - ends[0])
     curve = here.shooting.curve()
     step = min(LARGEST_STEP, float(np.linalg.norm(ends[1] - ends[0])))
     for _, point in zip(range(MOST_STEPS_BETWEEN), curve.follow(here.point, step, 1e-9, LARGEST_STEP), strict=False):

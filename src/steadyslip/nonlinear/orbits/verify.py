@@ -8,21 +8,22 @@ earlier.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
+from steadyslip.core.telling import shown
 from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.orbits.cycle import Cycle
-from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs, states_between
+from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs, passages, states_between
 from steadyslip.nonlinear.orbits.measure import amplitude, measured
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
 
 Array = np.ndarray
-BEGINS = LOG_KINDS.index("slip begins")  # the block, speeding up, is as fast as the load point
+BEGINS = LOG_KINDS.index("slip begins")  # of a slip event: the block, speeding up, is as fast as the load point
+RINGS = 8  # passages for each slip event, rings after it among them, beyond which no more events are waited for
 RETURNS = 17  # so many returns are compared: cycles with up to 16 of them in a period are found
 NEAR = 0.1  # distance, as a share of the cycle's size, to which Newton's method may go from the motion
 CLOSE = 0.05  # distance within which a return may be one to the same place
@@ -59,26 +60,56 @@ def cycle_near(
         The primitive cycle next to the motion, with multipliers; ``cycle.stable`` says whether it attracts.
         None if there is none: the motion grows, settles, wanders, or is still too far from any.
     """
-    with suppress(FlowFailure):
+    return motion_from(runs, state, value, patience, attracts, unknowns).cycle
+
+
+def motion_from(
+    runs: Runs, state: Array, value: float = 0.0, patience: int = 1, attracts: bool = False,
+    unknowns: Array | None = None,
+) -> Simulated:  # fmt: skip
+    """What a motion shows that starts at a state: the cycle that it comes to, or what it does instead.
+
+    Parameters are those of `cycle_near`.
+    """
+    returns, low, high = 0, np.inf, -np.inf
+    try:
         for seen in _stretches(runs, runs.setting(value), state, unknowns, patience):
+            returns, low, high = returns + len(seen.times), min(low, seen.speeds[0]), max(high, seen.speeds[1])
+            if seen.extent < SMALLEST:
+                return Simulated(None, "settles to steady sliding")
             for back in _candidates(runs, seen):
                 found = _solved(runs, value, seen, int(back))
                 if found is not None and (found.stable or not attracts):
-                    return found
-    return None
+                    return Simulated(found, f"comes to a cycle of period {shown(found.period, 's')}")
+    except FlowFailure as failure:
+        return Simulated(None, f"ends: {failure}")
+    if not returns:
+        return Simulated(None, "does not come back to the velocity at which cycles begin")
+    between = f"velocity between {shown(low, 'm/s')} and {shown(high, 'm/s')}"
+    return Simulated(None, f"does not repeat itself in {returns} returns, compared over up to {RETURNS - 1}: {between}")
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What a motion comes to: a cycle, if it does, and words for it."""
+
+    cycle: Cycle | None
+    words: str
 
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
     """Returns of a motion: where and when the block, speeding up, is as fast as the load point; and their sizes.
 
-    `extent` is the largest range of a state variable, in its natural size, `amplitude` that of ln v.
+    `extent` is the largest range of a state variable, in its natural size, `amplitude` that of ln v, `speeds` the
+    lowest and the highest velocity.
     """
 
     times: Array
     states: Array
     extent: float
     amplitude: float
+    speeds: tuple[float, float]
 
 
 def _stretches(
@@ -87,29 +118,55 @@ def _stretches(
     """The motion, some returns at a time."""
     span, spent = FIRST_SPAN * runs.time, 0
     for _ in range(patience):
-        times: list[float] = []
-        states: list[Array] = []
+        slips, passes = _Returns(), _Returns()
         low, high, speeds = [], [], []
         now = 0.0
-        while len(times) < RETURNS and spent < MOST_STEPS * patience:
+        while not _enough(slips, passes) and spent < MOST_STEPS * patience:
             outcome = runs.watched(setting, state, span, unknowns=unknowns)
             record, log = outcome.recorded, outcome.log
             visited = record[:, Recorded.STATE : Recorded.STATE + runs.size]
-            at = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0), 1]
-            times += list(now + at)
-            states += list(states_between(runs, setting, record, at))
+            begun = log[(log[:, 0] == BEGINS + runs.contact * KINDS_EACH) & (log[:, 1] > 0), 1]
+            for returns, at in ((slips, begun), (passes, passages(runs, setting, record)[0])):
+                returns.add(now + at, states_between(runs, setting, record, at))
             low.append(np.arcsinh(visited.min(axis=0) / runs.scales))
             high.append(np.arcsinh(visited.max(axis=0) / runs.scales))
-            if np.max(high[-1] - low[-1]) < SMALLEST:
-                return
             speeds.append(runs.speeds(setting, outcome))
+            if np.max(high[-1] - low[-1]) < SMALLEST:
+                yield _Stretch(np.array(slips.times), np.array(slips.states), 0.0, 0.0, _ends(speeds[-1:]))
+                return
             state, unknowns = outcome.state[0], outcome.unknowns[0]
             now, spent = now + span, spent + len(record)
-            span *= 2.0 if len(times) < RETURNS // 2 else 1.0
+            span *= 2.0 if max(len(slips.times), len(passes.times)) < RETURNS // 2 else 1.0
+        seen = slips if len(slips.times) >= RETURNS // 2 else passes
+        times, states = seen.times[-RETURNS:], seen.states[-RETURNS:]
         if len(times) < 2:
             return
         extent = float(np.max(np.max(high, axis=0) - np.min(low, axis=0)))
-        yield _Stretch(np.array(times), np.array(states), extent, amplitude(np.concatenate(speeds)))
+        yield _Stretch(np.array(times), np.array(states), extent, amplitude(np.concatenate(speeds)), _ends(speeds))
+
+
+class _Returns:
+    """Times and states at which a motion was at the place where cycles begin."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+        self.states: list[Array] = []
+
+    def add(self, times: Array, states: Array) -> None:
+        """Further ones."""
+        self.times += list(times)
+        self.states += list(states)
+
+
+def _enough(slips: _Returns, passes: _Returns) -> bool:
+    """Whether returns can be compared: begins of slip events, or where there are few of these, all passages."""
+    few = len(passes.times) >= RETURNS and len(slips.times) < 2
+    return len(slips.times) >= RETURNS or few or len(passes.times) >= RINGS * RETURNS
+
+
+def _ends(speeds: list[Array]) -> tuple[float, float]:
+    """Lowest and highest."""
+    return float(min(one.min() for one in speeds)), float(max(one.max() for one in speeds))
 
 
 def _candidates(runs: Runs, seen: _Stretch) -> Array:

@@ -1,0 +1,118 @@
+"""Ranges of the parameter in which the cycles of a branch attract, and the answers to the questions that check it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from steadyslip.nonlinear.orbits.cycle import OPEN, Cycle, End, SpecialCycle
+from steadyslip.nonlinear.orbits.special import NOISE, SMALL
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Consecutive cycles of a branch that all attract or all do not, between the places where that changes.
+
+    Attributes
+    ----------
+    stable : bool
+    cycles : tuple of Cycle
+        Both ends included, where there is a cycle.
+    ends : tuple of End
+        Where it begins and stops along the branch: kinds are those of `SpecialCycle` and of `End`, or ``not located``
+        where stability changes between the last cycle of the stretch and its neighbour at no cycle that was found.
+    """
+
+    stable: bool
+    cycles: tuple[Cycle, ...]
+    ends: tuple[End, End]
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest value of the parameter, SI units; of cycles within rounding of an end, the end's."""
+        ends = [end.value for end in self.ends]
+        values = [value for value in (cycle.value for cycle in self.cycles) if not _near(value, ends)]
+        return min([*values, *ends]), max([*values, *ends])
+
+
+def _near(value: float, ends: Sequence[float]) -> bool:
+    """Whether a value cannot be told from one of the ends."""
+    return any(abs(value - end) <= NOISE * abs(end) for end in ends)
+
+
+def stretches_of(
+    cycles: Sequence[Cycle], special: Sequence[SpecialCycle], gaps: Sequence[int], bounds: Sequence[tuple[End, End]]
+) -> Iterator[Stretch]:
+    """Stretches of equal stability of a branch, in its order; `bounds` are the ends of each of its parts."""
+    where = {point.index: End(point.kind, point.cycle.value, point.cycle) for point in special}
+    for (start, stop), (begins, stops) in zip(pairwise((0, *gaps, len(cycles))), bounds, strict=True):
+        changes = [i for i in range(start + 1, stop) if cycles[i].stable != cycles[i - 1].stable]
+        for low, high in pairwise([start, *changes, stop] if stop > start else []):
+            first = begins if low == start else where.get(low, End("not located", cycles[low].value))
+            last = stops if high == stop else where.get(high, End("not located", cycles[high - 1].value))
+            inside = cycles[low:high]
+            before = [one.cycle for one in (first,) if one.cycle is not None and one.cycle is not inside[0]]
+            after = [one.cycle for one in (last,) if one.cycle is not None and one.cycle is not inside[-1]]
+            yield Stretch(inside[0].stable, (*before, *inside, *after), (first, last))
+
+
+@dataclass(frozen=True)
+class CycleChecks:
+    """Answers to the questions that check the cycles of a branch.
+
+    Attributes
+    ----------
+    count : int
+        Number of cycles.
+    closing : float
+        Largest `Cycle.closing`.
+    multiplier_error : float
+        Largest `Cycle.multiplier_error`.
+    repeated : int
+        Number of cycles that were computed again with smaller errors per step.
+    open : tuple of float
+        Values of the parameter of cycles that do not close.
+    undecided : tuple of float
+        Values of the parameter at which the largest multiplier is 1 within its error, small cycles at the edge left
+        out: there the kind of onset decides.
+    """
+
+    count: int
+    closing: float
+    multiplier_error: float
+    repeated: int
+    open: tuple[float, ...]
+    undecided: tuple[float, ...]
+
+    def __str__(self) -> str:
+        words = f"checked: cycles close to {self.closing:.1g} of their size by an integration of the motion alone; "
+        words += f"the multiplier along the motion is 1 to {self.multiplier_error:.1g}"
+        if self.repeated:
+            words += f"; {self.repeated} computed again with smaller errors per step"
+        for what, values in (("whether they are cycles", self.open), ("whether they attract", self.undecided)):
+            if values:
+                words += f"; not decided: {what}, of {len(values)} of {self.count}"
+        return words
+
+
+def checks_of(cycles: Sequence[Cycle], repeated: int) -> CycleChecks:
+    """The checks of the cycles of a branch."""
+    return CycleChecks(
+        count=len(cycles),
+        closing=max((cycle.closing for cycle in cycles), default=0.0),
+        multiplier_error=max((cycle.multiplier_error for cycle in cycles), default=0.0),
+        repeated=repeated,
+        open=tuple(cycle.value for cycle in cycles if is_open(cycle)),
+        undecided=tuple(cycle.value for cycle in cycles if is_undecided(cycle)),
+    )
+
+
+def is_open(cycle: Cycle) -> bool:
+    """Whether a motion that begins on a cycle does not come back to its start."""
+    return not cycle.closing <= OPEN
+
+
+def is_undecided(cycle: Cycle) -> bool:
+    """Whether the largest multiplier of a cycle is 1 within its error, and its size does not tell either."""
+    return not cycle.decided and cycle.amplitude > SMALL

@@ -1,0 +1,113 @@
+"""Where cycles attract, what they double into, and how well they are known: by laws of nature and second routes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from dimensionless import two_states
+from doubled_machines import ALONG, closing, drawn, judged, places
+from steadyslip.nonlinear.orbits.cycle import End
+from steadyslip.nonlinear.orbits.ranges import stretches_of
+
+
+@dataclass
+class Named:
+    """A cycle, or a special one, as far as stretches know it."""
+
+    value: float
+    stable: bool = False
+
+
+@dataclass
+class Located:
+    kind: str
+    cycle: Named
+    index: int
+
+
+@pytest.fixture(scope="module")
+def doubling():
+    """Two states: a doubling at .8662587 of the edge (theory 7), and at .8570388 another of the doubled cycles."""
+    own = two_states()
+    edge = ss.hopf(own).value
+    return ss.cycles(own, between=(0.8575 * edge, 1.01 * edge))
+
+
+def test_stretches_end_at_special_cycles_gaps_and_ends():
+    cycles = [Named(float(i), stable) for i, stable in enumerate([True, True, False, False, True, True, False])]
+    special = [Located("fold", Named(1.7), 2), Located("torus", Named(5.5), 6), Located("fold", Named(2.5), 3)]
+    bounds = [(End("onset", -0.1), End("last cycle", 2.0)), (End("last cycle", 3.0), End("range", 6.0))]
+    found = list(stretches_of(cycles, special, (3,), bounds))
+    assert [(one.stable, *one.range) for one in found] == [
+        (True, -0.1, 1.7), (False, 1.7, 2.0), (False, 3.0, 3.0), (True, 4.0, 5.5), (False, 5.5, 6.0),
+    ]  # fmt: skip
+    assert [tuple(end.kind for end in one.ends) for one in found] == [
+        ("onset", "fold"), ("fold", "last cycle"), ("last cycle", "not located"), ("not located", "torus"),
+        ("torus", "range"),
+    ]  # fmt: skip
+
+
+def test_ranges_of_stability_end_where_multipliers_leave_the_unit_circle(doubling):
+    """Text, plain data and picture say the same; the doubled cycles attract from the doubling on."""
+    (flip,) = [point for point in doubling.special if point.kind == "period doubling"]
+    assert flip.cycle.value / doubling.onset.value == pytest.approx(0.8662587, abs=1e-6)
+    assert doubling.stable_ranges == ((flip.cycle.value, doubling.onset.value),)
+    ((low, high),) = doubling.doubled.stable_ranges
+    assert (low, high) == (pytest.approx(0.8575 * doubling.onset.value, rel=1e-6), flip.cycle.value)
+    data = doubling.to_dict()
+    assert data["stable_ranges"] == [[flip.cycle.value, doubling.onset.value]]
+    assert data["stretches"][0]["ends"] == ["onset", "period doubling"]
+    assert "stable       14.49 mPa/m to 16.72 mPa/m" in str(doubling)
+    assert doubling.to_xarray().attrs["stable_ranges"] == list(doubling.stable_ranges[0])
+    full = [line for line in doubling.plot().lines if line.get_label() == "stable cycle"]
+    x = np.concatenate([line.get_xdata() for line in full])
+    assert x.min() * 1e-3 == pytest.approx(flip.cycle.value, rel=1e-12)
+
+
+def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling):
+    """Twice the period beside the doubling, by the branch and by a motion from beside the unstable cycle alone."""
+    value = 0.862 * doubling.onset.value
+    once, twice = doubling.at(value)
+    assert (once.stable, twice.stable) == (False, True)
+    assert twice.period == pytest.approx(2 * once.period, rel=0.01)
+    found = replace(doubling, doubled=None).at(value)
+    assert found[-1].period == pytest.approx(twice.period, rel=1e-8)
+    assert found.simulated[-1].multiple == pytest.approx(twice.period / once.period, rel=1e-8)
+    assert "comes to a cycle of period" in str(found)
+    assert not doubling.at(0.9 * doubling.onset.value).simulated
+
+
+def test_cycles_carry_how_well_they_close_and_multipliers_their_error(doubling):
+    """What integrates badly shows it, and is computed again with smaller errors per step."""
+    assert doubling.checks.closing < 1e-6
+    assert doubling.checks.multiplier_error < 1e-6
+    assert not doubling.checks.undecided
+    assert str(doubling.checks) in str(doubling)
+    assert doubling.to_dict()["checks"].startswith("checked: cycles close to")
+    edge = doubling.onset.value
+    coarse = ss.cycles(doubling.rig, between=(0.9 * edge, 1.01 * edge), rtol=1e-4, doublings=0)
+    worst = max(cycle.multiplier_error for cycle in coarse)
+    assert worst > 100 * doubling.checks.multiplier_error
+    one = coarse.cycles[-1]
+    wrong = replace(one, closing=1e-3)
+    assert "not decided: whether it is a cycle" in wrong.checked
+    assert "not decided: whether it attracts" in replace(one, trivial=1.9, multipliers=(0.9,)).checked
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [33, 125])
+def test_cycles_of_machines_double_between_two_doublings(seed):
+    """Found at every place, closed by SciPy with equations typed by hand, and the doubled branch ends at both."""
+    machine = drawn(np.random.default_rng(seed))
+    edge = ss.hopf(machine, ALONG).value
+    branch = ss.cycles(machine, ALONG, between=(0.4 * edge, 1.05 * edge))
+    flips = [point.cycle for point in branch.special if point.kind == "period doubling"]
+    (ends,) = branch.doubled.bounds
+    assert [end.value for end in ends] == [flip.value for flip in flips]
+    assert branch.doubled["period"][[0, -1]] == pytest.approx([2 * flip.period for flip in flips], rel=1e-4)
+    for value in places(branch, 2):
+        _, stable, twice = judged(branch, value)
+        assert twice
+        assert closing(machine.with_values({ALONG: value}), stable[0]) < 1e-7

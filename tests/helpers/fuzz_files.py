@@ -75,7 +75,7 @@ def small_fit():
         (Combination({"friction.a": 1.0, "friction.b": -0.5}, float("inf")),),
         (coordinates - 5, coordinates + 5), ss.__version__,
     )  # fmt: skip
-    found.__dict__["model"] = friction.copy()  # needs compiled kernels
+    found.__dict__.update(model=friction.copy(), as_measured=None, as_ramps=())  # which need compiled kernels
     return found
 
 

@@ -10,27 +10,33 @@ from typing import Any, TypeVar
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, SteadyslipError
+from steadyslip.core.results import read_only
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import FitNumbers, SearchStory
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
+from steadyslip.experiments.fitting.refit import Ramped
 from steadyslip.experiments.loading.loading import Change, Course, Loading
+from steadyslip.experiments.loading.pressing import Spans
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
 from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.experiments.numerics.smoothing import Smooth
 from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
-FIT = FileKind("fit", 5, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
+FIT = FileKind("fit", 6, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
 _ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
-    "loading": str, "steadyslip": str,
+    "loading": str, "refits": str, "steadyslip": str,
 }  # fmt: skip
 _OPTIONS = {
     "free": [str], "separate": [str], "drive": str, "trend": int, "trend_axis": str, "offset": bool, "lag": bool,
     "initial": str, "loss": str, "width": {float, None}, "rtol": float,
 }  # fmt: skip
-_COURSE = (float, [(float,) * len(fields(Change))], [float], float, int, int, int, int)
+_CURVE = ([float], float, float, float, int, [float], [float])  # the ends of its span, if it has any; the curve itself
+_COURSE = (float, [(float,) * len(fields(Change))], [float], [_CURVE], float, int, int, int, int)
+_COLUMNS = (*ROLES, "worth")
 _FORMS = {
     "options": _OPTIONS | {"weighted": bool, "columns": [[str]]},
     "search": {"starts": int, "arrived": int, "others": [float], "iterations": int, "converged": bool, "cut": bool},
@@ -38,6 +44,7 @@ _FORMS = {
     "noise": [(float, bool, float)],
     "records": [(str, [str], bool)],
     "loading": [[[_COURSE]]],
+    "refits": {"measured": [{str: float}], "ramps": [(float, float, {str: float})]},
 }
 """What the attributes hold as JSON; see `steadyslip.files.tables.fits_form`."""
 
@@ -62,9 +69,10 @@ def to_dataset(fit: FitNumbers) -> Any:
     }
     for i, (record, noise) in enumerate(zip(fit.plan.records, fit.noise, strict=True), start=1):
         dim = f"sample_{i}"
-        for name, unit in ROLES.items():
+        for name in _COLUMNS:
             if (column := getattr(record, name)) is not None:
-                variables[f"{name}_{i}"] = (dim, np.asarray(column), {"units": unit})
+                about = {"units": ROLES[name]} if name in ROLES else {}
+                variables[f"{name}_{i}"] = (dim, np.asarray(column), about)
         if fit.plan.weights is not None:
             variables[f"weight_{i}"] = (dim, fit.plan.weights[i - 1], {})
         variables[f"model_{i}"] = (dim, fit.part(fit.model, i - 1), {"units": "1"})
@@ -72,7 +80,7 @@ def to_dataset(fit: FitNumbers) -> Any:
         variables[f"noise_covariance_{i}"] = (f"lag_{i}", noise.covariance, {})
     options = {name: getattr(fit.plan, name) for name in _OPTIONS}
     options["weighted"] = fit.plan.weights is not None
-    options["columns"] = [[n for n in ROLES if getattr(r, n) is not None] for r in fit.plan.records]
+    options["columns"] = [[n for n in _COLUMNS if getattr(r, n) is not None] for r in fit.plan.records]
     attributes = {
         "rig": rig_to_text(fit.plan.rig, fit.plan.protocol),
         "options": json.dumps(options),
@@ -82,6 +90,12 @@ def to_dataset(fit: FitNumbers) -> Any:
         "noise": json.dumps([[n.lag1, n.correlated, n.innovation] for n in fit.noise]),
         "records": json.dumps([[r.source, list(r.notes), r.integrated] for r in fit.plan.records]),
         "loading": json.dumps([_written(r.commanded) for r in fit.plan.records]),
+        "refits": json.dumps(
+            {
+                "measured": [] if fit.as_measured is None else [fit.as_measured],
+                "ramps": [[one.share, one.ssq, one.values] for one in fit.as_ramps],
+            }
+        ),
         "steadyslip": fit.version,
     }
     return xr.Dataset(variables, coords={"parameter": names, "other": names}, attrs=attributes)
@@ -116,7 +130,7 @@ def read(path: str | PathLike[str], made: type[F]) -> F:
         raise table.fault(f"it has {len(described)} records, {len(present)} sets of columns and {len(noises)} noises")
     found = table.columns(_columns(present, weighted))
     records = tuple(
-        _record(table, found, i, (source, notes, integrated), _read(own))
+        _record(table, found, i, (source, notes, integrated), _read(table, own))
         for i, ((source, notes, integrated), own) in enumerate(zip(described, loading, strict=True), start=1)
     )
     weights = [found[f"weight_{i}"] for i in range(1, len(records) + 1)] if weighted else None
@@ -142,6 +156,13 @@ def read(path: str | PathLike[str], made: type[F]) -> F:
         version=table.attributes["steadyslip"],
     )
     _check(table, fit)
+    refits = stored["refits"]
+    found_before = {  # by the program that wrote it: nothing is searched or simulated anew
+        "as_measured": next(iter(refits["measured"]), None),
+        "as_ramps": tuple(Ramped(*one) for one in refits["ramps"]),
+        "model": read_only(np.concatenate([found[f"model_{i}"] for i in range(1, len(records) + 1)])),
+    }
+    fit.__dict__.update(found_before)
     return fit
 
 
@@ -164,36 +185,47 @@ def _columns(present: list[list[str]], weighted: bool) -> dict[str, ColumnRule]:
 
 
 def _written(loading: Loading | None) -> Any:
-    """A loading as plain data, a list for each channel; empty for a smooth curve, which is found again."""
-    if loading is None or any(c is not None and c.curve is not None for c in (loading.load, loading.stress)):
-        return []
-    return [[] if c is None else [_course(c)] for c in (loading.load, loading.stress)]
+    """A loading as plain data, a list for each channel; empty where it is found again in the columns."""
+    return [] if loading is None else [[] if c is None else [_course(c)] for c in (loading.load, loading.stress)]
 
 
 def _course(course: Course) -> list[Any]:
     changes = [list(astuple(change)) for change in course.changes]
-    return [course.first, changes, list(course.errors), course.strays, course.slips, course.glitches,
-            course.early, course.late]  # fmt: skip
+    return [course.first, changes, list(course.errors), _curves(course.curve), course.strays, course.slips,
+            course.glitches, course.early, course.late]  # fmt: skip
 
 
-def _read(written: list[Any]) -> Loading | None:
+def _curves(curve: Any) -> list[Any]:
+    if isinstance(curve, Spans):
+        return [[[first, last], *own.parts()] for first, last, own in curve.spans]
+    return [] if curve is None else [[[], *curve.parts()]]
+
+
+def _read(table: ExpectedTable, written: list[Any]) -> Loading | None:
     """The loading in such data."""
     if len(written) != 2:
         return None
-    load, stress = (_channel(one[0]) if one else None for one in written)
+    try:
+        load, stress = (_channel(one[0]) if one else None for one in written)
+    except ValueError as error:
+        raise table.fault(f"a curve of its loading {error}") from error
     return Loading(load, stress)
 
 
 def _channel(one: list[Any]) -> Course:
-    first, changes, errors, *rest = one
-    return Course(first, tuple(Change(*change) for change in changes), np.array(errors), None, *rest)
+    first, changes, errors, curves, *rest = one
+    own = [(ends, Smooth.from_parts(*parts)) for ends, *parts in curves]
+    curve: Any = None
+    if own:
+        curve = Spans([(*ends, smooth) for ends, smooth in own]) if own[0][0] else own[0][1]
+    return Course(first, tuple(Change(*change) for change in changes), np.array(errors), curve, *rest)
 
 
 def _record(
     table: ExpectedTable, found: dict[str, Any], i: int, about: tuple[str, list[str], bool], commanded: Loading | None
 ) -> Record:  # fmt: skip
     source, notes, integrated = about
-    columns = {name: found.get(f"{name}_{i}") for name in ROLES}
+    columns = {name: found.get(f"{name}_{i}") for name in _COLUMNS}
     if columns["time"] is None or columns["friction"] is None:
         raise table.fault(f"record {i} has no time or no friction")
     try:

@@ -255,18 +255,19 @@ def whole_record(
         If they are not: times that do not rise, numbers that are not finite, too few of them.
     """
     present = {name: frozen(values) for name, values in columns.items() if values is not None}
-    time, normal = present["time"], present.get("normal")
+    time = present["time"]
     problems = [Problem(name, "is not finite throughout") for name, a in present.items() if not np.all(np.isfinite(a))]
     if len(time) < FEWEST_ROWS:
         problems.append(Problem("time", f"has {len(time)} samples; a record needs {FEWEST_ROWS} or more"))
     elif not np.all(np.diff(time) > 0):
         problems.append(Problem("time", "does not rise throughout"))
-    if normal is not None and not np.all(normal > 0):
-        problems.append(Problem("normal", "is not > 0 throughout"))
+    for name in ("normal", "worth"):
+        if name in present and not np.all(present[name] > 0):
+            problems.append(Problem(name, "is not > 0 throughout"))
     if problems:
         raise ParameterError(problems, title=source)
     return Record(
-        **{name: present.get(name) for name in ("time", "friction", *_OPTIONAL)},  # type: ignore[arg-type]
+        **{name: present.get(name) for name in ("time", "friction", *_OPTIONAL, "worth")},  # type: ignore[arg-type]
         source=source, notes=notes, integrated=integrated, commanded=commanded,
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import make_interp_spline, make_smoothing_spline
+from scipy.interpolate import BSpline, make_interp_spline, make_smoothing_spline
 
 from steadyslip.core.arrays import Array
 
@@ -47,6 +47,27 @@ class Smooth:
 
     def __call__(self, time: Array) -> Array:
         return np.asarray(self.spline((np.asarray(time) - self.origin) / self.unit)) * self.size
+
+    def parts(self) -> list[Any]:
+        """Numbers that make the same curve again (`from_parts`): units, degree, knots and coefficients."""
+        own = self.spline
+        return [self.origin, self.unit, self.size, int(own.k), own.t.tolist(), own.c.tolist()]
+
+    @classmethod
+    def from_parts(cls, origin: float, unit: float, size: float, degree: int, knots: Any, coefficients: Any) -> Smooth:
+        """The curve of such numbers.
+
+        Raises
+        ------
+        ValueError
+            If no curve has them.
+        """
+        columns = [np.array(column, dtype=float) for column in (knots, coefficients)]
+        if not all(
+            np.all(np.isfinite(column)) for column in (*columns, np.array([origin, size, 1 / (unit or np.inf)]))
+        ):
+            raise ValueError("is not finite throughout")
+        return cls(BSpline(*columns, degree), origin, unit, size)
 
     def derivative(self) -> Smooth:
         return Smooth(self.spline.derivative(), self.origin, self.unit, self.size / self.unit)

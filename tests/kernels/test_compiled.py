@@ -133,7 +133,7 @@ def test_parameters_are_lifted_out():
     formulas = Formulas([constants.lifted(sp.tan(a) * b * x + sp.log(a) + x**3)], {x: "y0"})
     assert len(constants.symbols) == 2
     values = constants.function([a, b])(0.3, 2.0)
-    known = {str(s): v for s, v in zip(constants.symbols.values(), values, strict=True)} | {"y0": 1.7}
+    known = {s.name: v for s, v in zip(constants.symbols.values(), values, strict=True)} | {"y0": 1.7}
     assert formulas(known)[0] == pytest.approx(np.tan(0.3) * 2 * 1.7 + np.log(0.3) + 1.7**3, rel=1e-14)
 
 

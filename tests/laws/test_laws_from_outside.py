@@ -194,7 +194,7 @@ def test_formula(case):
 
 def _numbers(rig):
     point = operating_point(rig)
-    return point.model.arguments, (*point.arguments, point.sigma)
+    return map(point.model.written, point.model.arguments), (*point.arguments, point.sigma)
 
 
 def _edge_in_k(rig):

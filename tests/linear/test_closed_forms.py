@@ -213,7 +213,7 @@ def test_formula_gives_the_number(contact, mass):
     right = ss.formula(r).rhs
     model = build_model(r)
     numbers = {
-        symbol.name: value
+        model.written(symbol).name: value
         for symbol, value in zip(model.parameters.values(), operating_point(r).arguments, strict=True)
     }
     numbers |= {"sigma_ss": ss.steady_state(r).normal_stress, "mu_ss": 0.7}
@@ -304,9 +304,9 @@ def test_the_formula_in_parts_is_the_formula(stem):
     for part in parts[::-1]:
         whole = whole.subs(part.lhs, part.rhs)
     point = operating_point(own)
-    names = dict(zip(point.model.parameters.values(), point.arguments, strict=True))
+    names = dict(zip(map(point.model.written, point.model.parameters.values()), point.arguments, strict=True))
     steady = ss.steady_state(own)
-    names |= {point.model.contact.sigma_ss: steady.normal_stress, MU_SS: steady.friction}
+    names |= {point.model.written(point.model.contact.sigma_ss): steady.normal_stress, MU_SS: steady.friction}
     assert float(whole.rhs.subs(names)) == pytest.approx(
         float(ss.critical_stiffness(own)) + float(own.drive.proportional()), rel=1e-9
     )

@@ -11,7 +11,8 @@ from steadyslip.model.point import operating_point
 def number(rig, equation):
     """What a formula is for the values of a rig."""
     point = operating_point(rig)
-    symbols = dict(zip(map(str, point.model.arguments), map(float, (*point.arguments, *point.sigmas)), strict=True))
+    letters = [str(point.model.written(symbol)) for symbol in point.model.arguments]
+    symbols = dict(zip(letters, map(float, (*point.arguments, *point.sigmas)), strict=True))
     mu = point.model.steady[point.model.contacts[0].friction] / point.model.contacts[0].sigma_ss
     symbols["mu_ss"] = float(mu.subs(dict(zip(point.model.arguments, (*point.arguments, *point.sigmas), strict=True))))
     return float(equation.rhs.subs({s: symbols[str(s)] for s in equation.rhs.free_symbols}))

@@ -150,7 +150,7 @@ def test_answers_are_the_same_for_everybody():
     point = operating_point(RIG)
     scales, _ = natural_scales(point, reduce_model(point.model))
     with pytest.raises(TypeError, match="item assignment"):
-        scales["w"] = 2.0
+        scales["x"] = 2.0
     for array in (posed(point), weights(point).direct, *weights(point).decay):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 2.0

@@ -3,7 +3,7 @@
 A record declares each parameter once, with unit, domain and meaning::
 
     class Constant(ContactLaw, name="constant"):
-        normal_stress: float = parameter("Pa", positive, "normal stress")
+        stress: float = parameter("Pa", positive, "normal stress")
 
 From that one line come the constructor and its checks, reading and writing of rig files, the JSON
 schema, the reference page, the symbol in the equations and the range searched for stability edges.
@@ -188,6 +188,7 @@ class FrozenRecord(Displayed):
         cls, *, name: str = "", family: str = "", section: str = "", kw_only: bool = True, **kwargs: Any
     ) -> None:
         super().__init_subclass__(**kwargs)
+        _check_fields(cls)
         dataclass(frozen=True, kw_only=kw_only, repr=False)(cls)
         if section:
             cls.section = section + "."
@@ -248,6 +249,19 @@ class FrozenRecord(Displayed):
             if getattr(self, item.name) not in (None, ()) and getattr(self, item.name) != item.default
         )
         return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def _check_fields(cls: type[FrozenRecord]) -> None:
+    """A field must not take the place of a method or of another attribute of the class, nor of a key in its tables."""
+    known = {name for base in cls.__mro__[1:] for name in getattr(base, "__dataclass_fields__", ())}
+    own = [name for name in vars(cls).get("__annotations__", ()) if isinstance(vars(cls).get(name), Field)]
+    for name in own:
+        if name not in known and any(name in vars(base) for base in cls.__mro__[1:]):
+            raise TypeError(
+                f"{cls.__name__}: a field cannot be called {name!r}, as something else is that records have"
+            )
+        if name == cls.chosen_by[0]:
+            raise TypeError(f"{cls.__name__}: a field cannot be called {name!r}, the key that names a law in files")
 
 
 class Settings(FrozenRecord):
@@ -336,7 +350,13 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
             found[name] = Address(name, role, value)
         elif isinstance(role, Part):
             for before, member in below(role, value, name, prefix):
-                found |= parameters(member, before)
+                own = parameters(member, before)
+                if twice := found.keys() & own.keys():
+                    owners = f"{type(record).__name__} and of {type(member).__name__}"
+                    raise ParameterError(
+                        [Problem(one, f"is a parameter of {owners}; rename one") for one in sorted(twice)]
+                    )
+                found |= own
     return found
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import sympy as sp
 
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.explorer.programs import program
 from steadyslip.explorer.sliding import characteristic_polynomial
 from steadyslip.kernels.layout import SETTINGS
@@ -66,7 +67,7 @@ class Shares:
 
 def _blow(coordinate: Coordinate) -> sp.Symbol:
     """Velocity at the start over that of steady sliding."""
-    return sp.Symbol(f"blow_on_{coordinate.velocity}", positive=True)
+    return inner_symbol(f"blow_on_{coordinate.velocity.name}", positive=True)
 
 
 # -- starting values

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
+from steadyslip.core.symbols import inner_symbol
+
 __all__ = ["with_short_chains"]
 
 
@@ -27,7 +29,7 @@ def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Sym
     written, late = list(expressions), frozenset(variables)
     names: list[tuple[sp.Symbol, sp.Expr]] = []
     while slow := _innermost(written, late | {name for name, _ in names}):
-        name = sp.Dummy(real=True)
+        name = inner_symbol(f"slow.{len(names)}", real=True)
         names.append((name, slow))
         written = [e.xreplace({slow: name}) for e in written]
         written = [_Collector(name).collected(e) for e in written]

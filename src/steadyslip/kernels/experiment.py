@@ -12,6 +12,7 @@ import sympy as sp
 
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.lockstep import LockstepKernel
@@ -67,8 +68,8 @@ class ExperimentProgram:
             return {}
         model = self.reduction.model
         own = [item for item in model.memory if item.unit == "1"]  # a memory of the stress has settled
-        return {"friction": sp.Symbol("initial_friction", real=True)} | {
-            item.name: sp.Symbol(f"initial_{item.name}", real=True) for item in own
+        return {"friction": inner_symbol("initial_friction", real=True)} | {
+            item.name: inner_symbol(f"initial_{item.symbol.name}", real=True) for item in own
         }
 
     @cached_property

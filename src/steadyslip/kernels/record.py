@@ -95,7 +95,7 @@ class Evaluator:
         self.extended = extended  # whether the dense output of the last step is there as polynomials
         self._polynomials: dict[int, list[Value]] = {}
         layout, load = kernel.layout, program.load
-        self.constants: Values = {str(s): load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
+        self.constants: Values = {s.name: load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
         count = range(kernel.unknowns)
         self.z: list[Value] = [load(guess_at(layout, k)) for k in count]
         self.scales: list[Value] = [load(scale_at(layout, k)) for k in count]

@@ -19,6 +19,7 @@ from sympy.logic.boolalg import Boolean
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction, asinh_exp, occurrences
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.nodes import Node, Value, as_node, primitive, select
 
 SQUARED = 2**10
@@ -71,7 +72,7 @@ class Constants:
         if expression.could_extract_minus_sign():
             return -self._constant(-expression)
         if expression not in self.symbols:
-            self.symbols[expression] = sp.Symbol(f"c{len(self.symbols)}", real=True)
+            self.symbols[expression] = inner_symbol(f"c{len(self.symbols)}", real=True)
         return self.symbols[expression]
 
     @property
@@ -81,7 +82,9 @@ class Constants:
 
     def rate_of(self, constant: sp.Symbol, direction: int) -> sp.Symbol:
         """A further constant: how fast `constant` changes with one of the things that the caller varies."""
-        return self.rates.setdefault((constant, direction), sp.Symbol(f"{constant}_rate_{direction}", real=True))
+        return self.rates.setdefault(
+            (constant, direction), inner_symbol(f"{constant.name}_rate_{direction}", real=True)
+        )
 
     def with_rates(self, found: np.ndarray, rates: np.ndarray, inputs: Mapping[sp.Symbol, np.ndarray]) -> np.ndarray:
         """Rows of all constants, from those of the constants and of their rates of change.

@@ -12,6 +12,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.options import checked
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic
 from steadyslip.linear.response import response
 from steadyslip.linear.stable_values import is_own_stiffness, name_along
@@ -81,7 +82,7 @@ def _name(rig: Slider | Machine, along: str | None) -> str:
 @question
 def _condition(model: Model, name: str) -> sp.Eq:
     """Where the last Hurwitz determinant but one vanishes: roots on the imaginary axis."""
-    symbol, c = model.parameters.get(name), characteristic_coefficients(model)
+    symbol, c = model.parameters.get(name), tuple(map(model.written, characteristic_coefficients(model)))
     degree, numbers = len(c) - 1, f"; stable_values(rig, {name!r}) gives its edges as numbers"
     if symbol is None:
         raise NotAvailable(f"{name} is not in the equations of this rig")
@@ -91,6 +92,7 @@ def _condition(model: Model, name: str) -> sp.Eq:
         )
     if any(symbol in e.free_symbols for one in model.contacts for e in _stresses(one)):
         raise NotAvailable(f"the steady normal stress depends on {name}, and no short formula has its edges{numbers}")
+    symbol = model.written(symbol)
     whole = {2: lambda: c[1], 3: lambda: c[1] * c[2] - c[0] * c[3],
              4: lambda: c[1] * c[2] * c[3] - c[0] * c[3] ** 2 - c[4] * c[1] ** 2}[degree]()  # fmt: skip
     slope = derivative(whole, symbol)
@@ -110,16 +112,20 @@ def _stresses(contact: Contact) -> list[sp.Expr]:
 
 @question
 def _formula(model: Model) -> sp.Eq:
-    known = response(model).as_dict()
-    del known["k"]
-    friction = model.steady[model.contact.friction] / model.contact.sigma_ss
+    known = _answers(model)
+    friction = model.written(model.steady[model.contact.friction] / model.contact.sigma_ss)
     mu = _in_time(lambda: sp.simplify(friction), friction)
-    levels = [model.parameters[name] for name in model.with_role("friction level")]
+    levels = [model.written(model.parameters[name]) for name in model.with_role("friction level")]
     numerator, denominator = cubic.hopf_line(**known)
     short = _in_time(
         lambda: _shortest(*(_with_mu(part, mu, levels) for part in (numerator, denominator))), numerator / denominator
     )
-    return sp.Eq(sp.Symbol("k_cr") + model.gain, short, evaluate=False)
+    return sp.Eq(sp.Symbol("k_cr") + model.written(model.gain), short, evaluate=False)
+
+
+def _answers(model: Model) -> dict[str, sp.Expr]:
+    """What friction and contact answer to small changes, in letters."""
+    return {name: model.written(value) for name, value in response(model).as_dict().items() if name != "k"}
 
 
 def formula_in_parts(rig: Slider) -> list[sp.Eq]:
@@ -133,9 +139,7 @@ def formula_in_parts(rig: Slider) -> list[sp.Eq]:
     whole = formula(rig)
     if sp.count_ops(whole) <= LEGIBLE:
         return [whole]
-    model = build_model(rig)
-    known = response(model).as_dict()
-    del known["k"]
+    known = _answers(build_model(rig))
     letters = {name: sp.Symbol(_LETTERS.get(name, name), real=True) for name in known}
     letters = {name: letters["mu"] if known[name] == known["mu"] else one for name, one in letters.items()}
     told = {name: value for name, value in known.items() if sp.count_ops(value) > SHORT}
@@ -147,8 +151,8 @@ def formula_in_parts(rig: Slider) -> list[sp.Eq]:
 
 def _gathered(value: sp.Expr) -> sp.Expr:
     """A sum with what its terms share in front; roots and functions stay as they are."""
-    kept = [one for one in value.atoms(sp.Pow, sp.Function) if one.is_Function or not one.exp.is_Integer]
-    names = {one: sp.Dummy() for one in kept}
+    kept = [one for one in sp.ordered(value.atoms(sp.Pow, sp.Function)) if one.is_Function or not one.exp.is_Integer]
+    names = {one: inner_symbol(f"kept_{i:03d}") for i, one in enumerate(kept)}
     terms = [sp.factor(term) for term in sp.Add.make_args(value.xreplace(names))]
     back = {name: one for one, name in names.items()}
     return min((value, sp.Add(*terms).xreplace(back)), key=sp.count_ops)

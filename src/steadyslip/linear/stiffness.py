@@ -20,6 +20,7 @@ from steadyslip.core.errors import IllPosedWarning, InternalError
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import checked, slider
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.linear import cubic
 from steadyslip.linear.linear_sets import linear_set, most_values, sets_of, too_late
 from steadyslip.linear.pencil import best_spectrum
@@ -267,13 +268,13 @@ def _interval_function(model: Model) -> Callable[[OperatingPoint], list[Array]]:
 
 def _hopf_line(known: dict[str, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
     """N and D of D k > N, divided by a2 where that divides both: stability needs a2 > 0 anyway."""
-    names = {key: sp.Integer(0) if value == 0 else sp.Symbol(key) for key, value in known.items()}
+    names = {key: sp.Integer(0) if value == 0 else inner_symbol(key) for key, value in known.items()}
     numerator, denominator = cubic.hopf_line(**names)
     a2 = cubic.coefficients(**names, k=sp.Integer(0))[2]
     short = [sp.cancel(part / a2) for part in (numerator, denominator)]
     if all(part.is_polynomial() for part in short):
         numerator, denominator = short
-    point = {symbol: known[key] for key, symbol in names.items() if isinstance(symbol, sp.Symbol)}
+    point = {symbol: known[key] for key, symbol in names.items() if symbol.is_Symbol}
     return numerator.xreplace(point), denominator.xreplace(point)
 
 

@@ -10,16 +10,16 @@ from collections.abc import Mapping
 import sympy as sp
 
 from steadyslip.core.roles import Parameter
-from steadyslip.machine.mechanism import LOAD_POINT, Mechanism, Shares
-from steadyslip.model.equations import MOVED, Contact, Coordinate, Model, Variable
-from steadyslip.model.forces import INTEGRAL, TIME, V_LP, Forces, Letters, P, Q, SymbolicTouch
+from steadyslip.core.symbols import Letters
+from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
+from steadyslip.model.equations import HELD, MOVED, TIME, V_LP, Contact, Coordinate, Model, P, Q, Variable
+from steadyslip.model.forces import INTEGRAL, Forces, SymbolicTouch
+from steadyslip.model.names import Observables, check_names, joined
 from steadyslip.model.statics import row_of
-
-RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
 
 
 def assemble(
-    mechanism: Mechanism, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter], letter: Letters,
+    mechanism: Mechanism, given: dict[str, sp.Symbol], roles: Mapping[str, Parameter], letters: Letters,
     drive: str = MOVED,
 ) -> Model:  # fmt: skip
     """The Model of a mechanism in symbols.
@@ -31,8 +31,8 @@ def assemble(
         The parameters by dotted name.
     roles : mapping of str to Parameter
         What is declared of them.
-    letter : callable
-        A letter for a dotted name that nothing else has.
+    letters : Letters
+        Those of the parameters; further ones join them.
     drive : str
         Whether it moves, pulls with a force of its own, or both by turns.
 
@@ -41,7 +41,7 @@ def assemble(
     NotAvailable
         If it is open what a force of the drive does.
     """
-    return _Assembly(mechanism, letter, drive).model(given, roles)
+    return _Assembly(mechanism, letters, drive).model(given, roles)
 
 
 class _Assembly(Forces):
@@ -78,6 +78,7 @@ class _Assembly(Forces):
             inputs=inputs,
             parameters=given,
             roles={name: roles[name] for name in given},
+            letters=self.letters.known,
             gain=sp.sympify(self.mechanism.gain),
             axial_share=None if share is None else sp.sympify(share),
             steady=self._steady(coordinates),
@@ -158,7 +159,7 @@ class _Assembly(Forces):
             rates.append(self._sensed(integral.senses))
         if self.by_turns:
             what = "force of the drive that its motion does not make"
-            variables.append(Variable("held", self.held, "Pa" if self.bare else "N", what, "held"))
+            variables.append(Variable(HELD, self.held, "Pa" if self.bare else "N", what, "held"))
             rates.append(sp.Integer(0))
         return tuple(variables), tuple(rates)
 
@@ -192,33 +193,53 @@ class _Assembly(Forces):
 
     def _observables(self) -> dict[str, tuple[sp.Expr, str]]:
         """The named results that every stage shows, with units; totals where contacts have names."""
-        found: dict[str, tuple[sp.Expr, str]] = {}
+        tables: list[tuple[str, Observables]] = []
         for one in self.mechanism.coordinates:
             own = "" if self.bare else f"{one.name}."
-            found |= {f"{own}x": (self.x[one.name], one.unit), f"{own}v": (self.v[one.name], f"{one.unit}/s")}
-        for place in self.places:
-            own, area = (f"{place.touch.name}.", place.touch.area) if place.touch.name else ("", 1)
-            words = ("friction_force", "normal_force") if own else ("shear_stress", "normal_stress")
-            unit = "N" if own else "Pa"
-            found |= {
-                f"{own}friction": (place.tau / place.sigma, "1"),
-                own + words[0]: (area * place.tau, unit),
-                own + words[1]: (area * place.sigma, unit),
-            }
-            if not own:
-                found["spring_stress"] = (place.spring, "Pa")
-            law = place.touch.friction
-            seen = law.observables(place.velocity, place.sigma, place.memory, place.tau)
-            found |= {f"{own}{name}": (sp.sympify(e), unit) for name, (e, unit) in seen.items()}
-            contact = place.touch.contact
-            held = zip(contact.memory(), place.states, contact.memory_units(), strict=True)
-            found |= {f"{own}{name}": (symbol, unit) for name, symbol, unit in held}
-        for element in self.mechanism.elements:
-            if element.name:
-                resting = self._known(self.statics.tension(element))
-                twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
-                force = -resting - self._tension(element, self.x, self.moving)
-                if self.imposed and LOAD_POINT in element.senses:
-                    force = -resting - self._tension(element, {}, self.speeds) + self._beyond(element)
-                found[f"{element.name}.force"] = (force, "N m" if twisted else "N")
+            moving = {f"{own}x": (self.x[one.name], one.unit), f"{own}v": (self.v[one.name], f"{one.unit}/s")}
+            tables.append(("the block" if self.bare else one.name, moving))
+        tables += [("the equations", self._observed(place)) for place in self.places]
+        laws = [one for place in self.places for one in self._stated(place)]
+        tables += [(owner, seen) for owner, _, seen in laws]
+        tables += [(element.name, self._carried(element)) for element in self.mechanism.elements if element.name]
+        every = joined([*tables, *((owner, remembered) for owner, remembered, _ in laws)])
+        return {name: every[name] for _, table in tables for name in table}
+
+    def _observed(self, place: SymbolicTouch) -> Observables:
+        """What is seen at every contact."""
+        own, area = (f"{place.touch.name}.", place.touch.area) if place.touch.name else ("", 1)
+        words = ("friction_force", "normal_force") if own else ("shear_stress", "normal_stress")
+        unit = "N" if own else "Pa"
+        seen = {
+            f"{own}friction": (place.tau / place.sigma, "1"),
+            own + words[0]: (area * place.tau, unit),
+            own + words[1]: (area * place.sigma, unit),
+        }
+        if not own:
+            seen["spring_stress"] = (place.spring, "Pa")
+        return seen
+
+    def _stated(self, place: SymbolicTouch) -> list[tuple[str, Observables, Observables]]:
+        """Of both laws of a contact: whose they are, what they remember, and what they let see."""
+        touch, own = place.touch, f"{place.touch.name}." if place.touch.name else ""
+        stated = touch.friction.observables(place.velocity, place.sigma, place.memory, place.tau)
+        found: list[tuple[str, Observables, Observables]] = []
+        for kind, law, symbols in (
+            ("friction", touch.friction, place.memory),
+            ("contact", touch.contact, place.states),
+        ):
+            remembered = dict(zip(law.memory(), zip(symbols, law.memory_units(), strict=True), strict=True))
+            seen = remembered if kind == "contact" else {n: (sp.sympify(e), unit) for n, (e, unit) in stated.items()}
+            check_names(f"contacts.{own}{kind}" if own else kind, law, [*law.memory(), *(seen.keys() - remembered)])
+            kept, shown = ({f"{own}{name}": one for name, one in table.items()} for table in (remembered, seen))
+            found.append((f"the {kind} law of {touch.name}" if own else f"the {kind} law", kept, shown))
         return found
+
+    def _carried(self, element: Element) -> Observables:
+        """The force in a link."""
+        resting = self._known(self.statics.tension(element))
+        twisted = all(one.unit == "rad" for one in self.mechanism.coordinates if one.name in element.acts)
+        force = -resting - self._tension(element, self.x, self.moving)
+        if self.imposed and LOAD_POINT in element.senses:
+            force = -resting - self._tension(element, {}, self.speeds) + self._beyond(element)
+        return {f"{element.name}.force": (force, "N m" if twisted else "N")}

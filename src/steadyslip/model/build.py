@@ -11,12 +11,15 @@ import sympy as sp
 
 from steadyslip.core.options import checked
 from steadyslip.core.records import Address, parameters, shape_of, twin
+from steadyslip.core.symbols import Letters
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
-from steadyslip.model.assembly import RESERVED, assemble
+from steadyslip.model.assembly import assemble
 from steadyslip.model.equations import MOVED, Model
 
+RESERVED = ("x", "v", "a_x", "I_x", "T", "tau", "sigma", "sigma_ss", "v_lp", "q", "p", "t", "mu_ss", "k_cr")
+"""Letters of the equations' own."""
 _LETTERS = {
     "slider.stiffness": "k",
     "slider.mass": "m",
@@ -64,62 +67,39 @@ class _Structure:
 @lru_cache(maxsize=128)
 def _build_cached(structure: _Structure) -> Model:
     rig = structure.rig
-    symbols = _parameter_symbols(rig, structure.present)
-    given = {name: symbol for name, symbol in symbols.items() if isinstance(symbol, sp.Symbol)}
+    symbols, known = _parameter_symbols(rig, structure.present)
+    given = {name: symbol for name, symbol in symbols.items() if symbol.is_Symbol}
     for name in rig.instead:
         given.pop(name, None)
     roles = {name: address.role for name, address in rig.parameters().items()}
-    taken = set(RESERVED) | {str(symbol) for symbol in given.values()}
     mechanism = twin(rig, symbols).mechanism()
-    return assemble(mechanism, given, roles, lambda name: _unused_letter(name, taken), structure.drive)
+    return assemble(mechanism, given, roles, Letters({*RESERVED, *known.values()}, known), structure.drive)
 
 
-def _parameter_symbols(rig: Rig, present: frozenset[str]) -> dict[str, Any]:
-    """A symbol for every given parameter; structural zeros stay zero, gauges stay symbols."""
+def _parameter_symbols(rig: Rig, present: frozenset[str]) -> tuple[dict[str, Any], dict[sp.Symbol, str]]:
+    """A symbol for every given parameter, and its letter; structural zeros stay zero, gauges stay symbols."""
     symbols: dict[str, Any] = {}
-    letters = Counter(a.role.letter for a in parameters(rig).values())
-    taken = set(RESERVED) | set(_LETTERS.values()) | set(letters)
-    for name, address in parameters(rig).items():
-        if name in rig.aside or address.value is None:
-            continue
+    every = parameters(rig)
+    declared = Counter(address.role.letter for address in every.values())
+    letters = Letters({*RESERVED, *_LETTERS.values(), *declared})
+    for place, (name, address) in enumerate(every.items()):
+        called, letter = f"parameter_{place:03d}", _LETTERS.get(name) or _declared_letter(address, declared)
+        before = name.rpartition(".")[0]
+        dotted = f"{before}.{address.role.letter}" if address.role.letter else name
         if name in rig.assumed:
-            symbols[name] = sp.Symbol(rig.assumed[name], nonnegative=True)
+            symbols[name] = letters.symbol(called, dotted, rig.assumed[name], nonnegative=True)
+        elif name in rig.aside or address.value is None:
             continue
-        if address.role.structural and address.value == 0 and name not in present:
+        elif address.role.structural and address.value == 0 and name not in present:
             symbols[name] = sp.Integer(0)
-            continue
-        domain = address.role.domain
-        symbols[name] = sp.Symbol(
-            _LETTERS.get(name) or _own_letter(address, letters, taken),
-            real=True,
-            positive=True if domain.low == 0 and not domain.low_allowed else None,
-            nonnegative=True if domain.low == 0 else None,
-        )
-    for name in rig.assumed.keys() - symbols.keys():
-        symbols[name] = sp.Symbol(rig.assumed[name], nonnegative=True)
-    return symbols
+        else:
+            low, reached = address.role.domain.low == 0, address.role.domain.low_allowed
+            signs = {"positive": True if low and not reached else None, "nonnegative": True if low else None}
+            symbols[name] = letters.symbol(called, dotted, letter, real=True, **signs)
+    return symbols, letters.known
 
 
-def _own_letter(address: Address, letters: Mapping[str, int], taken: set[str]) -> str:
-    """The letter that is declared for a parameter, with its name behind it where others have the same."""
+def _declared_letter(address: Address, declared: Mapping[str, int]) -> str:
+    """The letter that is declared for a parameter, unless others have the same or it is one of the equations' own."""
     letter = address.role.letter
-    if letter and letters[letter] == 1:
-        return letter
-    before = address.name.rpartition(".")[0]
-    return _unused_letter(f"{before}.{letter}" if letter else address.name, taken)
-
-
-def _unused_letter(name: str, taken: set[str]) -> str:
-    """The last part of a dotted name, with as many earlier parts behind it as make it unique, or else a number.
-
-    A body and a contact may have the same name, and ``a-b`` and ``a_b`` are two.
-    """
-    *before, letter = name.replace("-", "_").split(".")
-    if before[-1].isdigit():
-        letter = f"{letter}_{before.pop()}"
-    while letter in taken and before:
-        letter = f"{letter}_{before.pop()}"
-    free = (letter, *(f"{letter}_{number}" for number in range(2, len(taken) + 3)))
-    letter = next(one for one in free if one not in taken)
-    taken.add(letter)
-    return letter
+    return letter if declared[letter] == 1 and letter not in (*RESERVED, *_LETTERS.values()) else ""

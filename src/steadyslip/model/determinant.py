@@ -14,6 +14,7 @@ import sympy as sp
 from sympy.polys.domains import ZZ
 
 from steadyslip.core.errors import InternalError
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import Model
 from steadyslip.model.stand_ins import StandIns
 
@@ -45,7 +46,7 @@ def determinant(
     """
     names = sorted({n for row in matrix for entry in row for e in entry.values() for n in e.free_symbols}, key=str)
     width = max((len(powers) for row in matrix for entry in row for powers in entry), default=1)
-    main = [sp.Dummy(f"s{i}") for i in range(width)]
+    main = [inner_symbol(f"s.{i}") for i in range(width)]
     ring = ZZ[(*main, *names)].ring
     table = [[_in_ring(entry, ring) for entry in row] for row in matrix]
     known = {frozenset[int](): ring.one}
@@ -129,14 +130,14 @@ class _Block:
         table = list(rows.values())
         square = [[table[i][j] for j in self.own] for i in self.own]
         outside = [j for j in columns.values() if j not in self.own and any(table[i][j] for i in self.own)]
-        self.whole = sp.Dummy(f"D{index}")
+        self.whole = inner_symbol(f"D.{index}")
         self.meant = {self.whole: _expanded(square)}
         self.symbols: dict[int, sp.Symbol] = {}
         for j in outside:
             replaced = [[*line[:-1], table[i][j]] for i, line in zip(self.own, square, strict=True)]
             value = _expanded(replaced)
             if value:
-                self.symbols[j] = sp.Dummy(f"G{index}_{j}")
+                self.symbols[j] = inner_symbol(f"G.{index}.{j}")
                 self.meant[self.symbols[j]] = value
 
 

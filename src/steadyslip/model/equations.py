@@ -13,6 +13,7 @@ from steadyslip.core.expressions import ArrayFunction, replaced
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import Keeper
 from steadyslip.core.roles import Parameter
+from steadyslip.core.symbols import inner_symbols
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,10 @@ class Contact:
         return self.unknown is self.acceleration
 
 
+V_LP, Q, P, TIME = inner_symbols("v_lp q p t", real=True)
+"""Velocity of the load point, the first push, the first normal stress that is added, and time."""
+HELD = "held back"
+"""Name of the variable `LettingGo.held`, which no variable of a law can have."""
 MOVED, PULLED, EITHER = "moved", "pulled", "either"
 """What a drive does in the course of a run: it moves, it pulls with a force of its own, or both by turns."""
 
@@ -229,6 +234,8 @@ class Model(Keeper, Displayed):
         By dotted name. ``slider.stiffness`` is always the component along the sliding direction.
     roles : dict of str to Parameter
         What the rig declares of its parameters: unit, domain, meaning.
+    letters : dict of sympy.Symbol to str
+        By what people know symbols that are not known by their own names, such as those of parameters; see `written`.
     gain : sympy.Expr
         Stiffness that a controller adds to ``slider.stiffness``.
     axial_share : sympy.Expr or None
@@ -253,6 +260,7 @@ class Model(Keeper, Displayed):
     inputs: dict[str, sp.Symbol]
     parameters: dict[str, sp.Symbol]
     roles: dict[str, Parameter] = field(repr=False)
+    letters: dict[sp.Symbol, str] = field(repr=False)
     gain: sp.Expr
     axial_share: sp.Expr | None
     steady: dict[sp.Symbol, sp.Expr]
@@ -361,11 +369,27 @@ class Model(Keeper, Displayed):
 
     # -- words
 
+    def written(self, expression: sp.Basic) -> sp.Basic:
+        """An expression as people know it: with plain SymPy symbols, called by their `letters`.
+
+        The symbols of the equations are called by their places, whatever names users give, and equal no others.
+        """
+        return expression.xreplace(
+            {
+                one: sp.Symbol(self.letters.get(one, one.name), **one.assumptions0)
+                for one in expression.free_symbols
+                if isinstance(one, sp.Dummy)
+            }
+        )
+
     def equations(self) -> list[sp.Eq]:
-        """The model as SymPy equations, ready for LaTeX."""
+        """The model as SymPy equations in its letters, ready for LaTeX."""
+        return list(map(self.written, self._equations()))
+
+    def _equations(self) -> list[sp.Eq]:
         time = self.inputs["time"]
         found = [
-            sp.Eq(late, sp.Function(str(symbol))(time - delay), evaluate=False)
+            sp.Eq(late, sp.Function(str(self.written(symbol)))(time - delay), evaluate=False)
             for late, (symbol, delay) in self.late.items()
         ]
         found += [sp.Eq(symbol, expression, evaluate=False) for symbol, expression in self.definitions.items()]
@@ -377,11 +401,12 @@ class Model(Keeper, Displayed):
 
     def __str__(self) -> str:
         kind = "with inertia" if self.inertial else "quasistatic"
-        unknowns = ", ".join(str(contact.unknown) for contact in self.contacts)
+        unknowns = ", ".join(str(self.written(contact.unknown)) for contact in self.contacts)
         lines = [f"Model, {kind}; algebraic unknown {unknowns}", "variables"]
-        lines += [f"  {v.symbol!s:<10} {v.unit:<8} {v.doc}" for v in self.variables]
+        lines += [f"  {self.written(v.symbol)!s:<10} {v.unit:<8} {v.doc}" for v in self.variables]
         lines.append("parameters")
-        lines += [f"  {symbol!s:<14} {self.roles[name].unit:<8} {name}" for name, symbol in self.parameters.items()]
+        letters = {name: self.written(symbol) for name, symbol in self.parameters.items()}
+        lines += [f"  {letter!s:<14} {self.roles[name].unit:<8} {name}" for name, letter in letters.items()]
         lines.append("equations")
         for equation in self.equations():
             left = equation.lhs

@@ -7,7 +7,7 @@ its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,14 +16,13 @@ import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
+from steadyslip.core.symbols import Letters, inner_symbol
 from steadyslip.laws.contact import Motion
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Touch
-from steadyslip.model.equations import EITHER, MOVED, LettingGo
+from steadyslip.model.equations import EITHER, MOVED, V_LP, LettingGo, P, Q
 from steadyslip.model.statics import Press, Statics, row_of, statics
 
-V_LP, Q, P, TIME = (sp.Symbol(name, real=True) for name in ("v_lp", "q", "p", "t"))
-INTEGRAL = sp.Symbol("I_x", real=True)
-Letters = Callable[[str], str]
+INTEGRAL = inner_symbol("I_x", real=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +52,11 @@ class SymbolicTouch:
 class Forces:
     """Symbols of a mechanism, and what its contacts and links do in them."""
 
-    def __init__(self, mechanism: Mechanism, letter: Letters, drive: str) -> None:
-        self.mechanism, self.letter, self.imposed, self.by_turns = mechanism, letter, drive != MOVED, drive == EITHER
-        self.loading = sp.Symbol(letter("drive.loading"), real=True) if self.imposed else sp.Integer(0)
+    def __init__(self, mechanism: Mechanism, letters: Letters, drive: str) -> None:
+        self.mechanism, self.letters, self.imposed, self.by_turns = mechanism, letters, drive != MOVED, drive == EITHER
+        self.loading = self._of_the_drive("loading") if self.imposed else sp.Integer(0)
         if self.by_turns:
-            self.free, self.held = (sp.Symbol(letter(f"drive.{name}"), real=True) for name in ("free", "held"))
+            self.free, self.held = map(self._of_the_drive, ("free", "held"))
         if self.imposed:
             self._check_loading()
         names = [one.name for one in mechanism.coordinates]
@@ -65,13 +64,15 @@ class Forces:
         self.bare = not all(touch.name for touch in mechanism.touches)
 
         def symbols(of: str, alone: str) -> dict[str, sp.Symbol]:
-            return {n: sp.Symbol(alone if self.single else letter(f"{n}.{of}"), real=True) for n in names}
+            if self.single:
+                return {names[0]: inner_symbol(alone, real=True)}
+            return {n: letters.symbol(f"{alone}_{i:03d}", f"{n}.{of}", real=True) for i, n in enumerate(names)}
 
         self.x, self.v, self.a = symbols("x", "x"), symbols("v", "v"), symbols("a", "a_x")
         self.push = {names[0]: Q} if self.single else symbols("q", "q")
         self.moving = self.v | {LOAD_POINT: V_LP}
         self.speeds = {c.name: sp.sympify(c.speed) for c in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
-        self.places = [self._place(touch) for touch in mechanism.touches]
+        self.places = [self._place(i, touch) for i, touch in enumerate(mechanism.touches)]
         self.definitions: dict[sp.Symbol, sp.Expr] = {}
         self.late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = {}
         self._define()
@@ -92,16 +93,25 @@ class Forces:
 
     # -- contacts in symbols
 
-    def _place(self, touch: Touch) -> SymbolicTouch:
-        def symbol(name: str, **assumptions: bool) -> sp.Symbol:
-            return sp.Symbol(name if self.single else self.letter(f"{touch.name}.{name}"), **assumptions)
+    def _of_the_drive(self, what: str) -> sp.Symbol:
+        return self.letters.symbol(f"drive_{what}", f"drive.{what}", real=True)
+
+    def _place(self, index: int, touch: Touch) -> SymbolicTouch:
+        def symbol(name: str, **assumptions: Any) -> sp.Symbol:
+            if self.single:
+                return inner_symbol(name, **assumptions)
+            return self.letters.symbol(f"at_{index:03d}_{name}", f"{touch.name}.{name}", **assumptions)
+
+        def remembered(names: tuple[str, ...], kind: str) -> tuple[sp.Symbol, ...]:
+            each = enumerate(names)
+            return tuple(
+                self.letters.symbol(f"at_{index:03d}_{kind}_{i:03d}", f"{touch.name or kind}.{name}", real=True)
+                for i, name in each
+            )
 
         body = next(iter(touch.slip))
-        memory = tuple(
-            sp.Symbol(self.letter(f"{touch.name or 'memory'}.{name}"), real=True) for name in touch.friction.memory()
-        )
-        states = tuple(
-            sp.Symbol(self.letter(f"{touch.name or 'contact'}.{name}"), real=True) for name in touch.contact.memory()
+        memory, states = (
+            remembered(law.memory(), kind) for law, kind in ((touch.friction, "memory"), (touch.contact, "contact"))
         )
         return SymbolicTouch(
             touch,
@@ -116,18 +126,18 @@ class Forces:
             memory,
             states,
             P if self.single else symbol("p", real=True),
-            sp.Symbol(self.letter(f"{touch.name or 'contact'}.p_out"), real=True),
+            self.letters.symbol(f"at_{index:03d}_p_out", f"{touch.name or 'contact'}.p_out", real=True),
         )
 
     @cached_property
     def friction(self) -> dict[sp.Symbol, sp.Expr]:
         """Symbols that stand for friction until the statics are solved, and what it is."""
-        return {sp.Symbol(f"friction_{i}"): place.tau_ss for i, place in enumerate(self.places)}
+        return {inner_symbol(f"friction_{i:03d}"): place.tau_ss for i, place in enumerate(self.places)}
 
     @cached_property
     def statics(self) -> Statics:
         """How far everything is displaced in steady sliding, in terms of friction and normal stresses."""
-        distance = sp.Symbol("distance", real=True)
+        distance = inner_symbol("distance", real=True)
         friction, normal = {}, {}
         for place, held in zip(self.places, self.friction, strict=True):
             touch = place.touch
@@ -137,7 +147,7 @@ class Forces:
                 still = replace(self._motion(place, sp.nan, sp.nan, distance, distance), separation_rate=0)
                 pressed = sp.sympify(touch.contact.normal_stress(still))
                 normal[touch.name] = Press(pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance))
-        return statics(self.mechanism, friction, normal, self.letter)
+        return statics(self.mechanism, friction, normal, self.letters.symbol)
 
     def _known(self, expression: sp.Expr) -> sp.Expr:
         """A result of the statics in lowest terms, so that a stiffness which does not matter is not in it."""
@@ -228,7 +238,7 @@ class Forces:
         stiffness = stiffness / self._per_area()
         velocity = self.mechanism.velocity
         rates = {n: self.v[n] - self.speeds[n] / velocity * V_LP for n in self.x}
-        changing = sp.Symbol(self.letter("drive.loading_rate"), real=True)
+        changing = self._of_the_drive("loading_rate")
         own = self._of_drive(self.x, {}, INTEGRAL)
         return LettingGo(
             free=self.free,
@@ -265,7 +275,8 @@ class Forces:
             if meant == (symbol, delay):
                 return late
         others = sum(base is symbol for base, _ in self.late.values())
-        late = sp.Symbol(f"{symbol}_late{others + 1 if others else ''}", real=True)
+        name = f"{self.letters.known.get(symbol, symbol.name)}_late{others + 1 if others else ''}"
+        late = self.letters.symbol(f"{symbol.name}_late_{others:03d}", name, real=True)
         self.late[late] = (symbol, delay)
         return late
 

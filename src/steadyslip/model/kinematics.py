@@ -15,9 +15,10 @@ import sympy as sp
 from steadyslip.core.errors import InternalError
 from steadyslip.core.expressions import asinh_exp, derivative, replaced
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.equations import Contact, Coordinate, Model
 
-W = sp.Symbol("w", real=True)
+W = inner_symbol("w", real=True)
 _FIRST = ("logarithm", "asinh", "linear")
 
 
@@ -99,7 +100,7 @@ def kinematics(model: Model) -> Kinematics:
 def _variable(model: Model, index: int) -> VelocityVariable:
     """The kind of w of a contact, v as a function of it, and the other way round."""
     contact = model.contacts[index]
-    w = W if len(model.contacts) == 1 else sp.Symbol(f"w_{index}", real=True)
+    w = W if len(model.contacts) == 1 else inner_symbol(f"w_{index}", real=True)
     v, scale = contact.velocity, sp.sympify(model.steady[contact.velocity])
     everything = [contact.balance, *model.rates, *model.definitions.values()]
     for expression in (contact.balance, *model.definitions.values()):

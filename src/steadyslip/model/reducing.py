@@ -27,10 +27,11 @@ import sympy as sp
 from steadyslip.core.errors import InternalError, NotAvailable
 from steadyslip.core.expressions import derivative, replaced
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.kinematics import in_variables, kinematics, solved_in_turn, solved_together
-from steadyslip.model.reduction import TIME, V_LP, Reduction, Sliding, channels_for, slope_of
+from steadyslip.model.reduction import SPEED, TIME, V_LP, Reduction, Sliding, channels_for, slope_of
 
 Replacements = dict[sp.Symbol, sp.Expr]
 Equations = list[tuple[sp.Expr, sp.Symbol]]
@@ -298,7 +299,10 @@ class _Reducing:
                 self.raw[one.velocity] = replaced(self.inlined(one.acceleration), self.pushed)
         own = (variable.w for variable in self.moving.variables if variable)
         others = self._felt()
-        rates = {symbol: sp.Dummy(real=True) for symbol in (*own, *(symbol for _, symbol in others))}
+        rates = {
+            symbol: inner_symbol(f"{symbol.name}_rate", real=True)
+            for symbol in (*own, *(symbol for _, symbol in others))
+        }
         placed = {self._w(i): one for i, one in enumerate(self.moving.coordinates) if one is not None and one.inertial}
         self.raw |= {w: rates[w] for w in (*placed, *(symbol for _, symbol in (*self.light, *others)))}
         equations = [self._change(self._velocity(one.velocity)) - self._acceleration(one) for one in placed.values()]
@@ -380,7 +384,7 @@ class _Reducing:
         names = {item.symbol: item.name for item in self.model.variables}
         for variable, contact in zip(self.moving.variables, self.model.contacts, strict=True):
             if variable is not None:
-                names[variable.w] = f"{contact.name}.w" if contact.name else "w"
+                names[variable.w] = f"{contact.name}.{SPEED}" if contact.name else SPEED
         return tuple(names[symbol] for symbol in state)
 
 
@@ -416,7 +420,7 @@ def _inputs(
 
 def share_of(input_: sp.Symbol) -> sp.Symbol:
     """The constant that says whether a disturbance acts at an input of a Model, where it may act `EVERYWHERE`."""
-    return sp.Symbol(f"share_of_{input_}", real=True)
+    return inner_symbol(f"share_of_{input_.name}", real=True)
 
 
 def _kept_moving(rate: sp.Expr, w: sp.Symbol) -> sp.Expr:
@@ -425,6 +429,6 @@ def _kept_moving(rate: sp.Expr, w: sp.Symbol) -> sp.Expr:
     Whoever pulls the block back far below its strength would else divide by a velocity beneath floating point.
     """
     least = sp.Piecewise((w, w > STANDSTILL), (sp.Integer(STANDSTILL), True))
-    bounded = sp.Dummy(real=True)  # put in last: a condition must not be bounded by itself
+    bounded = inner_symbol("w_bounded", real=True)  # put in last: a condition must not be bounded by itself
     slowed = rate.replace(lambda e: isinstance(e, sp.exp) and e.has(w), lambda e: e.xreplace({w: bounded}))
     return slowed.xreplace({bounded: least})

@@ -9,26 +9,30 @@ from functools import cached_property
 import sympy as sp
 
 from steadyslip.core.questions import Keeper
-from steadyslip.model.equations import Model
+from steadyslip.core.symbols import inner_symbol
+from steadyslip.model.equations import TIME, V_LP, Model, P, Q
 from steadyslip.model.kinematics import VelocityVariable, W, only
 from steadyslip.model.unknowns import Unknowns
 
 __all__ = ["TIME", "V_LP", "P", "Q", "Reduction", "Sliding", "W"]
-V_LP, Q, P, TIME = sp.symbols("v_lp q p t", real=True)
+
+
+SPEED = "w of v"
+"""Name of a contact's velocity variable among those of the state, which no variable of a law can have."""
 
 
 def channels_for(pushes: int, presses: int) -> tuple[sp.Symbol, ...]:
     """Symbols of the channels: load point, first push, first normal stress, there always; further ones behind them.
 
-    Their order is that of `steadyslip.protocol.protocol.channel_of`; no name of a part has a dot in it.
+    Their order is that of `steadyslip.protocol.protocol.channel_of`.
     """
-    more = [sp.Symbol(f"q.{i}", real=True) for i in range(2, pushes + 1)]
-    return V_LP, Q, P, *more, *(sp.Symbol(f"p.{i}", real=True) for i in range(2, presses + 1))
+    more = [inner_symbol(f"q.{i}", real=True) for i in range(2, pushes + 1)]
+    return V_LP, Q, P, *more, *(inner_symbol(f"p.{i}", real=True) for i in range(2, presses + 1))
 
 
 def slope_of(channel: sp.Symbol) -> sp.Symbol:
     """Its rate of change."""
-    return sp.Symbol(f"{channel}_dot", real=True)
+    return inner_symbol(f"{channel.name}_dot", real=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +72,7 @@ class Reduction(Keeper):
         What is integrated: displacements, velocity variables (unless massless and not eliminated), memory variables,
         integral.
     names : tuple of str
-        Names of the state variables; ``w`` is the velocity variable, with the contact's name before it if it has one.
+        Names of the state variables; `SPEED` is the velocity variable, with the contact's name before it if it has one.
     continuous : tuple of sympy.Symbol
         What a jump of the inputs leaves unchanged: displacements, velocities (with inertia), memory, integral.
     rates : tuple of sympy.Expr

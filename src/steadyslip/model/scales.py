@@ -12,7 +12,7 @@ from steadyslip.core.expressions import FEW, ArrayFunction, Choose, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import Model
 from steadyslip.model.point import OperatingPoint
-from steadyslip.model.reduction import Reduction
+from steadyslip.model.reduction import SPEED, Reduction
 from steadyslip.model.weights import Weights, slip_rates, weighed, weights
 
 _FELT = 1e-7  # least share of the normal stress of a direct effect that sets sizes
@@ -139,7 +139,7 @@ def joined_sizes(
         # a pressure matters where friction feels it
         scales |= {item.name: choose(direct > 0, direct, abs(stress)) for item in contact.own_states}
     for (found, _), contact in zip(each, model.contacts, strict=True):
-        scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.w": found["w"]}
+        scales |= {item.name: found[item.name] for item in contact.memory} | {f"{contact.name}.{SPEED}": found[SPEED]}
     scales |= {item.name: force for item in model.variables if item.kind == "held"}
     for item, rate in zip(model.variables, model.rates, strict=True):
         if item.kind == "integral":
@@ -150,7 +150,7 @@ def joined_sizes(
         """The size of an unknown: of a velocity variable, a friction or an acceleration."""
         for i, (one, (found, _)) in enumerate(zip(reduction.slidings, each, strict=True)):
             if one.variable is not None and symbol is one.variable.w:
-                return found["w"]
+                return found[SPEED]
             if symbol is model.contacts[i].friction:
                 return directs[i]
         return least([unknown for _, unknown in each])
@@ -196,7 +196,7 @@ def sizes(
     x = choose(x < np.inf, x, abs(drive))
     variable, contact = reduction.slidings[index].variable, reduction.model.contacts[index]
     linear = variable is not None and variable.kind == "linear"
-    scales: dict[str, Any] = {"x": x, "w": drive if linear else 1.0}
+    scales: dict[str, Any] = {"x": x, SPEED: drive if linear else 1.0}
     for item, weight, value in zip(contact.memory, found.by_memory, found.memory, strict=True):
         own, scale = abs(value), direct / abs(weight)
         scale = choose((scale > 0) & (scale < np.inf), scale, choose(own > 0, own, 1.0))
@@ -208,6 +208,6 @@ def sizes(
         item.name: choose(direct > 0, direct, by_slip * x) for item in reduction.model.variables if item.kind == "held"
     }
     if reduction.model.is_single and reduction.restarts:
-        return scales, scales["w"]
+        return scales, scales[SPEED]
     force = choose(direct > by_slip * x, direct, by_slip * x) / found.by_unknown
     return scales, choose(force > drive * drive / x, force, drive * drive / x)

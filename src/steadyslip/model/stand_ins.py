@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
+from steadyslip.core.symbols import inner_symbol
+
 
 class StandIns:
     """Symbols in place of whatever is no polynomial, so that exact arithmetic can be done with what is left."""
@@ -16,7 +18,7 @@ class StandIns:
         """A symbol for an expression; numbers stay."""
         if expression.is_Number:
             return expression
-        symbol = sp.Symbol(f"e{len(self.names)}")
+        symbol = inner_symbol(f"e{len(self.names)}")
         self.names[symbol] = expression
         return symbol
 

@@ -12,7 +12,7 @@ from steadyslip.core.arrays import brief
 from steadyslip.core.errors import InternalError, ParameterError, Problem, unknown_name
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
-from steadyslip.model.equations import Model
+from steadyslip.model.equations import HELD, Model
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.reduction import V_LP, Reduction
 from steadyslip.model.weights import slip_rates
@@ -161,7 +161,7 @@ def _initial_values(
         values[item.name] = _number(start.get(item.name, value))
     if model.letting_go is not None:
         integrals = (values[item.name] for item in model.integrals)
-        values["held"] = free * point.evaluate(_driven(model), *places, *speeds, *integrals)[0]
+        values[HELD] = free * point.evaluate(_driven(model), *places, *speeds, *integrals)[0]
     order = _continuous_names(reduction)
     for i in range(len(slips)):
         if f"w {i}" in order:

@@ -22,6 +22,7 @@ from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
 from steadyslip.model.determinant import TooLong, determinant
 from steadyslip.model.equations import Carried, Entries
@@ -30,7 +31,7 @@ from steadyslip.model.stand_ins import StandIns
 LONGEST = 8
 """Terms that the determinant of a balance of forces may have for its exact solution to be worth having."""
 UNHELD = "nothing holds some body of this machine in its place; give every body a link"
-Letter = Callable[[str], str]
+Lettered = Callable[..., sp.Symbol]
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Press:
 
 
 def statics(
-    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], letter: Letter
+    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], lettered: Lettered
 ) -> Statics:
     """Solve the balance of forces.
 
@@ -76,19 +77,19 @@ def statics(
     friction : dict of str to sympy.Symbol
         Steady friction stress of every contact.
     normal : dict of str to Press
-    letter : callable
-        An unused letter for a dotted name.
+    lettered : callable
+        A symbol called by the first word, with an unused letter for the dotted name that is the second.
     """
     names = [one.name for one in mechanism.coordinates]
-    places = {name: sp.Symbol(f"place_{i}") for i, name in enumerate(names)}
-    held = sp.Symbol("held_back")
+    places = {name: inner_symbol(f"place.{i}") for i, name in enumerate(names)}
+    held = inner_symbol("held_back")
     integral = mechanism.integral
     unknowns = [*places.values(), *([held] if integral is not None else [])]
     stretched = {id(one): one.stiffness * row_of(one.senses, places) for one in mechanism.elements}
     equations = _balances(mechanism, friction, normal, places, held, stretched)
     found = _solved(equations, unknowns)
     if found is None:
-        return _carried(mechanism, friction, normal, letter)
+        return _carried(mechanism, friction, normal, lettered)
     return Statics(dict(zip(names, found, strict=False)), found[-1] if integral is not None else sp.Integer(0))
 
 
@@ -117,20 +118,22 @@ def _balances(
 
 
 def _carried(
-    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], letter: Letter
+    mechanism: Mechanism, friction: Mapping[str, sp.Expr], normal: Mapping[str, Press], lettered: Lettered
 ) -> Statics:
     """The same, with symbols for what is displaced and carried.
 
     The force of a stiff spring would be lost in the difference of the places of its ends, so that it is an unknown.
     """
-
-    def symbol(name: str) -> sp.Symbol:
-        return sp.Symbol(letter(name), real=True)
-
-    places = {one.name: symbol(f"{one.name}.place") for one in mechanism.coordinates}
+    places = {
+        one.name: lettered(f"displaced_{i:03d}", f"{one.name}.place", real=True)
+        for i, one in enumerate(mechanism.coordinates)
+    }
     springs = [one for one in mechanism.elements if one.stiffness != 0]
-    tensions = {id(one): symbol(f"{one.name or 'controller'}.carried") for one in springs}
-    held = symbol("controller.integral")
+    tensions = {
+        id(one): lettered(f"carried_{i:03d}", f"{one.name or 'controller'}.carried", real=True)
+        for i, one in enumerate(springs)
+    }
+    held = lettered("carried_integral", "controller.integral", real=True)
     every = {id(one): sp.Integer(0) for one in mechanism.elements} | tensions
     equations = _balances(mechanism, friction, normal, places, held, every)
     equations += [row_of(one.senses, places) - tensions[id(one)] / one.stiffness for one in springs]

@@ -12,6 +12,7 @@ from dataclasses import replace
 import sympy as sp
 
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.model.reduction import Reduction
 
 Column = tuple[sp.Symbol, ...]
@@ -32,7 +33,7 @@ def with_directions(reduction: Reduction, count: int) -> Reduction:
 
 
 def _column(name: str, size: int) -> Column:
-    return tuple(sp.Symbol(f"{name}_{i}", real=True) for i in range(size))
+    return tuple(inner_symbol(f"{name}_{i}", real=True) for i in range(size))
 
 
 def _extended(reduction: Reduction, free: tuple[Column, ...], driven: tuple[Column, ...]) -> Reduction:
@@ -48,7 +49,7 @@ def _extended(reduction: Reduction, free: tuple[Column, ...], driven: tuple[Colu
     return replace(
         reduction,
         state=reduction.state + extra,
-        names=reduction.names + tuple(map(str, extra)),
+        names=reduction.names + tuple(one.name for one in extra),
         continuous=reduction.continuous + extra,
         rates=reduction.rates + rates,
         restored=reduction.restored + extra,

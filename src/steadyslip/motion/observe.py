@@ -11,6 +11,7 @@ from steadyslip.core.questions import question
 from steadyslip.kernels.runner import Runner
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.model import Model, OperatingPoint
+from steadyslip.model.equations import HELD
 from steadyslip.model.reducing import FREE
 from steadyslip.motion.jobs import Jobs
 from steadyslip.motion.targets import Targets
@@ -22,7 +23,8 @@ Tables = tuple[np.ndarray, ...]
 OBSERVED = ("v", "acceleration", "normal_stress", "shear_stress", "spring_stress", "load_velocity",
             "load_displacement")  # fmt: skip
 """What the driver's `observe` gives, in this order."""
-LOADING = "loading"  # by which the imposed force of the drive changes
+LOADING = "loading of the drive"  # by which the imposed force of the drive changes
+WAY, LOAD = "way of the drive", "velocity of the drive"  # of a contact; no name in results
 STRESSES = ("normal_stress", "shear_stress", "spring_stress")
 EXTRA_UNITS = {"slip": "m", "load_displacement": "m", "acceleration": "m/s^2", "load_velocity": "m/s"}
 
@@ -89,7 +91,7 @@ def _given(model: Model) -> dict[sp.Symbol, str]:
         given[model.inputs["loading"]] = LOADING
     given |= {item.symbol: item.name for item in (*model.memory, *model.states, *model.integrals)}
     if model.letting_go is not None:
-        given |= {model.letting_go.free: FREE, model.letting_go.held: "held"}
+        given |= {model.letting_go.free: FREE, model.letting_go.held: HELD}
     given[model.inputs["load_velocity"]] = "load_velocity"
     return given
 
@@ -188,8 +190,8 @@ def _at_contacts(model: Model, values: Array) -> dict[str, Array]:
         if not contact.name:
             return seen
         found |= {f"{contact.name}.{name}": seen[name] for name in STRESSES}
-        found |= {f"{contact.name}.slip_rate": seen["v"], f"{contact.name}.way": seen["load_displacement"]}
-        found[f"{contact.name}.load"] = seen["load_velocity"]
+        found |= {f"{contact.name}.slip_rate": seen["v"], f"{contact.name}.{WAY}": seen["load_displacement"]}
+        found[f"{contact.name}.{LOAD}"] = seen["load_velocity"]
     return found
 
 
@@ -213,9 +215,9 @@ def _of_the_drive(model: Model, found: dict[str, Array], point: OperatingPoint) 
     places = [found[f"{one.name}.x"] for one in model.coordinates]
     ahead = point.evaluate(_slips(model), *places)
     for contact, x in zip(model.contacts, ahead, strict=True):
-        found[f"{contact.name}.slip"] = x + found[f"{contact.name}.way"]
-    found["load_velocity"] = found[f"{model.contacts[0].name}.load"] / slips[0]
-    found["load_displacement"] = found[f"{model.contacts[0].name}.way"] / slips[0]
+        found[f"{contact.name}.slip"] = x + found[f"{contact.name}.{WAY}"]
+    found["load_velocity"] = found[f"{model.contacts[0].name}.{LOAD}"] / slips[0]
+    found["load_displacement"] = found[f"{model.contacts[0].name}.{WAY}"] / slips[0]
     for one, x, speed in zip(model.coordinates, places, speeds, strict=True):
         if one.speed != 0:
             found[f"{one.name}.displacement"] = x + speed * found["load_displacement"]

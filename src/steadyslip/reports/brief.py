@@ -122,9 +122,12 @@ def _model(model: Model) -> Iterator[str]:
     yield heading(f"Model, {kind}", 3)
     for equation in model.equations():
         yield f'<div class="formula" tabindex="0">{formula(equation)}</div>'
-    yield table([(letter(one.symbol), one.unit, one.doc) for one in model.variables], ("variable", "unit", "meaning"))
+    yield table(
+        [(letter(model.written(one.symbol)), one.unit, one.doc) for one in model.variables],
+        ("variable", "unit", "meaning"),
+    )
     rows = [
-        (name, letter(symbol), model.roles[name].unit, model.roles[name].doc)
+        (name, letter(model.written(symbol)), model.roles[name].unit, model.roles[name].doc)
         for name, symbol in model.parameters.items()
     ]
     yield table(rows, ("parameter", "letter", "unit", "meaning"))

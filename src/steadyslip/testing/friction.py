@@ -76,14 +76,13 @@ def check_symbols(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:
         *((item.name, item.symbol) for item in model.variables),
         *((name, symbol) for name, symbol in model.inputs.items()),
         ("acceleration", model.contact.acceleration),
-        *((str(symbol), symbol) for symbol in model.definitions),
+        *((symbol.name, symbol) for symbol in model.definitions),
         ("steady normal stress", model.contact.sigma_ss),
     ]
     for i, (name, symbol) in enumerate(used):
         for other, same in used[:i]:
-            require(
-                symbol != same, law, f"{name} and {other} share the symbol {symbol} in the equations; rename the law's"
-            )
+            one, two = model.written(symbol), model.written(same)
+            require(one != two, law, f"{name} and {other} share the symbol {one} in the equations; rename the law's")
 
 
 def check_steady_state(law: FrictionLaw, conditions: Conditions = MIDDLE) -> None:

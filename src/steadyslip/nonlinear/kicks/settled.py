@@ -15,15 +15,16 @@ import sympy as sp
 
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import question
+from steadyslip.core.symbols import inner_symbol
 from steadyslip.model import OperatingPoint
-from steadyslip.model.reduction import V_LP, P, Reduction, W
+from steadyslip.model.reduction import SPEED, V_LP, P, Reduction, W
 from steadyslip.model.scales import natural_scales
 from steadyslip.motion.jobs import Jobs
 from steadyslip.nonlinear.kicks.field import normal_stresses, slopes_at, solved_at
 from steadyslip.nonlinear.kicks.rest import Rest, in_columns
 
 Array = np.ndarray
-S = sp.Symbol("s", positive=True)
+S = inner_symbol("s", positive=True)
 """The normal stress sought, apart from the rig's own steady one."""
 STEPS = 8  # from the rig's own inputs to the new ones, where the normal stress has no closed form
 ROUNDS = 40  # of Newton's method at most
@@ -93,7 +94,7 @@ def rest_of(jobs: Jobs, velocity: Array, pressure: Array, force: Array | None = 
         state = np.where(np.all(np.isfinite(found), axis=1)[:, None], state, np.nan)
         own, _ = natural_scales(point, reduction)
         if reduction.velocity == "linear":
-            own = {**own, "w": velocity}
+            own = {**own, SPEED: velocity}
         scales = in_columns([own[name] for name in reduction.names], count)
     return _linearised(reduction, point, velocity, force, pressure, state, unknowns, scales)
 
@@ -145,7 +146,7 @@ def _machine_rest(jobs: Jobs, velocity: Array, force: Array, pressure: Array) ->
     columns = dict(own)
     for one, contact in zip(reduction.slidings, reduction.model.contacts, strict=True):
         if one.variable is not None and one.variable.kind == "linear":
-            columns[f"{contact.name}.w"] = columns[f"{contact.name}.w"] * faster
+            columns[f"{contact.name}.{SPEED}"] = columns[f"{contact.name}.{SPEED}"] * faster
     scales = in_columns([columns[name] for name in reduction.names], count)
     with np.errstate(all="ignore"):
         guess = in_columns(_as_fast(reduction, point, faster), count)
@@ -166,7 +167,7 @@ def _as_fast(reduction: Reduction, point: OperatingPoint, faster: Array) -> list
     return point.evaluate(_steady_state_of(reduction), faster)
 
 
-FASTER = sp.Symbol("faster", positive=True)
+FASTER = inner_symbol("faster", positive=True)
 
 
 @question

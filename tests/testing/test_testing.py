@@ -164,6 +164,11 @@ FRICTION_FAULTS = [
     ),
     ("check_two_routes", {"steady_strength": lambda self, v, s: 0.7 * s}, "coefficient of s.1 .*different laws"),
     ("check_friction_round_trip", {"__post_init__": doubled}, "a rig file changes it"),
+    (
+        "check_renaming",
+        {"strength": lambda self, v, s, y, t: s * (len(self.memory()[0]) + sp.log(v / 1e-6))},
+        "has other equations as Broken.*must not depend on what",
+    ),
 ]
 
 
@@ -361,6 +366,11 @@ CONTACT_FAULTS = [
         "the rate of film has other slopes by differences",
     ),
     ("check_contact_round_trip", {"__post_init__": doubled_contact}, "a rig file changes it"),
+    (
+        "check_contact_renaming",
+        with_film(steady_memory=lambda self, velocity: (float(len(self.memory()[0])),)),
+        "has other equations as",
+    ),
 ]
 
 

@@ -40,6 +40,7 @@ from steadyslip.testing.friction import (
 )
 from steadyslip.testing.jumps import check_jumps
 from steadyslip.testing.precise import ContractViolation
+from steadyslip.testing.renaming import check_contact_renaming, check_renaming, under_random_names
 from steadyslip.testing.routes import check_friction_round_trip, check_two_routes
 from steadyslip.testing.statement import Conditions
 
@@ -53,6 +54,7 @@ FRICTION_CHECKS: tuple[Callable[[FrictionLaw, Conditions], None], ...] = (
     check_jumps,
     check_two_routes,
     check_friction_round_trip,
+    check_renaming,
 )
 CONTACT_CHECKS: tuple[Callable[[ContactLaw, Surroundings], None], ...] = (
     check_contact_names,
@@ -64,6 +66,7 @@ CONTACT_CHECKS: tuple[Callable[[ContactLaw, Surroundings], None], ...] = (
     check_axis,
     check_contact_routes,
     check_contact_round_trip,
+    check_contact_renaming,
 )
 
 
@@ -76,7 +79,7 @@ def check_friction_law(
     stress_decades: float = 1.0,
     instant_weakening: bool = False,
 ) -> None:
-    """Check everything that a friction law promises.
+    """Check everything that a friction law promises, and once more with other names of its parameters and memory.
 
     Parameters
     ----------
@@ -96,10 +99,13 @@ def check_friction_law(
     conditions = Conditions(velocity, normal_stress, velocity_decades, stress_decades, instant_weakening)
     for check in FRICTION_CHECKS:
         check(law, conditions)
+    with under_random_names(law) as other:
+        for check in FRICTION_CHECKS:
+            check(other, conditions)
 
 
 def check_contact_law(contact: ContactLaw, surroundings: Surroundings | None = None) -> None:
-    """Check everything that a contact law promises.
+    """Check everything that a contact law promises, and once more with other names of its parameters and states.
 
     Parameters
     ----------
@@ -116,6 +122,9 @@ def check_contact_law(contact: ContactLaw, surroundings: Surroundings | None = N
     place = surroundings or Surroundings()
     for check in CONTACT_CHECKS:
         check(contact, place)
+    with under_random_names(contact) as other:
+        for check in CONTACT_CHECKS:
+            check(other, place)
 
 
 __all__ = [

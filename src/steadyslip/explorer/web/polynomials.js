@@ -4,6 +4,7 @@
 /** @typedef {{re: number, im: number}} Complex */
 
 const CLOSE = 1e-3, EPS = 2.220446049250313e-16;
+const SETTLED = 1e-10; // relative step from which on a root that is not double would be found in one step more
 
 /** Value and slope of a polynomial at x + iy: [re, im, slope re, slope im]. @param {number[]} c */
 function valueAndSlope(c, x, y) {
@@ -58,12 +59,16 @@ function circles(c) {
 
 /** Aberth's iteration: all roots at once, each by Newton's step, repelled by the others. @param {number[]} c */
 function aberth(c) {
-  const [x, y] = circles(c), n = x.length;
-  for (let pass = 0; pass < 100; pass++) {
-    let moved = 0;
+  const [x, y] = circles(c), n = x.length, steps = new Float64Array(n).fill(Infinity);
+  for (let pass = 0, left = n; pass < 100 && left; pass++) {
     for (let k = 0; k < n; k++) {
+      if (steps[k] === 0) continue;
       const [pr, pi, qr, qi] = valueAndSlope(c, x[k], y[k]);
-      if (pr === 0 && pi === 0) continue;
+      if (pr === 0 && pi === 0) {
+        steps[k] = 0;
+        left--;
+        continue;
+      }
       const q = qr * qr + qi * qi || 1e-300, nr = (pr * qr + pi * qi) / q, ni = (pi * qr - pr * qi) / q;
       let sr = 0, si = 0;
       for (let j = 0; j < n; j++) {
@@ -76,9 +81,11 @@ function aberth(c) {
       const wx = (nr * er + ni * ei) / e, wy = (ni * er - nr * ei) / e;
       x[k] -= wx;
       y[k] -= wy;
-      moved = Math.max(moved, Math.hypot(wx, wy) / (Math.hypot(x[k], y[k]) || 1e-300));
+      const step = Math.hypot(wx, wy) / (Math.hypot(x[k], y[k]) || 1e-300);
+      const still = step < 4e-16 || (step < SETTLED && step > 0.5 * steps[k]); // or rounding alone moves it
+      steps[k] = still ? 0 : step;
+      if (still) left--;
     }
-    if (moved < 4e-16) break;
   }
   return [x, y];
 }

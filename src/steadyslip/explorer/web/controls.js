@@ -5,6 +5,7 @@ import { parse, told, unitFor, unitIn } from "./quantities.js";
 import { inside } from "./rig.js";
 import { named } from "./words.js";
 
+const THIN = 0.006; // share of a track below which a colour cannot be seen
 const ROOM = 15; // letters that a field has room for
 const STEPS = 1000, NEAR = 0.005, FAR = 0.05;
 const KEYS = { ArrowRight: NEAR, ArrowUp: NEAR, ArrowLeft: -NEAR, ArrowDown: -NEAR, PageUp: FAR, PageDown: -FAR };
@@ -100,8 +101,21 @@ export class Controls {
         if (text.value !== words) text.value = words;
       }
       name.classList.toggle("changed", !Object.is(value, one.value));
-      const stops = tracks[i].flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));
+      const stops = visible(tracks[i], this.page.scale(i).of(value)).flatMap((part) => [part.from, part.to].map((at) => `var(--${CLASSES[part.status]}) ${(100 * at).toFixed(2)}%`));
       put(slider, "style", `--track: linear-gradient(to right, ${stops.join(", ")})`);
     });
   }
+}
+
+/** Parts of a track, the thinnest wide enough to be seen, but not over the place where the rig is. @param {{from: number, to: number, status: number}[]} parts @param {number} own */
+function visible(parts, own) {
+  const found = parts.map(({ from, to, status }) => ({ from, to, status }));
+  found.forEach((part, n) => {
+    const before = found[n - 1], next = found[n + 1], middle = 0.5 * (part.from + part.to);
+    if (part.to - part.from >= THIN || !before || !next || before.to - before.from < 2 * THIN || next.to - next.from < 2 * THIN) return;
+    const from = own <= part.from && own > middle - THIN ? part.from : own >= part.to && own < middle + THIN ? part.to - THIN : middle - 0.5 * THIN;
+    [part.from, part.to] = [from, from + THIN];
+    [before.to, next.from] = [part.from, part.to];
+  });
+  return found;
 }

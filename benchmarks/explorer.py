@@ -3,6 +3,7 @@
     python benchmarks/explorer.py verdicts [--first N]
     python benchmarks/explorer.py motion [--first N]
     python benchmarks/explorer.py machines [--first N]
+    python benchmarks/explorer.py edges [--first N]
     python benchmarks/explorer.py speeds
 
 Each kind of rig is judged at its own numbers and with some of them changed; each is moved through a velocity step.
@@ -11,6 +12,10 @@ events than compiled, it counts as other unless their number changes in compiled
 few units of its last place: friction that falls with velocity and forgets at once makes such motions.
 
 `machines` judges and moves machines of one to four bodies, drawn at random, on pages and in Python.
+
+`edges` asks pages of all examples for their edges at N settings drawn at random each, and again where an edge of the
+list was pressed, three times in a row: none of Python within 30 % may be missing or invented, no track may contradict
+its verdict.
 
 `speeds` makes pages of examples, opens them in Chromium and prints every judged time beside its bar, on an idle
 machine: the command from the start, the verdict after opening, a redraw while sliders move (script, style, layout and
@@ -38,6 +43,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 import steadyslip as ss
 import users_laws
 from explored import Explored, ExploredMachine, MovedOnAPage, compared, differences, same_motion
+from explored_edges import Edges, walked
 from fuzz_rigs import DRIVES, FRICTION
 from machines import at_random
 from moved import compiled_run, motion_text, moved, slip_events
@@ -158,6 +164,19 @@ def machines(first: int) -> None:
             other += 1
             print(f"{seed}: motion, {str(apart)[:200]}", flush=True)
     print(f"{count} machines: {wrong} judged otherwise; {moved_ones} moved, {refused} refused: {other} other motions")
+
+
+def edges(first: int) -> None:
+    """Settings of the pages of examples, and listed edges that are pressed."""
+    chance, count, wrong = np.random.default_rng(30), 0, 0
+    for path in (*sorted(EXAMPLES.glob("*.toml")), *sorted(EXAMPLES.glob("machines/*.toml"))):
+        page = Edges(ss.read_rig(path))
+        for _ in range(min(first, 40)):
+            found = walked(page, chance, presses=3)
+            count, wrong = count + 1, wrong + bool(found)
+            if found:
+                print(f"{path.stem}: {found}", flush=True)
+    print(f"{count} settings, each with three edges pressed: {wrong} with other edges than in Python")
 
 
 WATCH = """new MutationObserver((_, observer) => {
@@ -293,9 +312,11 @@ def _twenty_cycles() -> float:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("verdicts", "motion", "machines", "speeds"))
+    parser.add_argument("what", choices=("verdicts", "motion", "machines", "edges", "speeds"))
     parser.add_argument("--first", type=int, default=10**6, help="kinds of rig, of those drawn first")
     given = parser.parse_args()
     began = time.process_time()
-    {"verdicts": verdicts, "motion": motion, "machines": machines, "speeds": speeds}[given.what](given.first)
+    {"verdicts": verdicts, "motion": motion, "machines": machines, "edges": edges, "speeds": speeds}[given.what](
+        given.first
+    )
     print(f"{time.process_time() - began:.0f} CPU s")

@@ -32,10 +32,10 @@ from steadyslip.model.sliding import ABSENT
 from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.words import REMOTE
+from steadyslip.verdict.words import BEYOND, REMOTE
 
 MODULES = (
-    "dom", "quantities", "polynomials", "modes", "linear", "rig", "words", "plot", "chart", "edges", "banner",
+    "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
     "controls", "map", "locus", "facts", "mover", "sketch", "disturbances", "course", "view", "leaving", "page",
 )  # fmt: skip
 """Modules of the page, each after those that it imports."""
@@ -163,6 +163,7 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "toml": file.pieces,
         **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else {"stiffness": _stiffness(rig, names)}),
         "remote": REMOTE,
+        "beyond": BEYOND,
         "checks": _checks(rig, names, branch),
     }
 
@@ -179,7 +180,7 @@ def _of_machine(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dic
     return {
         "stiffness": _checked(rig, names),
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
-        "phrases": {**PHRASES, "absent": ABSENT},
+        "phrases": {name: words for name, words in PHRASES.items() if name not in BEYOND} | {"absent": ABSENT},
     }
 
 

@@ -85,12 +85,12 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
     ]
     if isinstance(rig, Machine):
         modes, further = mode_part(rig, model)
-        programs += [_linear_split(len(coefficients)), *modes]
+        programs += modes
     else:
         without, slope = stiffness_split(model)
         programs.append(program(model, "split", [*without, *slope]))
         programs.append(program(model, "stiffness", [model.axial_share or 1, model.gain]))
-    edges = [] if closed else _stable_set(len(coefficients) - 1)
+    edges = _stable_set(len(coefficients) - 1)
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))
     facts = {
@@ -99,14 +99,14 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         "searched": searched(model),
         "joint": joint_equation(model) is not None,
         "degree": len(coefficients) - 1,
-        "squares": len(edges[0].stores) - 2 if edges else 0,
+        "squares": len(edges[0].stores) - 2,
         "closed": closed,
         "edge": ON_THE_EDGE,
         "grid": [len(GRID), float(np.log10(GRID[0])), float(np.log10(GRID[-1]))],
         "solved": SOLVED,
         "observed": [[name, _unit(model, name), meanings.get(name, "")] for name in names],
     } | further
-    programs += edges
+    programs += [_linear_split(len(coefficients)), *edges]
     text = "".join(javascript.text(one) for one in programs)
     return f"(() => {{\n{text}return {{ {', '.join(one.name for one in programs)} }};\n}})()", facts
 
@@ -146,9 +146,9 @@ def _static_terms(model: Model) -> list[sp.Expr]:
 
 
 def _judged(c: list[Node]) -> list[Value]:
-    """Coefficients, and behind them whether all roots are on the left, and whether the equations are ill-posed."""
-    truths = crossing.is_hurwitz(c, select), crossing.is_ill_posed(c)
-    return [*c, *(select(truth, 1.0, 0.0) for truth in truths)]
+    """Coefficients, whether all roots are on the left, whether the equations are ill-posed, and `crossing.judged`'s."""
+    stable, functions = crossing.judged(c, select)
+    return [*c, *(select(truth, 1.0, 0.0) for truth in (stable, crossing.is_ill_posed(c))), *functions]
 
 
 def _stable_set(degree: int) -> list[Program]:

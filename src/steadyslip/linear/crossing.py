@@ -111,12 +111,27 @@ def is_hurwitz(c: Polynomial, choose: Choose) -> Any:
 
     For one rig: of arrays see `polynomials.is_hurwitz`, which also heeds coefficients that lie a hundred decades apart.
     """
+    return judged(c, choose)[0]
+
+
+def judged(c: Polynomial, choose: Choose) -> tuple[Any, list[Any]]:
+    """`is_hurwitz`, and factors of three functions, one of which changes sign wherever that changes.
+
+    The three are the lowest coefficient (one root is zero), the highest (one is infinite), and the last but one
+    determinant of Hurwitz, which is the product of all sums of two roots but for a factor (Orlando; two are ±iβ). The
+    third has several factors, entries of the Routh array. Without mass the highest is the second highest.
+    """
     largest: Any = 0.0
     for one in c:
         largest = choose(abs(one) > largest, abs(one), largest)
     scaled = [one / largest for one in c]
-    full, less = (_all_positive(routh(part)) for part in (scaled, scaled[:-1]))
-    return ((c[-1] > 0) & full) | ((abs(c[-1]) <= 0) & less)
+    full, less = routh(scaled), routh(scaled[:-1])
+    massless = abs(c[-1]) <= 0
+    stable = ((c[-1] > 0) & _all_positive(full)) | (massless & _all_positive(less))
+    determinant = [
+        choose(massless, few, one) for one, few in zip(full[1:-1], [*less[1:-1], 1.0][: len(c) - 2], strict=True)
+    ]
+    return stable, [scaled[0], choose(massless, scaled[-2], scaled[-1]), *determinant]
 
 
 def _all_positive(values: Polynomial) -> Any:

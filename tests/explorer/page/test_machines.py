@@ -1,5 +1,6 @@
 """Pages of machines in a browser: the sentence, the bar of any parameter, motion of named contacts and bodies."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,11 @@ def test_a_force_that_holds_the_contact_ends_at_zero(browser, tmp_path):
         assert "bodies.pad.press → 0 N disc lifts off" in edges.all_text_contents()
         push = visit.page.get_by_label("disturbance", exact=True).locator("option[value=push][disabled]")
         push.wait_for(state="attached")  # through the dashpot of the arm it would be an infinite force
+        visit.page.get_by_role("button", name="links.lining.stiffness →").click()
+        edges.filter(has_text=re.compile("links.caliper.stiffness → 6.138 .* an oscillation grows")).wait_for()
+        edges.filter(has_text=re.compile("links.lining.stiffness → 7.328 .* an oscillation grows")).wait_for()
+        assert "--unstable" in visit.slider("links.caliper.stiffness").get_attribute("style"), "a band 9 % wide"
+        visit.page.get_by_role("button", name="undo").click()
         visit.type("bodies.pad.press", "-1 N")
         edges.filter(has_text="bodies.pad.press").filter(has_text="slides steadily, but unstable").wait_for()
         assert visit.page.locator(".verdict p").first.inner_text().startswith("Lift-off at contact disc.")

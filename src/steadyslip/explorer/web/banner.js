@@ -3,7 +3,7 @@ import { make, put, svg, tell } from "./dom.js";
 import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
 import { digits, shown, told, unitFor } from "./quantities.js";
-import { asStiffness, headline, kindBeyond, kindOf, machineReason, ofContact, reason } from "./words.js";
+import { asStiffness, beyondWords, headline, kindOf, machineReason, reason } from "./words.js";
 
 const DECADE = Math.log(10); // on both sides of what is marked
 const ASUNDER = 1e3; // between marks that share a unit
@@ -69,8 +69,7 @@ export class Banner {
   told(answer, first) {
     const { rig } = this.page, own = Array.from(rig.set(rig.values).R);
     if (!first) return machineReason({ ...answer, own }, this.data);
-    const one = this.data.parameters[first.i], behind = rig.assess(this.page.with(first.i, first.behind));
-    const beyond = ofContact(this.data.phrases[kindBeyond(behind)], behind, this.data.facts);
+    const one = this.data.parameters[first.i], beyond = first.beyond === STABLE ? this.data.phrases.stable : beyondWords(first, this.page);
     const edge = { name: one.name, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at), beyond };
     return machineReason({ ...answer, own }, this.data, edge);
   }

@@ -5,28 +5,26 @@ import { inside } from "./rig.js";
 export const BESIDE = 1e-3; // how far from an edge one lands that goes there, of its value
 
 /**
- * The nearest change of every parameter inside its range, the most urgent first: where, what is behind it, whether it is
- * far off, and values close to it: the landing on its stable side (on the one that slides steadily, where none is
- * stable), and one behind it.
+ * The nearest edge of every parameter, the most urgent first: where, what is behind it, whether it is far off, and values
+ * close to it: the landing on its stable side (on the one that slides steadily, where none is stable), and one behind it.
  * @param {import("./page.js").Page} page
  */
 export function edgesOf(page) {
   const { remote } = page.rig.data; // times a value, beyond which an edge is of little use
   const found = /** @type {{i: number, at: number, distance: number, beyond: number, far: boolean, landing: number, behind: number}[]} */ ([]);
   page.rig.data.parameters.forEach((one, i) => {
-    const first = page.scale(i).at(0), value = page.rig.values[i], parts = page.tracks[i];
+    const value = page.rig.values[i], { edges, low, high } = page.found[i];
     let best = null;
-    parts.slice(0, -1).forEach((part, n) => {
-      const { at } = part, other = parts[n + 1].status, away = at > value;
-      if (part.status === UNKNOWN || other === UNKNOWN) return; // there is no rig to go to
-      const [here, beyond] = away ? [part.status, other] : [other, part.status];
+    edges.forEach(({ at, below, above }, n) => {
+      const away = at > value;
+      if (below === UNKNOWN || above === UNKNOWN) return; // there is no rig to go to
+      const [here, beyond] = away ? [below, above] : [above, below];
       const distance = one.unit === "rad" ? Math.abs(at - value) : Math.abs(at - value) / (Math.abs(value) || 1e300);
       if (best !== null && distance >= best.distance && (value || at >= best.at)) return;
       const times = Math.abs(value / at), far = one.unit !== "rad" && Boolean(value && at) && !(times < remote && times > 1 / remote);
       const across = beyond === STABLE || (beyond !== ABSENT && here !== STABLE); // whether that side is behind the edge
-      const room = away === across ? parts[n + 1].at - at : (n ? parts[n - 1].at : first) - at;
-      const ahead = away ? parts[n + 1].at - at : (n ? parts[n - 1].at : first) - at;
-      best = { i, at, distance: value ? distance : 1e6, beyond, far, landing: beside(page, i, at, room), behind: beside(page, i, at, ahead) };
+      const room = (up) => (up ? (edges[n + 1]?.at ?? high) : (edges[n - 1]?.at ?? low)) - at;
+      best = { i, at, distance: value ? distance : 1e6, beyond, far, landing: beside(page, i, at, room(away === across)), behind: beside(page, i, at, room(away)) };
     });
     if (best) found.push(best);
   });

@@ -9,7 +9,9 @@ import { dampingOfPairs, roots } from "./polynomials.js";
 /** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, degree: number, squares: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
  *   observed: [string, string, string][], coordinates?: string[], matrix?: any, stores?: any, shape?: any}} Facts */
 
-const NEARLY_REAL = 1e-6, SAME = 1e-9; // imaginary part of a root that is tried as real; two edges that are one
+const NEARLY_REAL = 1e-6; // imaginary part of a root that is tried as real
+export const SAME = 1e-9; // relative distance of two edges that are one
+const HUGE = 1e150, SIGNED = 1e4; // sizes whose products are numbers; more than the logarithm of any product of coefficients
 const FORMULA = 4, REAL = 1e-9; // numbers that `steady` gives of a contact; imaginary part of a gain that is real but for rounding
 const APART = [1e-6, 1, 1e6]; // factors on a parameter at which the polynomial is looked at
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
@@ -27,9 +29,10 @@ export class Linear {
     this.count = facts.parameters.length;
     this.mixed = facts.searched.some(Boolean) && !facts.searched.every(Boolean);
     const contacts = facts.contacts.length, many = facts.degree + 1;
+    this.many = 3 + (facts.joint ? 1 + contacts : facts.searched.some(Boolean) ? 0 : 2 * contacts); // of `functions`
     this.R = new Float64Array(this.count + contacts);
     this.y = new Float64Array(Math.max(8, 2 * many + 4, facts.squares + 2, facts.observed.length, FORMULA * contacts, ...(facts.matrix ? [facts.matrix[1].length, 2 + contacts + facts.stores.length * 4 + 2 * many] : [])));
-    this.c = new Float64Array(facts.degree + 3); // whether all roots are on the left, and it is ill-posed, behind coefficients
+    this.c = new Float64Array(2 * facts.degree + 4); // behind coefficients: whether all roots are on the left, it is ill-posed, and what changes sign with that
   }
 
   /** What a program gives. @param {string} name @param {number} many @param {Float64Array} [from] @param {number} [number] */
@@ -119,6 +122,30 @@ export class Linear {
     return c[degree + 1] === 1 ? STABLE : UNSTABLE;
   }
 
+  /**
+   * Functions of which one changes its sign wherever the status does, once that has been asked for: the logarithm of each
+   * one's size, and `SIGNED` more, with its sign.
+   * @param {number} status
+   */
+  functions(status) {
+    const { y, c, facts: { contacts: { length: many }, searched, joint, degree } } = this, found = /** @type {number[]} */ ([]);
+    if (status === UNKNOWN) return found;
+    if (joint) {
+      let left = 0; // det(1 − A), of which that with the gains A has the coefficients
+      for (let i = many; i <= 2 * many; i++) left += y[i];
+      found.push(signedLog(left));
+      for (let i = 0; i < many; i++) found.push(signedLog(left * y[i]));
+    } else if (!searched.some(Boolean)) for (let i = 0; i < many; i++) found.push(signedLog(1 - y[FORMULA * i + 1]), signedLog(y[FORMULA * i + 2]));
+    if (status === ABSENT) return found;
+    let product = 1, size = SIGNED;
+    for (let k = degree + 5; k < 2 * degree + 4; k++) {
+      product *= c[k];
+      if (Math.abs(product) > HUGE || Math.abs(product) < 1 / HUGE) [product, size] = [Math.sign(product), size + Math.log(Math.abs(product))];
+    }
+    found.push(signedLog(c[degree + 3]), signedLog(c[degree + 4]), signedLog(product, size));
+    return found;
+  }
+
   /** The whole answer at the parameters that are set. */
   assess(branch = 0) {
     const { facts, R, count } = this, status = this.status(branch);
@@ -145,6 +172,13 @@ export class Linear {
   /** Eigenvalues alone; none where there is no steady sliding. */
   roots(branch = 0) {
     return this.settle(branch) === STABLE ? roots(this.ask("coefficients", this.facts.degree + 1)) : [];
+  }
+
+  /** Whether rounding decides on the status. */
+  onEdge(branch = 0) {
+    if (this.settle(branch) !== STABLE) return false;
+    const { facts: { degree, edge } } = this, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1;
+    return !illPosed && this.edgeDecides(roots(c), this.ask("statics", 1)[0] <= edge);
   }
 
   /** Why there is no steady sliding: the contact, and the numbers that say so. */
@@ -197,6 +231,12 @@ export class Linear {
     return found[2 * many] === 1 ? { p: found.slice(0, many), q: found.slice(many, 2 * many) } : null;
   }
 
+  /** Positive factors on a parameter at which a root is on the axis, rising; null where it does not enter linearly. @param {number} place */
+  crossings(place, branch) {
+    const split = this.R[place] > 0 ? this.linearIn(place, branch) : null;
+    return split && this.cuts(split.p, split.q);
+  }
+
   /** Whether a root on the axis decides: no other grows. @param {Complex[]} found @param {boolean} neutral whether one is zero */
   edgeDecides(found, neutral) {
     const { edge } = this.facts, least = Math.min(...found.map((s) => Math.hypot(s.re, s.im)));
@@ -212,12 +252,17 @@ export class Linear {
     return { intervals, ends };
   }
 
-  /** The same by trial: between all k at which a root may cross the axis, the verdict is one. */
-  stableSet(p, q) {
+  /** All k > 0 at which a root of p + k q may be on the axis, rising. */
+  cuts(p, q) {
     const both = Float64Array.of(...p, ...q), [still, infinite, ...squares] = this.ask("edges", this.facts.squares + 2, both), cuts = [still, infinite];
     for (const { re, im } of roots(squares)) if (re > 0 && Math.abs(im) <= NEARLY_REAL * Math.hypot(re, im)) cuts.push(this.ask("onAxis", 1, both, re)[0]);
     const found = cuts.filter((k) => k > 0 && Number.isFinite(k)).sort((a, b) => a - b);
-    const apart = [0, ...found.filter((k, i) => i === 0 || k > found[i - 1] * (1 + SAME)), Infinity];
+    return found.filter((k, i) => i === 0 || k > found[i - 1] * (1 + SAME));
+  }
+
+  /** The same by trial: between all k at which a root may cross the axis, the verdict is one. */
+  stableSet(p, q) {
+    const both = Float64Array.of(...p, ...q), apart = [0, ...this.cuts(p, q), Infinity];
     const ratios = p.map((v, i) => Math.abs(v / q[i])).filter((r) => r > 0 && Number.isFinite(r)), natural = ratios.length ? Math.max(...ratios) : 1;
     const intervals = [], ends = [];
     let before = false;
@@ -238,6 +283,8 @@ const NOTHING = {
   frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false,
   observed: /** @type {Record<string, number>} */ ({}),
 };
+
+const signedLog = (value, size = SIGNED) => Math.sign(value) * (size + Math.log(Math.abs(value)));
 
 /** A root between two values of different sign: regula falsi (Illinois), then bisection while it does not narrow. */
 function bracketed(at, low, high, below) {

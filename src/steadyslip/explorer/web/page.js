@@ -8,17 +8,16 @@ import { Facts } from "./facts.js";
 import { leaving } from "./leaving.js";
 import { Chart } from "./map.js";
 import { unitFor } from "./quantities.js";
-import { Rig, inside, rangeOf, scaleOf } from "./rig.js";
+import { Rig, inside, nearestOf, rangeOf, scaleOf } from "./rig.js";
+import { changes } from "./search.js";
 import { all, choose, chosen, chosenIn } from "./view.js";
 import { kindOf } from "./words.js";
 
 /** Where the chart's axes are, on a narrow page and on a wide one: its letters stay as large as the others. */
 const NARROW = { left: 58, top: 8, width: 270, height: 250 }, WIDE = { left: 66, top: 10, width: 560, height: 400 };
 const MIDDLE = 720, WIDE_FROM = 1280; // widths of the page from which it has two columns and three
-const PARTS = 60; // of a track, at whose ends the status is asked for
 const OTHERS = 40; // values of the bar at which eigenvalues are drawn
-const SOUGHT = 30; // tenths of a decade outside a range in which a change is sought
-const ROUNDED = 1e-12; // share of a value that is zero but for rounding
+const SOUGHT = 1e3; // times beyond a range in which a change is worth to be reached
 const OPENED = { values: "values", chart: "chart", motion: "motion", numbers: "numbers" }; // parts of a narrow page, one of which is seen
 const SAID = 4000, NAMED = 4; // ms for which a word stands; parts of a link that are named
 const WORDS = { stable: "stable", unstable: "unstable", edge: "on the edge", none: "no steady sliding", unknown: "no such rig" };
@@ -29,6 +28,7 @@ export class Page {
   // furnished once the verdict is to be seen
   /** @type {[number, number][]} */ home; // ranges of the rig of the file
   /** @type {[number, number][]} */ ranges; // those of now
+  /** @type {(import("./search.js").Found & {values: number[], coarse: boolean})[]} */ found = []; // of each parameter, with what it is found for
   /** @type {{from: number, to: number, at: number, status: number}[][]} */ tracks; // position and value of each end
   /** @type {Controls} */ controls;
   /** @type {Chart} */ chart;
@@ -68,14 +68,15 @@ export class Page {
   furnish(library) {
     const { rig, root } = this, { data } = rig, values = rig.values;
     rig.values = data.parameters.map((one) => one.value);
-    this.home = data.parameters.map((_, i) => rangeOf(rig, i));
+    this.search();
+    this.home = data.parameters.map((one, i) => rangeOf(one, one.value, this.found[i].edges.map(({ at }) => at)));
     this.fit(rig.values);
-    this.tracks = data.parameters.map((_, i) => this.track(i));
     const near = this.edges().filter((edge) => !edge.far && edge.at).map((edge) => edge.i);
     if (data.phrases && near.length) [rig.bar] = near; // the parameter whose edge is nearest
     const k = Math.max(0, rig.bar), across = near.find((i) => i !== k) ?? (k === 0 ? 1 % data.parameters.length : 0);
     rig.values = values;
     this.fit(values);
+    this.trace();
     this.controls = new Controls(this);
     this.chart = new Chart(this, [across, k]);
     this.facts = new Facts(this);
@@ -178,15 +179,12 @@ export class Page {
 
   /** A range within which nothing changes is widened to the nearest change outside, if there is one within some decades. */
   seek(i) {
-    const one = this.rig.data.parameters[i], [low, high] = this.ranges[i], [{ status }] = this.tracks[i];
-    if (one.low !== null && one.high !== null) return; // it is all there is
-    for (let step = 1; step <= SOUGHT; step++) {
-      const far = 10 ** (step / 10), found = [high * far, low > 0 ? low / far : low * far].find((x) => inside(one, x) && this.rig.status(i, x) !== status);
-      if (found === undefined) continue;
-      this.reach(i, found);
-      this.tracks[i] = this.track(i);
-      return;
-    }
+    const one = this.rig.data.parameters[i], [low, high] = this.ranges[i], all = this.found[i].edges.map(({ at }) => at);
+    if ((one.low !== null && one.high !== null) || all.some((at) => at >= low && at <= high)) return; // it is all there is
+    const above = nearestOf(all.filter((at) => at > high || (at < low && at > 0)), low > 0 ? Math.sqrt(low * high) : high), far = low > 0 ? low / SOUGHT : 0;
+    const below = all.filter((at) => at < low && low < 0).at(-1);
+    if (above !== undefined && above > far && above < high * SOUGHT) this.reach(i, above);
+    else if (below !== undefined && below > low * SOUGHT) this.reach(i, below);
   }
 
   /** The slider of the stiffness reaches to the critical one, which other parameters move. */
@@ -283,22 +281,27 @@ export class Page {
 
   // -- what follows from the values
 
+  /** All edges of every parameter for the values of now; those of one parameter stay while it alone varies. */
+  search() {
+    const { rig, sliding, ranges } = this, { values } = rig;
+    rig.data.parameters.forEach((_, i) => {
+      const known = this.found[i], range = ranges?.[i], moved = known && values.some((value, j) => !(i === j && sliding) && !Object.is(value, known.values[j]));
+      if (!known || moved || (known.coarse && !sliding) || (range && (range[0] < known.low || range[1] > known.high))) this.found[i] = { ...changes(rig, i, range, sliding), values, coarse: sliding };
+    });
+  }
+
+  /** Edges, and tracks that show them. */
+  trace() {
+    this.search();
+    if (!this.sliding) this.found.forEach((_, i) => this.seek(i));
+    this.tracks = this.found.map((_, i) => this.track(i));
+  }
+
   /** Positions between 0 and 1 where a track changes, and values, with what is between. */
   track(i) {
-    const scale = this.scale(i), parts = [];
-    let low = scale.at(0), before = this.rig.status(i, low), from = 0;
-    for (let n = 1; n <= PARTS; n++) {
-      const high = scale.at(n / PARTS), next = this.rig.status(i, high);
-      if (next !== before) {
-        const narrowed = this.rig.narrowed(i, low, high), own = this.rig.data.parameters[i], zero = (own.low === null || own.low < 0) && Math.abs(narrowed) < ROUNDED * Math.max(Math.abs(own.value), own.natural);
-        const at = zero ? 0 : narrowed, to = scale.of(at);
-        parts.push({ from, to, at, status: before });
-        [from, before] = [to, next];
-      }
-      low = high;
-    }
-    parts.push({ from, to: 1, at: low, status: before });
-    return parts;
+    const scale = this.scale(i), [low, high] = [scale.at(0), scale.at(1)], { edges, status } = this.found[i], inner = edges.filter(({ at }) => at > low && at < high);
+    const first = inner[0]?.below ?? edges.filter(({ at }) => at <= low).at(-1)?.above ?? status, at = (n) => (n < inner.length ? scale.of(inner[n].at) : 1);
+    return Array.from({ length: inner.length + 1 }, (_, n) => ({ from: n ? at(n - 1) : 0, to: at(n), at: inner[n]?.at ?? high, status: n ? inner[n - 1].above : first }));
   }
 
   /** The nearest change of every parameter inside its range, the most urgent first. */
@@ -349,8 +352,7 @@ export class Page {
     this.undoButton.disabled = !this.past.length;
     this.redoButton.disabled = !this.future.length;
     if (!this.controls) return;
-    this.tracks = this.rig.data.parameters.map((_, i) => this.track(i));
-    if (!this.sliding) this.tracks.forEach((track, i) => track.length > 1 || this.seek(i));
+    this.trace();
     this.banner.follow(this.answer, this.edges()[0]);
     this.controls.show();
     this.chart.show();

@@ -66,15 +66,17 @@ export class Rig {
     return this.set(this.trial).status(this.data.branch);
   }
 
-  /** Where the status changes between two values, to rounding of the value: the first that has the other. */
-  narrowed(i, low, high) {
-    const before = this.status(i, low), least = low === 0 ? 1e-12 * high : 0;
-    for (let step = 0; step < 200 && high - low > Math.max(least, 1e-13 * Math.max(Math.abs(low), Math.abs(high))); step++) {
-      const middle = low > 0 && high > 4 * low ? Math.sqrt(low) * Math.sqrt(high) : 0.5 * (low + high);
-      if (this.status(i, middle) === before) low = middle;
-      else high = middle;
-    }
-    return high;
+  /** Whether rounding decides on the status with one value in place of the rig's own. @param {number} i @param {number} x */
+  onEdge(i, x) {
+    this.trial.set(this.values);
+    this.trial[i] = x;
+    return inside(this.data.parameters[i], x) && this.set(this.trial).onEdge(this.data.branch);
+  }
+
+  /** Values of a parameter at which a root is on the axis, rising, where they follow from a formula. @param {number} i */
+  crossings(i) {
+    const { name, low } = this.data.parameters[i], place = i === this.data.axial ? this.spring : this.data.facts.parameters.indexOf(name);
+    return low === null || low < 0 ? null : this.set(this.values).crossings(place, this.data.branch)?.map((factor) => factor * this.values[i]) ?? null;
   }
 
   /** Whether these are the values of now. @param {number[]} values */
@@ -167,25 +169,23 @@ export function scaleOf(one, low, high) {
 
 /**
  * The range that a slider has at first: its whole domain if that is bounded, else some decades, and its nearest edge.
+ * @param {Parameter} one @param {number} value @param {number[]} edges
  * @returns {[number, number]}
  */
-export function rangeOf(rig, i) {
-  const one = rig.data.parameters[i];
+export function rangeOf(one, value, edges) {
   if (one.low !== null && one.high !== null) {
     const inset = 1e-6 * (one.high - one.low);
     return [one.lowAllowed ? one.low : one.low + inset, one.highAllowed ? one.high : one.high - inset];
   }
-  const size = Math.abs(one.value) || one.natural;
-  if (one.low === null || one.low < 0) return one.value > 0 ? [-size, 4 * size] : [-4 * size, one.value < 0 ? size : 4 * size];
-  const own = rig.status(i, one.value), other = (x) => rig.status(i, x) !== own;
-  if (one.value === 0) { // the first change above zero
-    for (let step = -80; step <= 60; step++) if (other(size * 10 ** (step / 10))) return [size * 10 ** (step / 10 - 2), size * 10 ** (step / 10 + 1.5)];
-    return [size * 1e-3, size * 1e2];
-  }
-  const close = [1, 2, 3, 4, 5, 6, 7, 8].some((n) => other(size * 1.5 ** n) || other(size / 1.5 ** n));
-  for (let step = 15; step <= 60 && !close; step++) { // six decades to each side, until something changes
-    const found = [size * 10 ** (step / 10), size / 10 ** (step / 10)].filter(other);
-    if (found.length) return [Math.min(size / 30, ...found.map((x) => x / 3)), Math.max(size * 30, ...found.map((x) => x * 3))];
-  }
-  return [size / 30, size * 30];
+  const size = Math.abs(value) || one.natural, above = edges.filter((at) => at > 0);
+  if (one.low === null || one.low < 0) return value > 0 ? [-size, 4 * size] : [-4 * size, value < 0 ? size : 4 * size];
+  if (value === 0) return above.length ? [above[0] * 1e-2, above[0] * 30] : [size * 1e-3, size * 1e2];
+  const nearest = nearestOf(above, size) ?? size;
+  return [Math.min(size / 30, nearest / 3), Math.max(size * 30, nearest * 3)];
+}
+
+/** Of values above zero that which is nearest to another, by their ratio. @param {number[]} values @param {number} size */
+export function nearestOf(values, size) {
+  const far = (x) => Math.abs(Math.log(x / size));
+  return values.length ? values.reduce((a, b) => (far(b) < far(a) ? b : a)) : undefined;
 }

@@ -57,7 +57,7 @@ export function reason(answer, data) {
 }
 
 /** What is said of a machine: what becomes of disturbances, and the nearest edge. @param {any} answer @param {any} data @param {any} [edge] */
-export function machineReason(answer, { phrases, facts, areas }, edge) {
+export function machineReason(answer, { phrases, beyond, facts, areas }, edge) {
   const sentence = (text) => text[0].toUpperCase() + text.slice(1) + ".";
   if (answer.status === UNKNOWN) return "A number leaves its range, or breaks a condition that several obey together.";
   if (answer.status === ABSENT) {
@@ -70,29 +70,25 @@ export function machineReason(answer, { phrases, facts, areas }, edge) {
   }
   if (answer.illPosed) return sentence(phrases["are ill-posed"]);
   if (answer.onEdge) return sentence(phrases["on edge"]);
-  const what = answer.status === STABLE ? phrases["dies out"] : phrases[answer.eigenvalues[0].im ? "oscillatory" : "divergence"];
+  const what = answer.status === STABLE ? phrases["dies out"] : beyond[kindBeyond(answer)];
   return sentence(edge ? `${what}; ${fill(phrases.nearest, edge)}` : what);
 }
 
-/** What kind of change an edge is, by what is behind it. @param {any} answer there */
-export function kindBeyond(answer) {
-  if (answer.status === STABLE) return "stable";
+/** What kind of change an edge is, by what is behind it where that is not stable. @param {any} answer there */
+function kindBeyond(answer) {
   if (answer.status === ABSENT) return answer.searched ? "no solution" : (answer.pressing ?? answer.slope) < 1 ? "lift-off" : "lock-up";
   return answer.illPosed ? "ill-posed" : answer.eigenvalues[0]?.im ? "oscillatory" : "divergence";
 }
 
 /** "it lifts off" of a machine: which contact does. @param {string} words @param {any} answer @param {any} facts */
-export const ofContact = (words, answer, facts) =>
-  answer.status === ABSENT && facts?.contacts ? words.replace(/^it /, `${facts.contacts[answer.contact]} `) : words;
+const ofContact = (words, answer, { contacts }) => (answer.status === ABSENT && contacts[answer.contact] ? words.replace(/^it /, `${contacts[answer.contact]} `) : words);
 
-/** What happens beyond an edge; where nothing slides steadily there, why. @param {any} edge @param {any} page */
+/** What happens beyond an edge, in the words of Python; where nothing slides steadily before it, what does behind. @param {any} edge @param {any} page */
 export function beyondWords({ i, beyond, behind }, page) {
   if (beyond === STABLE) return "becomes stable";
-  if (beyond === ABSENT) {
-    const answer = page.rig.assess(page.with(i, behind));
-    return ofContact({ "lift-off": "it lifts off", "lock-up": "it locks up", "no solution": "steady sliding ceases to exist" }[kindBeyond(answer)], answer, page.rig.data.facts);
-  }
-  return page.rig.status(i, page.rig.values[i]) === ABSENT ? "slides steadily, but unstable" : "becomes unstable";
+  if (beyond !== ABSENT && page.answer.status === ABSENT) return "slides steadily, but unstable";
+  const answer = page.rig.assess(page.with(i, behind)), { beyond: words, facts } = page.rig.data;
+  return ofContact(words[kindBeyond({ ...answer, status: beyond })], answer, facts);
 }
 
 /** How many times something is something else: with as many digits as tell it from once. */

@@ -1,0 +1,118 @@
+"""Edges that a page finds: those of Python, however narrow the windows between them are, and each has its words."""
+
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from explored_edges import Edges, judged, other_edges, walked
+from steadyslip.linear.status import ABSENT, STABLE, UNSTABLE
+from steadyslip.verdict.words import BEYOND
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+NAMES = sorted(
+    str(path.relative_to(EXAMPLES).with_suffix("")) for path in (*EXAMPLES.glob("*.toml"), *EXAMPLES.glob("machines/*"))
+)
+
+
+@cache
+def page(name):
+    return Edges(ss.read_rig(EXAMPLES / f"{name}.toml"))
+
+
+def changed(name, **values):
+    """Values of the page of an example, some of which are others; dots in names are double underscores."""
+    own = {key.replace("__", "."): value for key, value in values.items()}
+    found = page(name)
+    return [own.get(key, value) for key, value in zip(found.names, found.home, strict=True)]
+
+
+def test_an_edge_that_is_pressed_hides_no_other():
+    """The rig is a thousandth beside the edge of the lining; that of the caliper, 2.3 % away, is in the list."""
+    pad = page("machines/brake-pad")
+    (edge,) = [one for one in pad(pad.home)["edges"] if pad.names[one["i"]] == "links.lining.stiffness"]
+    values = changed("machines/brake-pad", links__lining__stiffness=edge["landing"])
+    wrong, edges = other_edges(pad, values)
+    assert wrong == []
+    listed = {pad.names[one["i"]]: one["at"] / values[one["i"]] - 1 for one in edges}
+    assert listed["links.caliper.stiffness"] == pytest.approx(0.023, abs=1e-3)
+    assert listed["links.lining.stiffness"] == pytest.approx(-1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize(("name", "parameter", "other", "range_", "tenth"), [
+    ("brake-pad", "links.caliper.angle", "bodies.pad.press", (2e3, 16e3), 0.01),  # edges of two kinds meet
+    ("telescope", "contacts.bearing.radius", "contacts.bearing.friction.mu_coulomb", (5e-3, 6.5e-3), 0.1),  # of one
+])  # fmt: skip
+def test_a_window_is_found_until_it_closes(name, parameter, other, range_, tenth):
+    """As another parameter rises, down to .002 and less; it closes as two lines cross, or as a parabola ends."""
+    there = page(f"machines/{name}")
+    i, k = there.names.index(parameter), there.names.index(other)
+
+    def at(value):
+        return [value if j == k else one for j, one in enumerate(there.home)]
+
+    def windows(value):
+        edges = there.script("(rig.values = values, changes(rig, i)).edges", values=at(value), i=i)
+        return [(one["at"], two["at"]) for one, two in pairwise(edges)]
+
+    low, high = range_
+    while high - low > 1e-9 * low:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if windows(middle) else (low, middle)
+    ((begin, end),) = windows(low)
+    assert 0 < end - begin < 2e-3
+    ((wide, far),) = windows(low * (1 - 1e-3))
+    ((begin, end),) = windows(low * (1 - 1e-5))
+    assert (end - begin) / (far - wide) == pytest.approx(tenth, rel=0.25)  # the last is not seen
+    beside = 1e-2 * (end - begin)
+    rigs = [there.own(at(low * (1 - 1e-5))).with_values({parameter: x}) for x in (begin - beside, 0.5 * (begin + end))]
+    assert {judged(one)[0] for one in rigs} == {STABLE, UNSTABLE}
+
+
+@pytest.mark.parametrize("name", ["inclined-spring", "machines/telescope"])
+def test_while_a_hand_moves_a_slider_the_nearest_edges_are_those_at_rest(name):
+    """Fewer samples then tell of the same edges, to the width of a pixel."""
+    there, values = page(name), page(name).home
+    moving, resting = there(values, coarse=True)["edges"], there(values)["edges"]
+    assert [one["i"] for one in moving] == [one["i"] for one in resting]
+    assert [one["at"] for one in moving] == pytest.approx([one["at"] for one in resting], rel=1e-4)
+
+
+def test_every_kind_of_edge_has_the_words_of_python():
+    """Also where what is asked for words is not what the list says."""
+    there = page("inclined-spring")
+    words = "beyondWords({ i: 0, beyond, behind }, { rig, answer: { status: now }, with: (i, x) => rig.values })"
+    for beyond, now, allowed in (
+        (STABLE, UNSTABLE, {"becomes stable"}),
+        (UNSTABLE, STABLE, {BEYOND[kind] for kind in ("oscillatory", "divergence", "ill-posed")}),
+        (ABSENT, STABLE, {BEYOND[kind] for kind in ("lock-up", "lift-off", "no solution")}),
+        (UNSTABLE, ABSENT, {"slides steadily, but unstable"}),
+    ):
+        assert there.script(words, beyond=beyond, now=now, behind=there.home[0]) in allowed
+    kinds = {one["words"] for one in there(there.home)["edges"]}
+    assert {"it locks up", "becomes stable"} <= kinds
+
+
+def test_thin_parts_of_a_track_are_seen_and_leave_the_own_place():
+    """Widened parts stay between their neighbours, and the place of the rig keeps its colour."""
+    there, chance = page("inclined-spring"), np.random.default_rng(5)
+    for _ in range(200):
+        cuts = np.sort(np.concatenate([chance.uniform(0, 1, 2), 0.5 + chance.normal(0, 2e-3, 2)]))
+        ends = [0.0, *cuts.tolist(), 1.0]
+        parts = [{"from": a, "to": b, "status": 1 + n % 2} for n, (a, b) in enumerate(pairwise(ends))]
+        own = float(chance.choice([0.5, chance.uniform(0, 1)]))
+        seen = there.script("visible(parts, own)", parts=parts, own=own)
+        colour = [next(one["status"] for one in row if own <= one["to"]) for row in (parts, seen)]
+        assert colour[0] == colour[1]
+        assert [one["from"] for one in seen[1:]] == [one["to"] for one in seen[:-1]]
+        assert all(one["to"] >= one["from"] for one in seen)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", NAMES)
+def test_edges_of_pages_are_those_of_python(name):
+    """At values drawn at random, and beside an edge that is pressed then; `benchmarks/explorer.py` has more."""
+    assert walked(page(name), np.random.default_rng(len(name)), presses=1) == []

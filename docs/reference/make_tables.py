@@ -311,6 +311,7 @@ GROUPS = {
     "machine.machine": "Machines",
     "machine.bodies": "Bodies of machines",
     "machine.links": "Links of machines",
+    "machine.joining": "Rigid links of machines",
     "machine.surfaces": "Contacts of machines",
     "machine.servo": "Drives of machines",
     "core.errors": "Exceptions",
@@ -329,7 +330,7 @@ GROUPS = {
 ORDER = (
     *("machine.slider", "laws.friction", "laws.contact", "machine.drive", "protocol", "files.specifications"),
     "schemas",
-    *("machine.machine", "machine.bodies", "machine.links", "machine.surfaces", "machine.servo"),
+    *("machine.machine", "machine.bodies", "machine.links", "machine.joining", "machine.surfaces", "machine.servo"),
     *("verdict", "model.sliding", "linear", "model", "core.records"),
     *("core.errors", "experiments", "motion", "nonlinear", "maps"),
 )

@@ -132,6 +132,9 @@ from .machine.drive import (
     Drive as Drive,
     Steady as Steady,
 )
+from .machine.joining import (
+    joined as joined,
+)
 from .machine.links import (
     Link as Link,
     Screw as Screw,

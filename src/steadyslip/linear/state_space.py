@@ -101,8 +101,9 @@ def _require_eigenvalues(point: OperatingPoint, a: Array) -> None:
     raise NotAvailable(
         "no state matrix in double precision has the eigenvalues of this rig, which lie between "
         f"{np.min(rates, initial=np.inf):.3g} and {np.max(rates, initial=0.0):.3g} 1/s: rounding of the largest hides "
-        f"the least{which}; lower what is as good as rigid, raise masses and dampings that are as good as none, or "
-        "take eigenvalues, which tells them all"
+        f"the least{which}; write links that are as good as rigid as rigid (stiffness = 'rigid' in a file, "
+        "steadyslip.joined), raise masses and dampings that are as good as none, or take eigenvalues, which tells them "
+        "all"
     )
 
 

@@ -35,6 +35,7 @@ from steadyslip.files.specifications.lines import key_lines, line_of
 from steadyslip.files.specifications.tables import TableReader
 from steadyslip.files.specifications.toml import NotToml, Table, tables_of
 from steadyslip.machine.ends import unknown_ends
+from steadyslip.machine.joining import joined
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol
@@ -241,6 +242,14 @@ def _failed(name: str, message: str) -> RigFileError:
     return RigFileError([Problem(name, message)])
 
 
+def _rigid(links: Any) -> tuple[Any, list[str]]:
+    """Tables of links with numbers where the stiffness is ``rigid``, and the names of those links."""
+    if not isinstance(links, dict):
+        return links, []
+    names = [name for name, one in links.items() if isinstance(one, dict) and one.get("stiffness") == "rigid"]
+    return links | {name: links[name] | {"stiffness": 1.0} for name in names}, names
+
+
 class _SpecificationReader(TableReader):
     """One pass over a file's tables."""
 
@@ -262,6 +271,7 @@ class _SpecificationReader(TableReader):
         """A machine; with faulty tables, what the others say of bodies and links that do not exist is found too."""
         before = len(self.problems)
         found: dict[str, Any] = {}
+        rigid: list[str] = []
         for section in machine_sections():
             if section.family is None:
                 raise InternalError("section.family is not None")
@@ -270,11 +280,18 @@ class _SpecificationReader(TableReader):
                 self.problem(section.name, f"missing table; write [{name}] with its parameters")
             elif section.keyed:
                 raw = self.tables.get(section.name, {})
+                if section.name == "links":
+                    raw, rigid = _rigid(raw)
                 found[section.name] = self.members(Part(section.family, "", keyed=True), raw, section.name)
             else:
                 found[section.name] = self.record(section.family, self._table(section.name), f"{section.name}.")
         if len(self.problems) == before:
-            return self._built(Machine, found, "")  # type: ignore[return-value]
+            machine = self._built(Machine, found, "")
+            try:
+                return joined(machine, *rigid) if isinstance(machine, Machine) else None
+            except NotAvailable as error:
+                self.problem("links", str(error))
+                return None
         self.problems += list(unknown_ends(self.tables))
         return None
 

@@ -1,0 +1,151 @@
+"""A machine with rigid links: both ends of each become one body, so that no stiffness is too large."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from steadyslip.core.errors import NotAvailable, UnknownNameError
+from steadyslip.machine.bodies import Body, RotatingBody, SlidingBody
+from steadyslip.machine.links import Link, Screw, Shaft, Spring
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.mechanism import GROUND, LOAD_POINT
+from steadyslip.machine.surfaces import Surface
+
+_SAME = 1e-12  # relative difference of two ratios that are one but for rounding
+
+
+def joined(machine: Machine, *links: str) -> Machine:
+    """The machine with links that are rigid: the bodies at both ends of each are one body, and the link is gone.
+
+    What turns and what slides may be joined as well: a screw's inertia J is then a mass J/lead² of the table, or the
+    table's mass m an inertia m lead² of the screw; what held or rubbed on the one holds or rubs on the other.
+
+    Parameters
+    ----------
+    machine : Machine
+    *links : str
+        Names of links, such as ``"screw"`` or ``"links.screw"``.
+
+    Returns
+    -------
+    Machine
+        The body that is kept has the name of the link's first end, unless the drive acts on the second, or only the
+        second can have the other's contacts.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such link.
+    NotAvailable
+        If a link ends at the ground or the drive, an end moves away from the surface, a contact sees the force of the
+        link, or no body can take over what holds and rubs on the other.
+    """
+    for link in links:
+        name = link.removeprefix("links.")
+        if name not in machine.links:
+            raise UnknownNameError("link", link, machine.links)
+        machine = _without(machine, name)
+    return machine
+
+
+def _without(machine: Machine, name: str) -> Machine:
+    link = machine.links[name]
+    first, second = link.between
+    for end in link.between:
+        if end in (GROUND, LOAD_POINT):
+            raise NotAvailable(
+                f"links.{name} cannot be rigid: it ends at the {end}, so that {_other(link, end)!r} would not move by "
+                "itself; leave that body out, or give the link a stiffness"
+            )
+        if machine.bodies[end].lifts or "y" in link.directions():
+            raise NotAvailable(f"links.{name} cannot be rigid: it holds a body that moves away from the surface")
+    for contact, touch in machine.contacts.items():
+        if touch.loaded_by == name:
+            raise NotAvailable(f"links.{name} cannot be rigid: contacts.{contact} sees its force (loaded_by)")
+    ratio = float(link.ratio())
+    trials = [(first, second, ratio), (second, first, 1 / ratio)]
+    if machine.drive.driven() == second:
+        trials.reverse()
+    try:
+        return _merged(machine, name, *trials[0])
+    except NotAvailable as error:
+        try:
+            return _merged(machine, name, *trials[1])
+        except NotAvailable:
+            raise error from None
+
+
+def _other(link: Link, end: str) -> str:
+    return link.between[1] if link.between[0] == end else link.between[0]
+
+
+def _merged(machine: Machine, name: str, kept: str, gone: str, ratio: float) -> Machine:
+    """With one body in place of two, of which that which goes moves `ratio` times as fast as that which is kept."""
+    bodies = dict(machine.bodies)
+    bodies[kept] = _heavier(bodies[kept], bodies.pop(gone), ratio)
+    links = {}
+    for other, link in machine.links.items():
+        if other != name and set(link.between) != {kept, gone}:
+            links[other] = _tied(machine, other, link, kept, gone, ratio) if gone in link.between else link
+    contacts = {
+        n: _rubbing(machine, n, one, kept, gone, ratio) if gone in (one.body, one.against) else one
+        for n, one in machine.contacts.items()
+    }
+    drive = machine.drive
+    if drive.driven() == gone and (not _is_one(ratio) or bodies[kept].turns != machine.bodies[gone].turns):
+        raise NotAvailable(f"links.{name} cannot be rigid: the drive acts on {gone!r}; let it act on {kept!r}")
+    senses: dict[str, Any] = {
+        key: kept for key in ("body", "measured", "speed_measured") if getattr(drive, key, None) == gone
+    }
+    return replace(machine, bodies=bodies, links=links, contacts=contacts, drive=replace(drive, **senses))
+
+
+def _is_one(ratio: float) -> bool:
+    return abs(ratio - 1) <= _SAME
+
+
+def _heavier(body: Body, other: Body, ratio: float) -> Body:
+    """A body with the inertia and the constant force of another that moves so many times as fast."""
+    inertia = body.inertia_of() + ratio**2 * other.inertia_of()
+    force = body.along() + ratio * other.along()
+    if isinstance(body, RotatingBody):
+        return replace(body, inertia=inertia, torque=force)
+    return replace(body, mass=inertia, force=force) if isinstance(body, SlidingBody) else body
+
+
+def _tied(machine: Machine, name: str, link: Link, kept: str, gone: str, ratio: float) -> Link:
+    """A link to the body that goes, as one to the body that is kept."""
+    shares = dict(zip(link.between, (-float(link.ratio()), 1.0), strict=True))
+    other = _other(link, gone)
+    own, far = shares[gone] * ratio, shares[other]
+    turning: Mapping[str, bool | None] = {kept: machine.bodies[kept].turns, other: machine._turns(other)}
+
+    def values(share: float) -> dict[str, Any]:
+        stiffness = None if link.rigidity() is None else link.rigidity() * share**2
+        return {"stiffness": stiffness, "damping": link.dashpot() * share**2}
+
+    if turning[other] is None:  # the ground
+        kind = Shaft if turning[kept] else Spring
+        return kind(between=(other, kept), **values(own))
+    if turning[kept] and turning[other]:
+        return Shaft(between=(other, kept), gear=abs(far / own), **values(own))
+    if turning[kept]:
+        return Screw(between=(kept, other), lead=abs(own / far), **values(far))
+    if turning[other]:
+        return Screw(between=(other, kept), lead=abs(far / own), **values(own))
+    if not _is_one(abs(far / own)):
+        raise NotAvailable(f"links.{name} would tie two bodies that slide at unlike speeds; allowed: one that turns")
+    return Spring(between=(other, kept), **values(own))
+
+
+def _rubbing(machine: Machine, name: str, touch: Surface, kept: str, gone: str, ratio: float) -> Surface:
+    """A contact of the body that goes, as one of the body that is kept."""
+    if touch.against == gone or not machine.bodies[kept].turns:
+        if not _is_one(ratio) or machine.bodies[kept].turns != machine.bodies[gone].turns:
+            raise NotAvailable(
+                f"contacts.{name}: {kept!r} cannot rub there in place of {gone!r}, which moves otherwise"
+            )
+        return replace(touch, against=kept) if touch.against == gone else replace(touch, body=kept)
+    return replace(touch, body=kept, radius=ratio * (1.0 if touch.radius is None else touch.radius))

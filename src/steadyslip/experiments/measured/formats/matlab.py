@@ -42,8 +42,7 @@ def read(path: Path, table: str | None) -> Table:
         check_size(path, sum(math.prod(shape) for _, shape, _ in whosmat(path)))
         _check_unpacked(path)
         found = loadmat(path, squeeze_me=True, struct_as_record=True)
-        left = Left(path)
-        variables = {name: _plain(value, DEEPEST, left) for name, value in found.items() if not name.startswith("__")}
+        variables = {name: _plain(value, DEEPEST) for name, value in found.items() if not name.startswith("__")}
     except NotImplementedError:  # version 7.3
         variables = _of_version_73(path)
         if not variables:  # HDF5 of another program
@@ -70,7 +69,7 @@ def _is_inside(name: str, part: str) -> bool:
 
 
 class Left:
-    """How many members of structures and cells, and numbers, a file may still have."""
+    """How many members of structures and cells, and numbers, were read of a file of version 7.3: some, often."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.members, self.numbers = path, 0, 0
@@ -108,16 +107,15 @@ def _check_unpacked(path: Path) -> None:
             check_size(path, (size := size + len(part)) // BYTES)
 
 
-def _plain(value: Any, deep: int, left: Left) -> Any:
+def _plain(value: Any, deep: int) -> Any:
     """What SciPy read, in dictionaries and lists."""
     array = np.asarray(value)
     if not deep or array.dtype.kind not in "OV":
         return str(value) if array.dtype.kind == "U" and array.size == 1 else array
-    left.take(array.size * max(len(array.dtype.names or ()), 1))
     if not array.dtype.names:
         own = array.ravel().tolist()
-        return _plain(own[0], deep - 1, left) if array.ndim == 0 else [_plain(one, deep - 1, left) for one in own]
-    members = [{field: _plain(one[field], deep - 1, left) for field in array.dtype.names} for one in array.ravel()]
+        return _plain(own[0], deep - 1) if array.ndim == 0 else [_plain(one, deep - 1) for one in own]
+    members = [{field: _plain(one[field], deep - 1) for field in array.dtype.names} for one in array.ravel()]
     return members[0] if array.size == 1 else members
 
 

@@ -54,10 +54,10 @@ def beyond(own, mass):
     """Kind of the onset, cycles, and the kick that is too large."""
     rig = renamed(own, contact=ss.Constant(preload=5e6), mass=mass, radiation_damping=1e4, stiffness=7e9)
     onset = ss.hopf(rig)
-    cycle = ss.cycles(rig, "slider.stiffness", between=(6.9e9, 7.6e9), doublings=0)
+    cycle = ss.cycles(rig, "slider.stiffness", between=(7.3e9, 7.5e9), doublings=0)
     kick = ss.threshold(renamed(own, contact=ss.Constant(preload=5e6), mass=mass, stiffness=7.8e9), kick="velocity")
     periods = [np.array([one.period, one.peak_velocity]) for one in cycle.cycles]
-    return [np.array([onset.c1, onset.value]), *periods, np.array([kick.size])]
+    return [np.array([onset.coefficient, onset.value]), *periods, np.array([kick.size])]
 
 
 def fitted(own, mass):

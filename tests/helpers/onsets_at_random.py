@@ -93,7 +93,7 @@ def compared(seed):
     if None in found:
         return [one and one.kind for one in found], np.inf
     times = 1 / np.array([1.0, time, time])
-    c1, error = (times * [getattr(one, what) for one in found] for what in ("coefficient", "error"))
+    c1, error = (times * [getattr(one, what) for one in found] for what in ("coefficient", "coefficient_error"))
     apart = np.abs(c1 - c1[0]) - error - error[0]
     size = np.max(np.abs(c1))
     return [one.kind for one in found], float(np.max(apart) / size) if size else 0.0

@@ -293,6 +293,30 @@ def test_a_file_says_the_same_as_python():
     assert ss.rig_from_text(FILE + TABLE) == rig()  # a rig file it is still
 
 
+@pytest.mark.parametrize("written", ["contact.angle", "angle", '"contact.angle"'])
+@pytest.mark.parametrize("said", ["contact.angle", "angle"])
+def test_a_change_means_the_parameter_that_the_file_means(written, said):
+    """However either of them is shortened; of samples, and of times and targets of a protocol, alike."""
+    text = FILE + TABLE.replace("\nangle =", f"\n{written} =")
+    assert ss.map_from_text(text, changes=[f"map.over.{said}.points=5"]).shape == (5, 2, 2, 4)
+    (angle, *_) = ss.map_from_text(text, changes=[f"map.over.{said}=[0.1, 0.2]"]).axes
+    assert (angle.name, list(angle.values)) == ("contact.angle", [0.1, 0.2])
+    for change in ("map.over.pieces.1.to=['3 um/s']", "map.over.protocol.pieces.1.to=['3 um/s']"):
+        assert list(ss.map_from_text(text, changes=[change]).axes[2].values) == [3e-6]
+    for change in ("map.samples.over.a.to=0.03", "map.samples.over.friction.a.to=0.03"):
+        assert ss.map_from_text(text, changes=[change]).sampling.ranges == (("friction.a", 0.01, 0.03, "linear"),)
+
+
+def test_changes_without_effect_are_refused():
+    for change in ("map.over.angle.points=5", "map.chunk=3"):
+        with pytest.raises(ss.RigFileError, match="no effect here"):
+            ss.rig_from_text(FILE + TABLE, changes=[change])
+    with pytest.raises(ss.RigFileError, match="named twice"):
+        ss.map_from_text(FILE + TABLE.replace("[map.samples]", "[map.over.slider]\nstiffness = [1e9]\n[map.samples]"))
+    with pytest.raises(ss.RigFileError, match="unknown parameter"):
+        ss.map_from_text(FILE + TABLE, changes=["map.over.angel.points=5"])
+
+
 def test_a_rig_with_an_area_is_varied_in_its_own_units():
     text = (Path(__file__).parents[2] / "examples" / "slow-axis.toml").read_text(encoding="utf-8")
     table = """

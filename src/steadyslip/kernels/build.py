@@ -5,8 +5,9 @@ routines of a model are straight-line programs. Both go to LLVM as text. Machine
 text, or of what it is made of, of all versions that matter and of the processor, in one sealed file, written under a
 temporary name and moved into place. It is opened only if it and its folder are this user's and nobody else can write to
 them, and if its seal (`steadyslip.files.sealed`) says that it is of this very function. Anything odd about it (damaged,
-of another function, foreign owner, other version, unreadable) means that it is ignored and compiled again; a folder
-that cannot be written to means that nothing is kept. Of a folder in which nothing can be kept a warning tells, once.
+of another function, foreign owner, other version, unreadable) means that it is ignored and compiled again. It is code
+all the same: what somebody with the user's rights has changed and sealed anew is run as it is, or ends the process.
+A folder that cannot be written to means that nothing is kept; a warning tells of it, once.
 ``STEADYSLIP_CACHE`` names another folder; empty, none. With
 ``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs it all.
 """

@@ -184,8 +184,8 @@ def simulate_many(
 ) -> Ensemble:
     """Integrate many variants of a rig side by side.
 
-    Results do not depend on the number of threads or on which other runs there are; they equal those of
-    `simulate` to within its tolerance (exactly the same steps are taken).
+    Results do not depend on the number of threads or on which other runs there are. They are those of `simulate` to
+    within its tolerance; steps are chosen by the same rule, but rounded otherwise, so that a few may differ.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ _BY_UNIT = {
     "Pa s/m": "f S",
     "kg/m^2": "m",
     "rad/s": "angular_frequency critical_angular_frequency",
-    "1/s": "eigenvalue eigenvalues growth_rate growth coefficient r",
+    "1/s": "eigenvalue eigenvalues growth_rate growth coefficient coefficient_error r",
     "m^2": "area",
     "N": "normal_force friction_force force_drop pull",
 }
@@ -257,14 +257,18 @@ def _series(result: Any) -> Iterator[tuple[str, str]]:
 
 def _listed(results: Iterable[Any], area: float | None) -> str:
     many = list(results)
-    names = [name for name, _ in _public(many[0]) if any(_short(one, name, area) for one in many)]
+    every = dict.fromkeys(name for one in many for name, _ in _public(one))
+    names = [name for name in every if any(_short(one, name, area) for one in many)]
     rows = [[_short(one, name, area) for name in names] for one in many[:_ROWS]]
+    if not names or len({type(one) for one in many}) > 1:  # of several kinds, or with nothing but their kind
+        names = ["kind", *names]
+        rows = [[getattr(one, "name", type(one).__name__), *row] for one, row in zip(many, rows, strict=False)]
     more = paragraph(f"and {len(many) - _ROWS} more", "small") if len(many) > _ROWS else ""
     return table(rows, [name.replace("_", " ") for name in names], left=False) + more
 
 
 def _short(result: Any, name: str, area: float | None) -> Any:
     """A cell of a list: numbers and words only."""
-    value = getattr(result, name)
+    value = getattr(result, name, None)
     own = getattr(result, "area", None) or area
     return _cell(value, unit_of(result, name), own) if isinstance(value, bool | int | float | str) else ""

@@ -98,7 +98,7 @@ def onset_dict(onset: Onset) -> dict[str, Any]:
         "parameter": onset.along,
         "value": onset.value,
         "coefficient": _finite(onset.coefficient),
-        "coefficient_error": _finite(onset.error),
+        "coefficient_error": _finite(onset.coefficient_error),
         "normalised_coefficient": _finite(onset.normalised),
         "growth_slope": onset.growth_slope,
         "angular_frequency": onset.angular_frequency,

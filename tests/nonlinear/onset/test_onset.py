@@ -26,7 +26,7 @@ def c1(a_rig):
 def test_massless_undamped_laws_are_degenerate(law, lam):
     onset = ss.hopf(unit_rig(law, lam, 1.3 * lam))
     assert onset.kind == "degenerate"
-    assert onset.coefficient == onset.error == 0.0
+    assert onset.coefficient == onset.coefficient_error == 0.0
     assert np.isnan(onset.velocity_amplitude(0.9 * onset.value))
 
 

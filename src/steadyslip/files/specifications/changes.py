@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
 from steadyslip.core.names import resolve
-from steadyslip.core.records import FrozenRecord, Part
+from steadyslip.core.records import FrozenRecord, Named, Part, key_of
 from steadyslip.files.specifications.layout import (
     PROTOCOL,
+    Section,
     has_choice,
     is_machine,
     machine_sections,
     own_fields,
     sections,
     selector,
+    ways,
 )
 from steadyslip.files.specifications.toml import NotToml, Table, tables_of
 from steadyslip.machine.slider import Slider
 
 
-def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
-    """Write ``name=value`` into the tables, and forget on which line that value stood; returns the problems."""
+def apply(text: str, tables: Table, lines: dict[str, int], section: Section | None = None) -> list[Problem]:
+    """Write ``name=value`` into the tables, and forget on which line that value stood; returns the problems.
+
+    `section` is the further table that the name is in.
+    """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
         return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = full_name(name, tables)
     if problems:  # written into the tables it would be a fault of theirs, too
         return problems
-    *path, last = full.split(".")
+    *path, last = full.split(".") if section is None else _keys_to(full, section, tables)
     table: Any = tables
     for step in path:
         if isinstance(table, list):
@@ -45,9 +51,39 @@ def apply(text: str, tables: Table, lines: dict[str, int]) -> list[Problem]:
         table[last] = value_of(raw, name)
     except ParameterError as error:
         return list(error.problems)
-    for key in [key for key in lines if key == full]:  # the fault is no longer on that line
-        del lines[key]
+    lines.pop(".".join([*path, last]), None)  # the fault is no longer on that line
     return []
+
+
+def _keys_to(full: str, section: Section, tables: Table) -> list[str]:
+    """The keys on the way to a value of a further table.
+
+    Where parameters by dotted name stand in it, these are the keys that the file has for the same parameter, however
+    either of them is shortened.
+    """
+    keys, family = full.split("."), section.family
+    inner = tables.get(section.name)
+    for count, key in enumerate(keys[1:], start=2):
+        roles = {key_of(item): role for item, role in own_fields(family)} if family is not None else {}
+        role, inner = roles.get(key), inner.get(key) if isinstance(inner, dict) else None
+        if isinstance(role, Named) and isinstance(inner, dict):
+            own = [key_of(item) for item, _ in own_fields(role.family)]
+            known = dict.fromkeys(_known_names(tables))
+            is_whole = keys[-1] not in own or _resolved(".".join(keys[count:]), known) in known
+            last = [] if is_whole else keys[-1:]
+            name = ".".join(keys[count : len(keys) - len(last)])
+            same = (way for way, _ in ways(inner, own) if _resolved(".".join(way), known) == _resolved(name, known))
+            return [*keys[:count], *next(same, (name,)), *last]
+        family = role.family if isinstance(role, Part) and not role.many else None
+    return keys
+
+
+def _resolved(name: str, known: Mapping[str, Any]) -> str:
+    """The full name, or the name itself where there is none."""
+    try:
+        return resolve(name, known)
+    except UnknownNameError:
+        return name
 
 
 def split(text: str) -> tuple[str, str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import Field, dataclass, fields
 from importlib.metadata import entry_points
 from typing import Any
@@ -105,3 +105,19 @@ def own_fields(law: type[FrozenRecord]) -> Iterator[tuple[Field[Any], Declared]]
         if law is Slider and isinstance(role, Part):
             continue
         yield item, role
+
+
+def ways(table: Table, keys: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The keys to every value of a table by dotted names, where dots without quotes have made tables of parts of names.
+
+    A table that has one value under one of the `keys` is a value.
+    """
+    for key, value in table.items():
+        if (
+            isinstance(value, dict)
+            and value
+            and not any(k in keys and not isinstance(v, (dict, list)) for k, v in value.items())
+        ):
+            yield from (((key, *way), one) for way, one in ways(value, keys))
+        else:
+            yield (key,), value

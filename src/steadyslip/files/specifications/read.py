@@ -209,11 +209,14 @@ def read_tables(
 ) -> Specification:  # fmt: skip
     """The same of tables, with the lines on which their keys stand."""
     reader = _SpecificationReader(tables)
-    names = [section.name for section in further]
+    names = {section.name: section for section in further}
     every = [changes] if isinstance(changes, str) else list(changes)
-    own = [change for change in every if split(change)[0].partition(".")[0] in names]
-    for change in own:
-        reader.problems += apply(change, tables, lines)
+    own = {change: first for change in every if (first := split(change)[0].partition(".")[0]) in {*names, MAP}}
+    for change, first in own.items():
+        if first in names:
+            reader.problems += apply(change, tables, lines, names[first])
+        else:
+            reader.problem(split(change)[0], f"has no effect here: the table [{MAP}] is read by what computes maps")
     if complete is not None:
         complete(tables)
     changed = set()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import Field, fields, replace
 from typing import Any
@@ -15,7 +15,7 @@ from steadyslip.core.members import Members
 from steadyslip.core.names import unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
-from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector
+from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector, ways
 from steadyslip.files.specifications.toml import Table
 from steadyslip.machine.doing import TURNING, turns_on
 from steadyslip.machine.machine import Machine
@@ -239,8 +239,11 @@ class TableReader:
             return None
         keys = [key_of(item) for item, _ in own_fields(role.family)]
         found: dict[str, Any] = {}
-        for inner, value in flat(raw, keys).items():
-            if isinstance(value, dict):
+        for way, value in ways(raw, keys):
+            inner = ".".join(way)
+            if inner in found:
+                self.problem(f"{name}.{inner}", "is named twice; name it once")
+            elif isinstance(value, dict):
                 one = self.record(role.family, value, f"{name}.{inner}.")
                 if one is not None:
                     found[inner] = one
@@ -252,31 +255,6 @@ class TableReader:
                     f"{name}.{inner}", f"got {came(value)}; allowed: {listed}{{{' = ..., '.join(keys)} = ...}}"
                 )
         return found
-
-
-def flat(table: Table, keys: Sequence[str]) -> dict[str, Any]:
-    """Dotted names and their values, where unquoted dots have made tables of parts of names.
-
-    A table that has one of the `keys` is a value. A name that was changed in full joins the shorter one of the file.
-    """
-    found: dict[str, Any] = {}
-
-    def walk(prefix: str, inner: Table) -> None:
-        for key, value in inner.items():
-            full = f"{prefix}{key}"
-            is_value = not isinstance(value, dict) or not value
-            if is_value or any(k in keys and not isinstance(v, dict) for k, v in value.items()):
-                both = isinstance(value, dict) and isinstance(found.get(full), dict)
-                found[full] = found[full] | value if both else value
-            else:
-                walk(f"{full}.", value)
-
-    walk("", table)
-    for name in [n for n in found if "." in n]:
-        short = next((n for n in found if n != name and name.endswith(f".{n}")), None)
-        if short is not None and isinstance(found[name], dict) and isinstance(found[short], dict):
-            found[short] = found[short] | found.pop(name)
-    return found
 
 
 def _from_short(family: type[FrozenRecord], raw: Any) -> Table | None:

@@ -56,11 +56,11 @@ class Onset(Displayed):
     unit : str
     kind : str
         ``supercritical``, ``subcritical``, ``degenerate`` (`coefficient` vanishes in exact arithmetic) or ``not
-        decided`` (it is below its `error`).
+        decided`` (it is below `coefficient_error`).
     coefficient : float
         c1, growth rate of amplitude per squared amplitude of ln v, 1/s; of a machine that at `contact`. NaN beyond
         floating point.
-    error : float
+    coefficient_error : float
         By how much rounding may have changed it, that of the rig's own numbers included, 1/s.
     share : float
         |c1| as a share of the terms that it is the sum of.
@@ -84,7 +84,7 @@ class Onset(Displayed):
     unit: str
     kind: str
     coefficient: float
-    error: float
+    coefficient_error: float
     share: float
     angular_frequency: float
     growth_slope: float
@@ -152,7 +152,7 @@ class Onset(Displayed):
 
     def _within(self) -> str:
         """The error of the coefficient in words, where it matters."""
-        return f" ± {self.error / self.angular_frequency:.2g}" if self.kind == UNDECIDED else ""
+        return f" ± {self.coefficient_error / self.angular_frequency:.2g}" if self.kind == UNDECIDED else ""
 
 
 MEANINGS = {
@@ -229,7 +229,7 @@ def onset_at(rig: Slider | Machine, edge: Boundary, branch: int = 0) -> Onset:
         unit=edge.unit,
         kind=str(kind[0]),
         coefficient=float(found.c1[0]),
-        error=float(found.error[0]),
+        coefficient_error=float(found.error[0]),
         share=float(found.share[0]),
         angular_frequency=edge.angular_frequency,
         growth_slope=_growth_slope(rig, name, edge, branch),

@@ -1,0 +1,116 @@
+"""Every public kind of result is asked for its HTML, as notebooks ask."""
+
+import dataclasses
+import functools
+import inspect
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lab_records as lab
+import steadyslip as ss
+from dimensionless import A, unit_rig
+from machines import two_mass
+from rigs_of_theory import V0, rate_state, rig
+from steadyslip.core.records import FrozenRecord
+
+RIG = rig(friction=rate_state(evolution=ss.Aging()), radiation_damping=1e5, stiffness=6e9)
+FIRM = RIG.with_values({"stiffness": 5e10})
+OVER, FREE = {"stiffness": ss.Grid(1e9, 5e10, 3)}, ("a", "b", "d_c")
+TRAJECTORIES = {"KickMargin", "Threshold"}  # whose kinds need many of them
+QUICK = {
+    "Analysis": lambda: ss.analyze(RIG), "SteadySliding": lambda: made("Analysis").steady,
+    "Margin": lambda: made("Analysis").margins[0], "Onset": lambda: made("Analysis").onset,
+    "Boundary": lambda: made("Margin").edge, "Response": lambda: ss.small_signal(RIG),
+    "Model": lambda: ss.build_model(RIG), "Tolerated": lambda: ss.tolerate(FIRM, {"stiffness": "5 %"}),
+    "MachineAnalysis": lambda: ss.analyze(two_mass()), "SteadyMachine": lambda: made("MachineAnalysis").steady,
+    "Mode": lambda: made("MachineAnalysis").mode, "SteadyContact": lambda: made("SteadyMachine").contacts["guide"],
+    "Map": lambda: ss.Map(RIG, OVER, samples=made("Samples")), "Grid": lambda: OVER["stiffness"],
+    "Samples": lambda: ss.Samples({"friction.a": (0.01, 0.02)}, 2), "Explorer": lambda: ss.explore(RIG),
+}  # fmt: skip
+LONG = {
+    "Report": lambda: ss.report(RIG, explorer=False), "MapResult": lambda: with_map(lambda found: found),
+    "Refined": lambda: with_map(lambda found: ss.refine(found, rounds=1, progress=False)),
+    "Sensitivity": lambda: ss.sensitivity(FIRM, {"stiffness": (1e9, 2e9), "friction.a": (0.01, 0.012)},
+                                          "growth_rate", points=64, progress=False),
+    "HopfCurve": lambda: ss.hopf_curve(unit_rig("aging", 0.5, 0.6, mass=0.05), "mass",
+                                       between={"mass": (0.01 * A, 0.2 * A)}),
+    "SpecialPoint": lambda: made("HopfCurve").special[0],
+    "History": lambda: ss.simulate(RIG, ss.VelocityStep(at=1.0, to=2 * V0), until=60.0),
+    "Event": lambda: made("History").events[0], "SlipEvent": lambda: made("History").slip_events[0],
+    "Ensemble": lambda: ss.simulate_many(RIG, {"stiffness": np.array([6e9, 5e10])}, until=2.0, progress=False),
+    "CycleBranch": lambda: ss.cycles(two_mass(), "drive.kp", between=(2.0, 10.0)),
+    "Cycle": lambda: made("CycleBranch").cycles[0],
+    "SpecialCycle": lambda: ss.SpecialCycle("fold", made("Cycle"), (2.0, 2.1), 1e-6),
+    "Basin": lambda: ss.basin(FIRM, [0.0, 1e-6], [V0, 2 * V0], progress=False),
+    "FrequencyResponse": lambda: ss.response(FIRM, [1.0, 2.0]),
+    "Record": lambda: lab.record(lab.rig(), lab.STEP, seed=1),
+    "Fit": lambda: ss.fit(lab.rig(), made("Record"), free=FREE), "Estimate": lambda: made("Fit")["a"],
+    "Draws": lambda: ss.normal_draws(made("Fit"), 50), "Prediction": lambda: ss.predict(lab.rig(), made("Draws")),
+    "Profile": lambda: ss.profile(made("Fit"), "friction.a"), "Precision": lambda: ss.precision(lab.rig(), lab.STEP),
+    "CrossValidation": lambda: ss.cross_validate(made("Fit"), folds=2),
+    "LawComparison": lambda: ss.compare_laws(lab.rig(), made("Record"), ("slip", "aging")),
+    "Population": lambda: ss.population({f"b{b}": fitted(b) for b in (0.014, 0.0145, 0.015)}, count=200),
+    "Spec": lambda: ss.read_spec(Path("examples/fits/basalt.toml")),
+}  # fmt: skip
+
+
+@functools.cache
+def made(name):
+    return (QUICK | LONG)[name]()
+
+
+def fitted(b):
+    return ss.fit(lab.rig(b=b), lab.record(lab.rig(b=b), lab.STEP, seed=round(1e5 * b)), free=FREE)
+
+
+def with_map(use):
+    """Of a small map, whose folder goes."""
+    with tempfile.TemporaryDirectory() as folder:
+        found = ss.run_map(ss.Map(RIG, OVER, ["status", "onset"]), Path(folder) / "map.zarr", progress=False)
+        result = use(found)
+        result._repr_html_()
+        return result
+
+
+def shows_itself(name):
+    found = made(name)
+    assert type(found).__name__ == name
+    if name != "MapResult":  # whose folder is gone; it was asked
+        assert len(found._repr_html_()) > 100
+
+
+def test_no_kind_of_result_is_left_out():
+    every = [one for one in (getattr(ss, name) for name in dir(ss)) if inspect.isclass(one)]
+    results = {
+        one.__name__ for one in every
+        if not issubclass(one, (Exception, FrozenRecord))
+        and (dataclasses.is_dataclass(one) or hasattr(one, "_repr_html_"))
+    }  # fmt: skip
+    of_machines = {"ContactEvent", "ContactSlip"}  # the same with the name of a contact
+    assert results - {"Motion"} == QUICK.keys() | LONG.keys() | TRAJECTORIES | of_machines
+
+
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize("name", QUICK)
+def test_results_show_themselves(name):
+    shows_itself(name)
+
+
+@pytest.mark.campaign
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize("name", LONG)
+def test_results_that_take_long_show_themselves(name):
+    shows_itself(name)
+
+
+@pytest.mark.parametrize(
+    "compute", [None, ["status"], ["status", "growth_rate"], ["growth_rate", ss.Edge(along="drive.kp")]]
+)
+def test_a_map_shows_what_it_computes(compute):
+    """Measures of one kind or several, with options or without."""
+    shown = ss.Map(two_mass(), {"drive.kp": [1.0, 2.0]}, compute)._repr_html_()
+    for one in compute or ["status"]:
+        assert getattr(one, "name", one).replace("_", "") in shown.replace("_", "").replace("<wbr>", "")

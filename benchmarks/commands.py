@@ -22,6 +22,8 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+from quick import QUICK, parsed
+
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 MEMORY = 6 * 2**30  # of addresses: numba and LLVM map some gigabytes that they never touch
@@ -88,11 +90,11 @@ def of_combinations(count: int | None, seed: int, folder: Path) -> Iterator[tupl
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("examples", "combinations"))
+    parser.add_argument("what", choices=("examples", "combinations"), nargs="?" if QUICK else None)
     parser.add_argument("--count", type=int, default=None)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--limit", type=float, default=60.0, help="processor time of one command, s")
-    given = parser.parse_args()
+    given = parsed(parser, what="combinations", count=2)
     table: dict[tuple[str, str], list[float]] = defaultdict(list)
     start, peak = time.perf_counter(), 0.0
     with tempfile.TemporaryDirectory() as folder:

@@ -19,6 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+from quick import parsed
 
 import steadyslip as ss
 
@@ -152,7 +153,7 @@ def main() -> None:
     parser.add_argument("--truths", type=Path)
     parser.add_argument("--only", default="")
     parser.add_argument("--simulate", action="store_true", help="simulate only")
-    asked = parser.parse_args()
+    asked = parsed(parser, only="3")
     truths = json.loads(asked.truths.read_text()) if asked.truths and asked.truths.exists() else {}
     which = [int(i) for i in asked.only.split(",")] if asked.only else range(32 if asked.aging else asked.rigs)
     count = dict.fromkeys(("right", "wrong", "broke off", "undecided"), 0)

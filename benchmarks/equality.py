@@ -21,6 +21,8 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
+from quick import parsed
+
 import steadyslip as ss
 from fuzz_rigs import DRIVES, FRICTION, PROTOCOLS, _rig
 from rigs_of_theory import CONTACTS
@@ -81,7 +83,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--lanes", type=int, default=96)
-    given = parser.parse_args()
+    given = parsed(parser, count=2, lanes=16)
     start, wrong, done, refused = time.process_time(), 0, 0, 0
     for i in range(given.count):
         try:

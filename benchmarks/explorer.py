@@ -40,6 +40,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
+from quick import QUICK, parsed
+
 import steadyslip as ss
 import users_laws
 from explored import Explored, ExploredMachine, MovedOnAPage, compared, differences, same_motion
@@ -312,9 +314,10 @@ def _twenty_cycles() -> float:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("verdicts", "motion", "machines", "edges", "speeds"))
+    kinds_of = ("verdicts", "motion", "machines", "edges", "speeds")
+    parser.add_argument("what", choices=kinds_of, nargs="?" if QUICK else None)
     parser.add_argument("--first", type=int, default=10**6, help="kinds of rig, of those drawn first")
-    given = parser.parse_args()
+    given = parsed(parser, what="verdicts", first=1)
     began = time.process_time()
     {"verdicts": verdicts, "motion": motion, "machines": machines, "edges": edges, "speeds": speeds}[given.what](
         given.first

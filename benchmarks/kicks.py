@@ -22,6 +22,7 @@ from itertools import count as numbers
 from pathlib import Path
 
 import numpy as np
+from quick import parsed
 
 import steadyslip as ss
 
@@ -175,7 +176,7 @@ def main() -> None:
     parser.add_argument("--only", default=",".join(KINDS))
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--truths", type=Path)
-    options = parser.parse_args()
+    options = parsed(parser, kicks=1, thresholds=0, basins=0)
     cases = Cases(options.seed, tuple(options.only.split(",")), options.truths)
     for part, count in ((kicks, options.kicks), (thresholds, options.thresholds), (basins, options.basins)):
         if count:

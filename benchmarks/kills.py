@@ -22,6 +22,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
+from quick import parsed
+
 import map_under_attack as attack
 import steadyslip as ss
 
@@ -88,7 +90,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=44, help="kills")
     parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
+    given = parsed(parser, count=1)
     begun, kills, trials, wrong = time.monotonic(), 0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)

@@ -10,18 +10,19 @@ Prints ratios measured side by side in this run, and rigs per second on one core
 
 from __future__ import annotations
 
+import argparse
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from quick import QUICK, parsed
 
 import steadyslip as ss
 from steadyslip.linear.state_space import jacobian
@@ -121,7 +122,7 @@ def general_route(count: int) -> None:
         # a gain of zero beside the closed form's own case still has to go the general way
         spectrum = min(seconds(lambda r=rig: ss.eigenvalues(r, vary)) for _ in range(5))
         sets = min(seconds(lambda r=rig: general_sets(r, vary)) for _ in range(5))
-        few = 200
+        few = min(200, count)
         rigs = [rig.with_values({k: float(v[i]) for k, v in vary.items()}) for i in range(few)]
         loop = min(seconds(lambda r=rigs: [np.linalg.eigvals(jacobian(one)) for one in r]) for _ in range(3)) / few
         both = (spectrum + sets) / count
@@ -139,6 +140,8 @@ def general_sets(rig: ss.Slider, vary: dict[str, Any]) -> Any:
 
 
 if __name__ == "__main__":
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+    chosen = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    chosen.add_argument("rigs", nargs="?", type=int, default=1_000_000)
+    number = parsed(chosen, rigs=1000).rigs
     closed_form(number)
-    general_route(max(number // 50, 1000))
+    general_route(max(number // 50, 50 if QUICK else 1000))

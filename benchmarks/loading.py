@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import tempfile
 import time as clock
 from collections import Counter
 from dataclasses import dataclass, field
@@ -21,6 +22,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from quick import QUICK, parsed
 from scipy.integrate import solve_ivp
 
 import steadyslip as ss
@@ -201,7 +203,7 @@ def table(path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path, help="of replicates, one a line; it is added to")
+    parser.add_argument("file", type=Path, nargs="?" if QUICK else None, help="of replicates; it is added to")
     parser.add_argument("--replicates", type=int, default=200, help="up to so many a cell, counting those in the file")
     parser.add_argument("--minutes", type=float, default=np.inf, help="end after so long")
     parser.add_argument("--designs", default=",".join(DESIGNS))
@@ -210,7 +212,13 @@ def main() -> None:
     parser.add_argument("--slips", default="3,0")
     parser.add_argument("--stress-noise", default="0.0005,0", help="as a share")
     parser.add_argument("--seed", type=int, default=1)
-    chosen = parser.parse_args()
+    few = {"replicates": 1, "noise": "0", "glitches": "0", "slips": "0", "stress_noise": "0"}
+    with tempfile.TemporaryDirectory() as folder:
+        replicates(parsed(parser, file=Path(folder) / "replicates.csv", designs=next(iter(DESIGNS)), **few))
+
+
+def replicates(chosen: argparse.Namespace) -> None:
+    """Add to the file what is missing of the replicates, and print the table."""
     end = clock.monotonic() + 60 * chosen.minutes
     lists = [[float(x) for x in text.split(",")]
              for text in (chosen.noise, chosen.glitches, chosen.slips, chosen.stress_noise)]  # fmt: skip

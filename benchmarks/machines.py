@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "helpers"))
 
 import numpy as np
+from quick import parsed
 
 import steadyslip as ss
 from delays import some, spectral, winding
@@ -150,7 +151,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=50)
     parser.add_argument("--first", type=int, default=0)
-    chosen = parser.parse_args()
+    chosen = parsed(parser, count=1)
     times()
     campaign(chosen.count, chosen.first)
     onsets(chosen.count, chosen.first)

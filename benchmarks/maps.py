@@ -7,7 +7,7 @@
 3. Two workers next to one, for both, from the first chunk to the last and with the start of the processes.
 4. The same map of 1e7 points on a local Dask cluster next to plain workers, likewise.
 
-``--quick`` does a tenth of each. Peak memory needs psutil.
+``--quick`` does a thousandth of each, once. Peak memory needs psutil.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import statistics
-import sys
 import tempfile
 import threading
 import time
@@ -26,12 +25,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from quick import QUICK
 
 import steadyslip as ss
-from steadyslip.maps import cluster, local
+from steadyslip.maps.work import cluster, local
 
-QUICK = "--quick" in sys.argv
-PART = 10 if QUICK else 1
+TIMES = 1 if QUICK else 3
+PART = 1000 if QUICK else 1
 RIG = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 
 
@@ -86,8 +86,8 @@ class ChunkTimes:
 
     @property
     def rate(self) -> float:
-        """Points a second after the first chunk."""
-        return self.counted / (self.last - self.first)
+        """Points a second after the first chunk; NaN if that was the only one."""
+        return self.counted / (self.last - self.first) if self.counted else float("nan")
 
 
 def run(plan: ss.Map, **options: Any) -> tuple[float, ChunkTimes]:
@@ -144,7 +144,7 @@ def simulated_rate(plan: ss.Map, runs: int) -> float:
     options: dict[str, Any] = {"until": 800.0, "observables": (), "progress": False}
     ss.simulate_many(plan.rig, {n: a[:64] for n, a in vary.items()}, plan.protocol, **options)  # compiled and warm
     times = []
-    for _ in range(3):
+    for _ in range(TIMES):
         begin = time.perf_counter()
         ss.simulate_many(plan.rig, vary, plan.protocol, **options)
         times.append(time.perf_counter() - begin)
@@ -173,7 +173,7 @@ def main() -> None:
               f"{times.rate * one / plan.size:.2f} x once they run")  # fmt: skip
 
     plan = stability(10**7 // PART)
-    pairs = [(run(plan, workers=2), run(plan, cluster="local", workers=2)) for _ in range(3)]
+    pairs = [(run(plan, workers=2), run(plan, cluster="local", workers=2)) for _ in range(TIMES)]
     whole = statistics.median(dask[0] / plain[0] for plain, dask in pairs)
     busy = statistics.median(plain[1].rate / dask[1].rate for plain, dask in pairs)
     print(f"Dask, {plan.size:.3g} points: {whole:.2f} x plain workers in all "

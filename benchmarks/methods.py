@@ -1,6 +1,6 @@
 """Which explicit pair needs less time for a given error? Tsit5 (order 5) beside DOP853 (order 8).
 
-    python benchmarks/methods.py [lanes]
+    python benchmarks/methods.py [--quick]
 
 Prints end error and CPU time per trajectory over tolerances, for one lane and for a row of lanes, on the massless
 problems of `problems.py`. `steadyslip.motion.jobs.TIGHT` is the tolerance from which order 8 is chosen.
@@ -12,11 +12,12 @@ import time
 
 import numpy as np
 from problems import Problem, problems
+from quick import QUICK
 
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.jobs import Options, prepare
 
-TOLERANCES = [10.0**-k for k in range(4, 12)]
+TOLERANCES = [10.0**-k for k in ((4, 8) if QUICK else range(4, 12))]
 
 
 def measured(
@@ -38,8 +39,8 @@ def measured(
 
 
 def main() -> None:
-    for problem in problems(2048)[:2]:
-        for lanes, count, repeat in ((1, 1, 20), (LANES, 2048 if problem.until < 300 else 480, 3)):
+    for problem in problems(2048)[: 1 if QUICK else 2]:
+        for lanes, count, repeat in ((1, 1, 20), (LANES, 2048 if problem.until < 300 else 480, 1 if QUICK else 3)):
             reference, _ = measured(problem, count, "dop853", 1e-13, lanes, 1)
             for method in ("tsit5", "dop853"):
                 for rtol in TOLERANCES:

@@ -31,6 +31,7 @@ import rivals
 from jump import jump
 from numba import njit
 from problems import Problem, problems
+from quick import QUICK
 
 import steadyslip as ss
 from steadyslip.kernels import linking
@@ -44,7 +45,7 @@ from steadyslip.motion.jobs import Options, prepare
 if "--wide" in sys.argv:
     linking.FEATURES.append("-prefer-256-bit")
 TARGET = 1e-6
-QUICK = "--quick" in sys.argv
+MANY = 1000 if QUICK else 100_000
 Curve = list[tuple[float, float]]  # (error, seconds per trajectory)
 
 
@@ -111,7 +112,7 @@ def at_target(curve: Curve) -> float:
 def compare(problem: Problem, kind: str) -> dict[str, Curve]:
     """All curves of one problem: single runs or ensembles."""
     single = kind == "single"
-    count = 1 if single else (4096 if QUICK else 16384)
+    count = 1 if single else (256 if QUICK else 16384)
     variants = problem.variants[:count]
     ours = ours_single if single else ours_ensemble
     reference, _ = ours(problem, 1e-12, variants)
@@ -151,7 +152,7 @@ def bare_rate(problem: Problem) -> tuple[float, float]:
         bare.program.store(place, bare.program.load(place) + 1e-12 * rate)
     address = machine_code([bare.program], LANES)["step"]
     work, scratch = np.full(kernel.layout.rows * LANES, 0.01), np.zeros(8)
-    rounds, best = 20_000, np.inf
+    rounds, best = 200 if QUICK else 20_000, np.inf
     for _ in range(7):
         begin = time.process_time()
         repeated(address, work, scratch, rounds)
@@ -205,28 +206,28 @@ def draw(everything: dict[str, dict[str, Curve]]) -> None:
 
 def main() -> None:
     everything: dict[str, dict[str, Curve]] = {}
-    for problem in problems():
+    for problem in problems()[: 1 if QUICK else None]:
         for kind in ("single", "ensemble"):
             title = f"{problem.name}, {kind}"
             everything[title] = compare(problem, kind)
             report(title, everything[title])
     print("\nright-hand sides, ns each: bare vector loop, ensemble kernel with rejected steps, ratio")
-    for problem in problems(2048)[:2]:
+    for problem in problems(2048)[: 1 if QUICK else 2]:
         bare, used = bare_rate(problem)
         print(f"  {problem.name:<28} {bare:6.2f} {used:6.2f}   {used / bare:5.2f} x")
-    spiral = problems(100_000)[0]
+    spiral = problems(MANY)[0]
     wall = time.perf_counter
     for events in (False, True):
         times = [min(_ensemble(spiral, events, n, wall) for _ in range(3)) for n in (1, 2)]
-        print(f"\n100 000 spirals{', with events' if events else ''}: one core {times[0]:.2f} s, "
+        print(f"\n{MANY} spirals{', with events' if events else ''}: one core {times[0]:.2f} s, "
               f"two {times[1]:.2f} s, {times[0] / times[1]:.2f} x")  # fmt: skip
-    for problem in problems(4096)[:3]:
+    for problem in problems(4096)[: 1 if QUICK else 3]:
         without, watched = (min(_ensemble(problem, events) for _ in range(3)) for events in (False, True))
         print(f"{problem.name}: with events {watched / without:.2f} x")
-    print(f"a million spirals on all cores: {_ensemble(problems(1_000_000)[0], False, None, wall):.1f} s")
+    print(f"{10 * MANY} spirals on all cores: {_ensemble(problems(10 * MANY)[0], False, None, wall):.1f} s")
     rig, kick = spiral.rig(), spiral.start
-    whole = min(_timed(lambda: ss.simulate(rig, until=200.0, initial=kick)) for _ in range(100))
-    kernel = min(ours_single(spiral, 1e-7, spiral.variants)[1] for _ in range(100))
+    whole = min(_timed(lambda: ss.simulate(rig, until=200.0, initial=kick)) for _ in range(3 if QUICK else 100))
+    kernel = min(ours_single(spiral, 1e-7, spiral.variants)[1] for _ in range(3 if QUICK else 100))
     print(f"simulate with events and result {whole * 1e3:.2f} ms, kernel alone {kernel * 1e3:.3f} ms")
     draw(everything)
 

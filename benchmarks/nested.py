@@ -13,6 +13,7 @@ import time
 
 import numpy as np
 from fits import KINDS, random_case, record_of
+from quick import parsed
 
 import steadyslip as ss
 
@@ -23,7 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
-    chosen = parser.parse_args()
+    chosen = parsed(parser, records=1)
     rng = np.random.default_rng(chosen.seed)
     pairs = worse = done = 0
     while done < chosen.records:

@@ -11,6 +11,7 @@ import argparse
 import time
 
 import numpy as np
+from quick import QUICK, parsed
 
 from steadyslip.experiments.numerics.pooling import Told, pooled
 
@@ -36,10 +37,10 @@ def trial(rng: np.random.Generator, count: int, spread: np.ndarray, seed: int) -
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=200)
-    trials = parser.parse_args().trials
+    trials = parsed(parser, trials=1).trials
     print("experiments  spread of errors   mean  spread  member  another   CPU s each")
-    for count in (3, 4, 6, 10):
-        for spread in (0.02, 0.1, 0.4):
+    for count in (3,) if QUICK else (3, 4, 6, 10):
+        for spread in (0.1,) if QUICK else (0.02, 0.1, 0.4):
             begin = time.process_time()
             hits = [trial(np.random.default_rng([count, int(1e3 * spread), i]), count, np.array([spread, 0.05]), i)
                     for i in range(trials)]  # fmt: skip

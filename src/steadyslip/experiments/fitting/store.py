@@ -17,7 +17,7 @@ from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.refit import Ramped
 from steadyslip.experiments.loading.loading import Change, Course, Loading
-from steadyslip.experiments.loading.pressing import Spans
+from steadyslip.experiments.loading.pressing import JoinedCurves
 from steadyslip.experiments.measured.columns import ROLES
 from steadyslip.experiments.measured.record import Record, whole_record
 from steadyslip.experiments.numerics.noise import Noise
@@ -196,7 +196,7 @@ def _course(course: Course) -> list[Any]:
 
 
 def _curves(curve: Any) -> list[Any]:
-    if isinstance(curve, Spans):
+    if isinstance(curve, JoinedCurves):
         return [[[first, last], *own.parts()] for first, last, own in curve.spans]
     return [] if curve is None else [[[], *curve.parts()]]
 
@@ -217,7 +217,7 @@ def _channel(one: list[Any]) -> Course:
     own = [(ends, Smooth.from_parts(*parts)) for ends, *parts in curves]
     curve: Any = None
     if own:
-        curve = Spans([(*ends, smooth) for ends, smooth in own]) if own[0][0] else own[0][1]
+        curve = JoinedCurves([(*ends, smooth) for ends, smooth in own]) if own[0][0] else own[0][1]
     return Course(first, tuple(Change(*change) for change in changes), np.array(errors), curve, *rest)
 
 

@@ -42,7 +42,7 @@ def stress_course(time: Array, normal: Array) -> Course:
     noise = level_noise(normal)
     if (wave := oscillation(time, normal)) is not None:
         level, knots = float(np.mean(normal)), int(PER_PERIOD * (time[-1] - time[0]) / wave.period)
-        return Course(level, curve=Spans([_span(time, normal, level, noise, knots)]))
+        return Course(level, curve=JoinedCurves([_span(time, normal, level, noise, knots)]))
     if len(time) < 2 * FEWEST:
         return Course(float(np.mean(normal)), strays=noise)
     places = _transitions(time, normal, split(time, normal, noise, linear=False))
@@ -60,7 +60,7 @@ def stress_course(time: Array, normal: Array) -> Course:
             curves.append(_span(time[span], normal[span], level, noise, SLOW))
     errors = np.array([noise / np.sqrt(span.stop - span.start) for span in spans])
     errors[noise <= 2e-7 * abs(levels[0])] = 0.0
-    return Course(levels[0], changes, errors, Spans(curves) if curves else None, noise)
+    return Course(levels[0], changes, errors, JoinedCurves(curves) if curves else None, noise)
 
 
 def _alone(normal: Array) -> int:
@@ -182,7 +182,7 @@ def _span(time: Array, normal: Array, level: float, noise: float, knots: int) ->
     return float(time[0]), float(time[-1]), curve
 
 
-class Spans:
+class JoinedCurves:
     """Curves, each on a span of its own; what lies between joins their ends, what lies outside is level."""
 
     def __init__(self, spans: list[tuple[float, float, Smooth]]) -> None:

@@ -13,7 +13,7 @@ from steadyslip.experiments.measured.columns import listed
 from steadyslip.experiments.measured.formats.moments import day, moment
 from steadyslip.experiments.measured.formats.numerals import either, marks_of, number
 from steadyslip.experiments.measured.formats.table import Table, check_size, chosen_part, count_moments, names_and_units
-from steadyslip.experiments.measured.formats.workbook import CLOCK, DATE, FORMULA, MOMENT, Sheet, Workbook
+from steadyslip.experiments.measured.formats.workbook import CLOCK, DATE, FORMULA, MOMENT, SheetCells, Workbook
 
 SPARSE = 0.05  # of the numbers of the fullest column: one of fewer belongs to something beside the record
 SHORT = 20  # rows: a sheet of fewer is none of a record
@@ -35,7 +35,7 @@ def read(path: Path, table: str | None) -> Table:
     return next(iter(found.values()))
 
 
-def _table(path: Path, sheet: Sheet) -> Table | None:
+def _table(path: Path, sheet: SheetCells) -> Table | None:
     """The record on a sheet; None if there is none."""
     known = {text: _stated(text) for text in set(sheet.texts)}
     stated = [known[text] for text in sheet.texts]
@@ -89,7 +89,7 @@ def _check_formulas(path: Path, names: list[str], values: Array, texts: list[lis
         )
 
 
-def _without_side_tables(sheet: Sheet, stated: Stated) -> tuple[Sheet, Stated, list[int]]:
+def _without_side_tables(sheet: SheetCells, stated: Stated) -> tuple[SheetCells, Stated, list[int]]:
     """The same without columns that have but a few numbers, beside those of a record; which had any."""
     is_number = [value is not None or text == FORMULA for value, text in zip(stated, sheet.texts, strict=True)]
     counts = sheet.counts(sheet.text_columns[np.array(is_number, dtype=bool)])
@@ -102,7 +102,7 @@ def _without_side_tables(sheet: Sheet, stated: Stated) -> tuple[Sheet, Stated, l
     return sheet, [value for value, is_left in zip(stated, left, strict=True) if is_left], dropped
 
 
-def _first_row(sheet: Sheet, stated: Stated) -> int | None:
+def _first_row(sheet: SheetCells, stated: Stated) -> int | None:
     """The first row that holds numbers and nothing else, two of them at least."""
     is_number = np.array([value is not None for value in stated], dtype=bool)
     is_other = ~is_number & np.array([text != FORMULA for text in sheet.texts], dtype=bool)

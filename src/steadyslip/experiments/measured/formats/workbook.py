@@ -36,7 +36,7 @@ TICKS = 5  # decimals of a second that a date has, as a number of days in double
 
 
 @dataclass
-class Sheet:
+class SheetCells:
     """Cells that are not empty: numbers, and texts beside them.
 
     Attributes
@@ -86,14 +86,14 @@ class Sheet:
         values[places], kinds[places] = self.numbers[own], self.kinds[own]
         return values, kinds
 
-    def without(self, columns: Array) -> tuple[Sheet, Array]:
+    def without(self, columns: Array) -> tuple[SheetCells, Array]:
         """The same without some columns, and which of the texts are left."""
         own, texts = (~np.isin(places, columns) for places in (self.columns, self.text_columns))
         rows, text_rows = self.rows[own], self.text_rows[texts]
         left = np.unique(np.concatenate([rows, text_rows]))
         rows, text_rows = np.searchsorted(left, rows), np.searchsorted(left, text_rows)
         words = [text for text, is_left in zip(self.texts, texts, strict=True) if is_left]
-        sheet = Sheet(self.lines[left], rows, self.columns[own], self.numbers[own], self.kinds[own],
+        sheet = SheetCells(self.lines[left], rows, self.columns[own], self.numbers[own], self.kinds[own],
                       text_rows, self.text_columns[texts], words)  # fmt: skip
         return sheet, texts
 
@@ -133,7 +133,7 @@ class Workbook:
     def __exit__(self, *_: object) -> None:
         self._archive.close()
 
-    def sheet(self, name: str) -> Sheet:
+    def sheet(self, name: str) -> SheetCells:
         """What is on a sheet."""
         lines, line, passed, timed = array("q"), 0, 0, 0
         rows, columns, numbers, kinds = array("q"), array("q"), array("d"), array("b")
@@ -164,7 +164,7 @@ class Workbook:
                 more_time((len(numbers) - timed) // SOME)
                 passed, timed = len(numbers) + len(texts), len(numbers)
                 check_size(self._path, passed, rows=len(lines))
-        return Sheet(
+        return SheetCells(
             np.array(lines), np.array(rows), np.array(columns), np.array(numbers), np.array(kinds),
             np.array(text_rows), np.array(text_columns), texts,
         )  # fmt: skip

@@ -115,12 +115,24 @@ def margins(rig: Slider | Machine, *, branch: int = 0) -> tuple[Margin, ...]:
             continue
         search = Search(rig, name, present, branch)
         edges = search.boundaries(None)
-        value = float(address.value)
-        edge = min(edges, key=lambda e, v=value: abs(e.value - v), default=None)  # type: ignore[misc]
-        gap = edge.value - value if edge else float("nan")
-        relative = gap / abs(value) if value else float("nan")
-        found.append(Margin(name, address.role.unit, value, edge, edges, gap, relative, search.searched))
+        found.append(_margin(name, address.role.unit, float(address.value), edges, search.searched))
     return tuple(sorted(found, key=_urgency))
+
+
+def without_edges(found: Sequence[Margin], lost: Sequence[Boundary]) -> tuple[Margin, ...]:
+    """Margins without some of their edges, the most critical first."""
+    if not lost:
+        return tuple(found)
+    kept = [(one, tuple(edge for edge in one.edges if edge not in lost)) for one in found]
+    others = [_margin(one.parameter, one.unit, one.value, edges, one.searched) for one, edges in kept]
+    return tuple(sorted(others, key=_urgency))
+
+
+def _margin(name: str, unit: str, value: float, edges: tuple[Boundary, ...], searched: tuple[float, float]) -> Margin:
+    """The margin of a parameter with these edges."""
+    edge = min(edges, key=lambda one: abs(one.value - value), default=None)
+    gap = edge.value - value if edge else float("nan")
+    return Margin(name, unit, value, edge, edges, gap, gap / abs(value) if value else float("nan"), searched)
 
 
 def _urgency(margin: Margin) -> float:

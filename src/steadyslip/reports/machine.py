@@ -24,7 +24,7 @@ def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Part
     body = [
         heading("The machine"), inside(machine),
         heading("The verdict"), *_verdict(analysis),
-        heading("How far is the edge?"), _picture(analysis), *of_rig.edges(analysis),
+        heading("How far is the edge?"), _picture(analysis), *of_rig.edges(analysis), *of_rig.checked(analysis),
         *of_rig.within(tolerated),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings),
         paragraph(of_rig.SMALL),

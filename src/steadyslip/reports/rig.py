@@ -22,6 +22,7 @@ from steadyslip.reports.brief import rows_of
 from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import Markup, figure, heading, letter, math, paragraph, table
 from steadyslip.verdict import Analysis, Tolerated
+from steadyslip.verdict.checks import in_words
 from steadyslip.verdict.findings import Verdict
 from steadyslip.verdict.words import edge_rows, facts, headline, meaning
 
@@ -39,7 +40,7 @@ def about(analysis: Analysis, prediction: Prediction | None = None, tolerated: T
         heading("The rig"), figure(sketch(rig)), inputs(rig),
         heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
         *_confidence(prediction), *within(tolerated),
-        heading("How far is the edge?"), *edges(analysis), *_charts(analysis),
+        heading("How far is the edge?"), *edges(analysis), *checked(analysis), *_charts(analysis),
         heading("The formulas"), *formulas(analysis),
         heading("What to keep in mind"), *(paragraph(text, "warning") for text in analysis.warnings), paragraph(SMALL),
     ]  # fmt: skip
@@ -95,6 +96,12 @@ def edges(analysis: Verdict) -> Iterator[str]:
         yield table(rows, head)
     if without:
         yield paragraph(f"No edge within range: {', '.join(without)}.", "small")
+
+
+def checked(analysis: Verdict) -> Iterator[str]:
+    """One line on what was asked a second time."""
+    if analysis.checks:
+        yield paragraph(in_words(analysis.checks), "small")
 
 
 def _charts(analysis: Analysis) -> Iterator[str]:

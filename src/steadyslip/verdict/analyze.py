@@ -25,6 +25,7 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.point import OperatingPoint, operating_point
 from steadyslip.model.sliding import SteadySliding, steady_states
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at, parameter_along
+from steadyslip.verdict.checks import critical_check, edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import as_dict
 from steadyslip.verdict.findings import Findings
 from steadyslip.verdict.machine import MachineAnalysis, analyze_machine
@@ -121,7 +122,15 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
         values = operating_point(rig, None, present_zeros(rig), branch)
         numbers = numbers_of(rig, values)
         on_the_edge = bool(on_edge(values)) or decided_by_rounding(values)
-        distances = margins(rig, branch=branch)
+        checks = verdict_checks(rig, values, numbers["stable"], on_the_edge)
+        if doubt := undecided(checks):
+            return Analysis(rig=rig, stable=None, reason=doubt, margins=(), checks=checks, version=__version__)
+        distances, of_edges = edge_checks(rig, margins(rig, branch=branch), branch)
+        checks += of_edges
+        if numbers.get("critical_angular_frequency") is not None:
+            checks += (critical_check(values, numbers["critical_stiffness"], numbers["critical_angular_frequency"]),)
+            if not checks[-1].passed:
+                numbers |= dict.fromkeys([name for name in numbers if name.startswith("critical_")])
         found = Analysis(
             rig=rig,
             steady=states[branch],
@@ -132,6 +141,7 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
             on_edge=on_the_edge,
             branch=branch,
             warnings=_warnings(rig, values, states, on_the_edge),
+            checks=checks,
             version=__version__,
             **numbers,
         )

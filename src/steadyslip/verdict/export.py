@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from steadyslip.core.areas import total
+from steadyslip.verdict.checks import in_words
 from steadyslip.verdict.holding import holding
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings, Verdict
+
+_LAST = ("boundaries", "warnings", "checked", "checks")
 
 
 def as_dict(analysis: Findings) -> dict[str, Any]:
@@ -36,11 +40,10 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
         "critical_axial_stiffness": analysis.critical_axial_stiffness,
         "stable_stiffness": [[low, _finite(high)] for low, high in analysis.stable_stiffness],
         **_held_by(analysis),
-        **{name: value for name, value in common.items() if name not in ("boundaries", "warnings")},
+        **{name: value for name, value in common.items() if name not in _LAST},
         "onset": None if analysis.onset is None else onset_dict(analysis.onset),
         "kicks": [kick.to_dict() for kick in analysis.kicks],
-        "boundaries": common["boundaries"],
-        "warnings": common["warnings"],
+        **{name: common[name] for name in _LAST},
     }
     if analysis.rig.area is not None:
         data["forces"] = _forces(analysis, analysis.rig.area)
@@ -86,6 +89,8 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "time_to_double": found.time_to_double,
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),
+        "checked": in_words(found.checks),
+        "checks": [asdict(check) | {"error": _finite(check.error)} for check in found.checks],
         **(late if found.characteristic_terms else {}),
     }
 

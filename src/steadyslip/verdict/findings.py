@@ -14,6 +14,7 @@ from steadyslip.machine.rig import Rig
 from steadyslip.machine.slider import Slider
 from steadyslip.model.sliding import SteadyMachine, SteadySliding
 from steadyslip.nonlinear.onset.hopf import Onset
+from steadyslip.verdict.checks import Check
 
 if TYPE_CHECKING:
     from steadyslip.nonlinear.kicks.threshold import Threshold
@@ -39,6 +40,7 @@ class Verdict(Displayed):
     on_edge: bool = False
     characteristic_terms: tuple[tuple[float, tuple[float, ...]], ...] = ()
     unstable_roots: int | None = None
+    checks: tuple[Check, ...] = ()
     version: str = field(default="", repr=False)
 
     @property
@@ -97,6 +99,9 @@ class Findings(Verdict):
     branch : int
         Which steady sliding is judged.
     warnings : tuple of str
+    checks : tuple of Check
+        The second question that was asked of each number. What failed is left out; a verdict that failed has
+        ``stable = None`` and a reason that begins with ``not decided``.
     """
 
     rig: Slider
@@ -144,6 +149,9 @@ class MachineFindings(Verdict):
     margins : tuple of Margin
         Distance of each parameter to its nearest edge, the most critical first.
     warnings : tuple of str
+    checks : tuple of Check
+        The second question that was asked of each number. What failed is left out; a verdict that failed has
+        ``stable = None`` and a reason that begins with ``not decided``.
     """
 
     rig: Machine

@@ -23,6 +23,7 @@ from steadyslip.model.range import require_range
 from steadyslip.model.sliding import SteadyMachine, steady_machine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
 from steadyslip.verdict.causes import why_late
+from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
@@ -99,19 +100,26 @@ def analyze_machine(machine: Machine, kicks: Sequence[str] = ()) -> MachineAnaly
             why = str(error).removeprefix("no steady sliding: ")
             return MachineAnalysis(rig=machine, stable=None, reason=why, margins=margins(machine), version=__version__)
         numbers = linear_numbers(point)  # refuses what cannot be counted, before the edges are looked for
-        distances = margins(machine)
-        posed = numbers["growth_rate"] != math.inf
+        edged = bool(on_edge(point)) or decided_by_rounding(point)
+        checks = verdict_checks(machine, point, numbers["stable"], edged)
+        if doubt := undecided(checks):
+            return MachineAnalysis(
+                rig=machine, stable=None, reason=doubt, margins=(), checks=checks, version=__version__
+            )
+        distances, of_edges = edge_checks(machine, margins(machine), 0)
+        posed = numbers["growth_rate"] not in (math.inf, None)
         leading = numbers["eigenvalues"][0] if posed else 0.0
         found = MachineAnalysis(
             rig=machine,
             reason="",
             steady=steady,
             mode=mode_of(machine, point, complex(leading.real, abs(leading.imag))) if posed else None,
-            on_edge=bool(on_edge(point)) or decided_by_rounding(point),
+            on_edge=edged,
             margins=distances,
             onset=None if point.model.delays else _onset(machine, distances),
             kicks=_kicks(machine, kicks),
             warnings=_warnings(machine, steady),
+            checks=(*checks, *of_edges),
             version=__version__,
             **numbers,
         )
@@ -160,7 +168,7 @@ def _reason(found: MachineAnalysis) -> str:
     first = next((one for one in found.margins if one.edge is not None), None)
     hint = "" if first is None else f"; {_nearest(found, first)}"
     if not found.stable:
-        return PHRASES["oscillatory" if found.eigenvalues[0].imag else "divergence"] + hint
+        return PHRASES["oscillatory" if any(s.imag for s in found.eigenvalues[:1]) else "divergence"] + hint
     return PHRASES["dies out"] + hint
 
 

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from steadyslip.linear.pencil import checked_spectrum
 from steadyslip.linear.polynomials import is_hurwitz, routh_column
 from steadyslip.linear.quasi import INFINITE
 from steadyslip.linear.roots import roots
 from steadyslip.linear.spectrum import ill_posed, is_ill_posed, is_stable, spectrum, unstable_roots
 from steadyslip.model.point import OperatingPoint
 from steadyslip.model.range import characteristic, quasi, require_range
+from steadyslip.verdict.checks import shares_of_errors
 
 
 def _of_polynomial(values: OperatingPoint) -> dict[str, Any]:
@@ -43,13 +45,20 @@ def _of_sum(values: OperatingPoint) -> dict[str, Any]:
 
 
 def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
-    """Everything that follows from the characteristic polynomial."""
+    """Everything that follows from the characteristic polynomial; without eigenvalues that fail their check."""
     require_range(values)
     numbers = _of_sum(values) if values.model.delays else _of_polynomial(values)
-    bad, eigenvalues = bool(is_ill_posed(values)), numbers["eigenvalues"]
-    growth = math.inf if bad else float(eigenvalues[0].real)
+    bad = bool(is_ill_posed(values))
+    if not bad:
+        found, good = checked_spectrum(values), shares_of_errors(values)[1]
+        if found.refined and found.complete:  # with many digits
+            numbers["stable"] = found.growing == 0
+        leading = bool(good[:1].all() and good.size)
+        numbers["eigenvalues"] = tuple(complex(s) for s in found.values[good]) if leading else ()
+    eigenvalues = numbers["eigenvalues"]
+    growth = math.inf if bad else float(eigenvalues[0].real) if eigenvalues else None
     numbers["growth_rate"] = growth
-    if math.isfinite(growth) and growth != 0:
+    if growth is not None and math.isfinite(growth) and growth != 0:
         numbers["time_to_halve" if growth < 0 else "time_to_double"] = math.log(2) / abs(growth)
     oscillation = next((s for s in eigenvalues if s.imag != 0), None)
     if oscillation is not None:

@@ -10,6 +10,7 @@ from steadyslip.core.errors import InternalError
 from steadyslip.core.telling import shown
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
+from steadyslip.verdict.checks import UNDECIDED, in_words
 from steadyslip.verdict.holding import gain_words, holding
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def lines_of(analysis: Verdict, known: list[tuple[str, str]], edges: list[str], 
     for name, text in known:
         lines += textwrap.wrap(f"{name:<15} {text}", 100, subsequent_indent=" " * 16)
     lines += edges
+    lines += ["", *textwrap.wrap(in_words(analysis.checks), 100, subsequent_indent="  ")] if analysis.checks else []
     lines += ["", *meant] if meant else []
     for text in analysis.warnings:
         lines += ["", *textwrap.wrap(f"Warning: {text}", 100, subsequent_indent="  ")]
@@ -92,10 +94,15 @@ def headline(analysis: Verdict) -> str:
     drive = analysis.rig.parameters()["drive.velocity"]
     speed = shown(float(drive.value or 0.0), drive.role.unit)
     if analysis.stable is None:
-        return f"NO STEADY SLIDING at {speed}"
+        return f"NOT DECIDED: steady sliding at {speed}" if is_undecided(analysis) else f"NO STEADY SLIDING at {speed}"
     if analysis.on_edge:
         return f"ON THE EDGE of stability to within rounding: steady sliding at {speed}"
     return f"{'STABLE' if analysis.stable else 'UNSTABLE'}: steady sliding at {speed}"
+
+
+def is_undecided(analysis: Verdict) -> bool:
+    """Whether the verdict failed its own check."""
+    return analysis.reason.startswith(UNDECIDED)
 
 
 def reason(analysis: Findings) -> str:
@@ -226,6 +233,8 @@ def disturbance(analysis: Verdict) -> str:
     """What becomes of a small disturbance."""
     if analysis.growth_rate == math.inf:
         return "grows without limit at once; the model misses an inertia or a direct effect that matters here"
+    if analysis.growth_rate is None:
+        return f"{'dies away' if analysis.stable else 'grows'}; not decided: how fast"
     if analysis.on_edge:
         text = "neither grows nor dies, to within rounding"
     elif analysis.time_to_double is not None:

@@ -1,0 +1,252 @@
+"""A second, independent question behind every number of a verdict, and what came of it.
+
+Steady sliding is asked whether the laws themselves, given its numbers, leave forces and memory at rest; eigenvalues
+whether the rig's own matrix is singular there, and their number of the argument of its determinant; edges whether small
+disturbances grow on one side and die on the other; the critical stiffness whether a root lies on the axis there. What
+fails is left out, and said in words that begin with ``not decided``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.pages import Displayed
+from steadyslip.core.questions import question
+from steadyslip.laws.friction.law import FrictionLaw
+from steadyslip.linear.boundary import Margin, present_zeros, without_edges
+from steadyslip.linear.pencil import GOOD, checked_spectrum
+from steadyslip.linear.search import Boundary
+from steadyslip.linear.spectrum import is_ill_posed, spectrum, unstable_roots
+from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, UNSTABLE, is_neutral
+from steadyslip.machine.machine import Machine
+from steadyslip.machine.rig import Rig
+from steadyslip.model import Model
+from steadyslip.model.point import OperatingPoint, operating_point
+from steadyslip.model.range import in_range
+
+Array = NDArray[np.float64]
+
+UNDECIDED = "not decided: "
+BALANCED = 1e-8
+"""Share of stresses, and of the rates of memory that are e-folds away, by which a balance may be missed."""
+BESIDE = (1e-7, 1e-5, 1e-9)
+"""Shares of an edge's value at which both of its sides are looked at, until they differ as the edge says."""
+ON_AXIS = 1e-6
+"""Share of its size by which a root may miss the axis at the critical stiffness."""
+
+_DECIDING = ("steady sliding", "growing roots")  # without which there is no verdict
+_STEP = 1e-3  # of the logarithms of velocity, stress and memory, whose effect on its rates says how large these are
+_ZERO = 1e-9  # of the largest root: what a root of zero, which has no share of its own, may be by rounding
+
+
+@dataclass(frozen=True)
+class Check(Displayed):
+    """One number of an answer, and the second question that was asked of it.
+
+    Attributes
+    ----------
+    what : str
+        The number, such as ``eigenvalues`` or ``edge of friction.a at 0.0142``.
+    how : str
+        What was asked.
+    error : float
+        What came of it, as a share of the number; inf where nothing did.
+    allowed : float
+        Up to which the number is told.
+    passed : bool
+    """
+
+    what: str
+    how: str
+    error: float
+    allowed: float
+    passed: bool
+
+    def __str__(self) -> str:
+        verb = "passed" if self.passed else "failed"
+        return f"{self.what}: {self.how}; {verb}, {self.error:.2g} where {self.allowed:.2g} is allowed"
+
+
+def _checked(what: str, how: str, error: float, allowed: float) -> Check:
+    error = float(error) if math.isfinite(error) else math.inf
+    return Check(what, how, error, allowed, error <= allowed)
+
+
+def in_words(checks: Sequence[Check]) -> str:
+    """One line: what was checked, or what failed."""
+    failed = [one.what for one in checks if not one.passed]
+    edges = sum(one.passed and one.what.startswith("edge of ") for one in checks)
+    passed = [one.what for one in checks if one.passed and not one.what.startswith("edge of ")]
+    passed += [f"{edges} edge{'s' if edges > 1 else ''}"] if edges else []
+    words = [f"{UNDECIDED}{', '.join(failed)}"] if failed else []
+    return "; ".join([*words, f"checked: {', '.join(passed)}"] if passed else words)
+
+
+def verdict_checks(rig: Rig, point: OperatingPoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
+    """What the verdict itself rests on: steady sliding, the eigenvalues and how many grow."""
+    return (steady_check(rig, point), *spectrum_checks(point, stable, on_edge))
+
+
+def undecided(checks: Sequence[Check]) -> str:
+    """Why there is no verdict; empty where there is one."""
+    failed = [str(one) for one in checks if not one.passed and one.what in _DECIDING]
+    return UNDECIDED + "; ".join(failed) if failed else ""
+
+
+# -- steady sliding
+
+
+def steady_check(rig: Rig, point: OperatingPoint) -> Check:
+    """Whether the laws, given the numbers of steady sliding, leave forces and memory as they are."""
+    frictions = (
+        [rig.contacts[contact.name].friction for contact in point.model.contacts]
+        if isinstance(rig, Machine)
+        else [rig.friction]  # type: ignore[attr-defined]
+    )
+    numbers = [float(one) for one in point.evaluate(_steady_numbers(point.model))]
+    missed = []
+    for contact, law, sigma in zip(point.model.contacts, frictions, point.sigmas, strict=True):
+        velocity, friction, normal, *memory = (numbers.pop(0) for _ in range(3 + len(contact.memory)))
+        missed.append(abs(normal - float(sigma)) / float(sigma))
+        missed += _missed_by_law(law, velocity, float(sigma), tuple(memory), friction)
+    return _checked("steady sliding", "forces and memory by the laws", max(missed), BALANCED)
+
+
+@question
+def _steady_numbers(model: Model) -> ArrayFunction:
+    """Of every contact velocity, friction stress, normal stress as the contact makes it, and memory."""
+    found = []
+    for contact in model.contacts:
+        found += [model.steady[contact.velocity], model.steady[contact.friction], contact.steady_stress]
+        found += [model.steady[item.symbol] for item in contact.memory]
+    return model.function(found)
+
+
+def _missed_by_law(
+    law: FrictionLaw, velocity: float, sigma: float, memory: tuple[float, ...], friction: float
+) -> Iterator[float]:
+    """Shares by which a law misses a friction stress, and by which its memory does not rest."""
+    v, s = abs(velocity), sp.Float(sigma)
+    yield abs(float(law.strength(sp.Float(v), s, memory, friction)) - friction) / max(abs(friction), sigma * BALANCED)
+    trials = ((1, 1, 1), (1 + _STEP, 1, 1), (1, 1 + _STEP, 1), (1, 1, 1 + _STEP))
+    rest, *others = (
+        np.array([float(rate) for rate in law.rates(sp.Float(v * a), s * b, tuple(c * m for m in memory), friction)])
+        for a, b, c in trials
+    )
+    for rate, *changed in zip(rest, *others, strict=True):
+        size = max(abs(other - rate) for other in changed) / _STEP
+        yield abs(rate) / size if size else float(rate != 0)
+
+
+# -- eigenvalues
+
+
+def shares_of_errors(point: OperatingPoint) -> tuple[Array, NDArray[np.bool_]]:
+    """Of every eigenvalue the error as a share of it, and whether it is told.
+
+    One of several that meet is told with its error, which is larger; so is one of zero, which has no share of its own.
+    """
+    found = checked_spectrum(point)
+    size = np.abs(found.values)
+    zero = np.where(size <= found.errors, _ZERO * np.max(size, initial=0.0), 0.0)
+    with np.errstate(all="ignore"):
+        share = found.errors / np.maximum(size, zero)
+        if is_neutral(point):  # the coefficient that vanishes says so better than any matrix
+            share[size <= _ZERO * np.max(size, initial=0.0)] = 0.0
+    return share, (share <= GOOD) | np.full(share.shape, found.decided)
+
+
+def spectrum_checks(point: OperatingPoint, stable: bool, on_edge: bool) -> tuple[Check, ...]:
+    """Of eigenvalues and of how many grow; none where the equations are ill-posed."""
+    if is_ill_posed(point):
+        return ()
+    found, (share, good) = checked_spectrum(point), shares_of_errors(point)
+    worst = float(np.max(share, initial=0.0)) if len(share) else math.inf
+    values = _checked(
+        "eigenvalues", "least singular value of the rig's own matrix", worst, max(GOOD, worst * all(good))
+    )
+    how, growing = "argument along the imaginary axis", found.growing
+    if growing < 0 and len(share) and not point.model.delays:  # sizes at which that leaves floating point
+        how, growing = "conditions of Routh and Hurwitz", int(np.sum(found.values.real > 0))
+    right = growing >= 0 and (on_edge or (growing == 0) == stable)
+    return values, Check("growing roots", how, float(not right), 0.0, right)
+
+
+def critical_check(point: OperatingPoint, stiffness: float, beta: float) -> Check:
+    """Whether a root of the rig with its critical stiffness lies on the imaginary axis at its frequency (rad/s)."""
+    place = list(point.model.parameters).index("slider.stiffness")
+    arguments = [stiffness if i == place else value for i, value in enumerate(point.arguments)]
+    with np.errstate(all="ignore"):
+        s = np.ravel(spectrum(point.with_arguments(arguments)))
+        s = s[np.isfinite(s)]
+        size = beta or float(np.exp(np.mean(np.log(np.maximum(np.sort(np.abs(s))[1:], 1e-300))))) or 1.0
+        missed = np.min(np.abs(s - 1j * beta), initial=np.inf) / size
+    return _checked("critical stiffness", "a root on the imaginary axis", float(missed), ON_AXIS)
+
+
+# -- edges
+
+
+def edge_checks(rig: Rig, margins: Sequence[Margin], branch: int) -> tuple[tuple[Margin, ...], tuple[Check, ...]]:
+    """Of every edge whether both sides are as it says; and the margins without edges that are not."""
+    edges = [(margin, edge) for margin in margins for edge in margin.edges]
+    if not edges:
+        return tuple(margins), ()
+    shares = np.full(len(edges), np.inf)
+    for share in BESIDE:
+        rest = np.flatnonzero(np.isinf(shares))
+        if rest.size:
+            sides = _sides(rig, [edges[i] for i in rest], share, branch)
+            shares[rest] = [
+                share if _as_said(edges[i][1], *pair) else np.inf for i, pair in zip(rest, sides, strict=True)
+            ]
+    checks = []
+    for (_, edge), share in zip(edges, shares, strict=True):
+        what = f"edge of {edge.parameter} at {edge.value:.6g} {edge.unit}".removesuffix(" 1")
+        checks.append(_checked(what, "roots on both sides", share, max(BESIDE)))
+    lost = [edge for (_, edge), one in zip(edges, checks, strict=True) if not one.passed]
+    return without_edges(margins, lost), tuple(checks)
+
+
+def _sides(rig: Rig, edges: Sequence[tuple[Margin, Boundary]], share: float, branch: int) -> list[list[int]]:
+    """Of each edge the status below and above, a share of its value away; one question for all."""
+    values = np.array([edge.value for _, edge in edges])
+    sizes = np.array([abs(edge.value) or abs(margin.value) or margin.searched[1] for margin, edge in edges])
+    beside = values + share * sizes * np.array([[-1.0], [1.0]])
+    vary = {}
+    for margin, _ in edges:
+        at = [i for i, (_, edge) in enumerate(edges) if edge.parameter == margin.parameter]
+        own = np.full(beside.shape, margin.value)
+        allowed = rig.parameters()[margin.parameter].role.domain.contains(beside[:, at])
+        own[:, at] = np.where(allowed, beside[:, at], values[at])
+        vary[margin.parameter] = own.ravel()
+    with np.errstate(all="ignore"):
+        found = _by_roots(operating_point(rig, vary, present_zeros(rig), branch, scan=True))
+    return [[int(one) for one in pair] for pair in found.reshape(beside.shape).T]
+
+
+def _as_said(edge: Boundary, below: int, above: int) -> bool:
+    """Whether the sides of an edge are as it says."""
+    if UNKNOWN in (below, above):
+        return False
+    stable = {"above": (below != STABLE and above == STABLE), "below": (below == STABLE and above != STABLE)}
+    return stable.get(edge.stable, {below, above} == {ABSENT, UNSTABLE})
+
+
+def _by_roots(point: OperatingPoint) -> NDArray[np.int64]:
+    """The status of rigs by their eigenvalues, (n,), where scans go by the conditions of Routh and Hurwitz."""
+    if point.model.delays:
+        grows = unstable_roots(point) != 0
+    else:
+        real = spectrum(point).real
+        grows = np.max(np.where(np.isnan(real), -np.inf, real), axis=-1) >= 0
+    found = np.where(grows | is_ill_posed(point), UNSTABLE, STABLE)
+    found = np.where(point.exists, found, ABSENT)
+    return np.asarray(np.where(in_range(point) & point.valid, found, UNKNOWN))

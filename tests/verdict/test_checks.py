@@ -1,0 +1,122 @@
+"""The second question behind every number of a verdict: it passes what is right and finds what is wrong."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import steadyslip as ss
+from edges_at_random import drawn
+from rigs_of_theory import LAWS, rig
+from steadyslip.core.errors import SteadyslipError
+from steadyslip.linear.boundary import margins
+from steadyslip.linear.pencil import checked_spectrum
+from steadyslip.model.point import operating_point
+from steadyslip.verdict import checks, numbers
+from steadyslip.verdict.checks import critical_check, edge_checks, in_words, spectrum_checks, steady_check
+from steadyslip.verdict.words import headline
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.mark.parametrize("name", ["inclined-spring", "machines/two-guides"])
+def test_a_verdict_lists_its_checks_and_prints_one_line(name):
+    analysis = ss.analyze(ss.read_rig(EXAMPLES / f"{name}.toml"))
+    assert all(one.passed and one.error <= one.allowed for one in analysis.checks)
+    assert [one.what for one in analysis.checks][:3] == ["steady sliding", "eigenvalues", "growing roots"]
+    edges = sum(len(margin.edges) for margin in analysis.margins)
+    assert sum(one.what.startswith("edge of ") for one in analysis.checks) == edges
+    data = json.loads(analysis.to_json())
+    assert data["checked"] in str(analysis)
+    assert f"{edges} edges" in data["checked"]
+    assert [one["what"] for one in data["checks"]] == [one.what for one in analysis.checks]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_steady_sliding_is_balanced_by_every_law_and_by_no_other(law):
+    held = rig(friction=LAWS[law])
+    point = operating_point(held)
+    assert steady_check(held, point).passed
+    name = next(name for name in ("friction.mu_ref", "friction.mu_static") if name in held.parameters())
+    other = held.with_values({name: held.value(name) * (1 + 1e-6)})
+    missed = steady_check(other, point)
+    assert not missed.passed
+    assert missed.error == pytest.approx(1e-6, rel=0.2)
+
+
+def test_memory_that_does_not_rest_is_found():
+    held = rig(friction=LAWS["lugre"])
+    other = held.with_values({"friction.v_stribeck": held.value("friction.v_stribeck") * 30})
+    assert not steady_check(other, operating_point(held)).passed
+
+
+def test_an_edge_that_is_none_is_left_out():
+    held = rig()
+    known = margins(held)
+    (margin,) = [one for one in known if one.parameter == "friction.b"]
+    wrong = replace(margin.edges[0], value=margin.edges[0].value * 1.001)
+    shifted = replace(margin, edges=(wrong,), edge=wrong)
+    kept, found = edge_checks(held, [shifted if one is margin else one for one in known], 0)
+    assert [one.parameter for one in kept if one.edge is None and one.parameter == "friction.b"] == ["friction.b"]
+    assert [one.passed for one in found if "friction.b" in one.what] == [False]
+    assert all(one.passed for one in found if "friction.b" not in one.what)
+    assert in_words(found).startswith(f"not decided: edge of friction.b at {wrong.value:.6g}; checked: ")
+
+
+def test_the_critical_stiffness_has_its_root_on_the_axis():
+    held = rig()
+    analysis, point = ss.analyze(held), operating_point(held)
+    right = analysis.critical_stiffness, analysis.critical_angular_frequency
+    assert critical_check(point, *right).passed
+    for wrong in ((right[0] * 1.0001, right[1]), (right[0], right[1] * 1.0001)):
+        assert not critical_check(point, *wrong).passed
+
+
+def test_a_wrong_count_of_growing_roots_leaves_no_verdict(monkeypatch):
+    """As if the roots of the polynomial were others than those of the rig's matrix."""
+    held = rig()
+    point = operating_point(held)
+    assert all(one.passed for one in spectrum_checks(point, False, False))
+    assert [one.passed for one in spectrum_checks(point, True, False)] == [True, False]
+    good = numbers._of_polynomial
+    monkeypatch.setattr(numbers, "_of_polynomial", lambda values: good(values) | {"stable": True})
+    analysis = ss.analyze(held)
+    assert analysis.stable is None
+    assert analysis.reason.startswith("not decided: growing roots")
+    assert headline(analysis).startswith("NOT DECIDED")
+    json.loads(analysis.to_json())
+    assert "not decided" in str(analysis)
+
+
+@pytest.mark.parametrize("name", ["two-states", "machines/two-guides"])
+def test_eigenvalues_that_fail_are_left_out(name, monkeypatch):
+    """Stability is told all the same: it rests on their number."""
+
+    def spoiled(point):
+        found = checked_spectrum(point)
+        return replace(found, errors=np.abs(found.values) * 0.01)
+
+    for module in (numbers, checks):
+        monkeypatch.setattr(module, "checked_spectrum", spoiled)
+    analysis = ss.analyze(ss.read_rig(EXAMPLES / f"{name}.toml"))
+    assert analysis.stable is not None
+    assert (analysis.eigenvalues, analysis.growth_rate, analysis.period) == ((), None, None)
+    assert "not decided: how fast" in str(analysis)
+    assert "not decided: eigenvalues; checked: steady sliding, growing roots" in " ".join(str(analysis).split())
+    json.loads(analysis.to_json())
+
+
+@pytest.mark.campaign
+def test_random_verdicts_pass_their_checks():
+    """Of right numbers none is withheld."""
+    found = []
+    for seed in range(300, 314):
+        try:
+            analysis = ss.analyze(drawn(np.random.default_rng(seed)))
+        except SteadyslipError:
+            continue
+        found += [(seed, one) for one in analysis.checks]
+    assert len(found) > 100
+    assert [(seed, str(one)) for seed, one in found if not one.passed] == []

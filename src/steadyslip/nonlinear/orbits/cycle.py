@@ -26,6 +26,7 @@ def quantities(rig: Slider | Machine) -> dict[str, tuple[str, str]]:
 
 
 OPEN = 1e-4  # share of a cycle's size by which a motion may miss its start: an order below what Newton's method leaves
+IMPRECISE = 1e-3  # error of the multiplier along the motion beyond which a cycle is not believed
 UNCERTAIN = 3.0  # errors of multipliers other than the one along the motion are taken to be up to so many times larger
 
 
@@ -121,8 +122,11 @@ class Cycle(Displayed):
 
     @property
     def decided(self) -> bool:
-        """Whether the largest multiplier is farther from 1 in size than its error."""
-        return abs(self.growth - 1) > UNCERTAIN * self.multiplier_error * self.growth
+        """Whether multipliers are known, and the largest is farther from 1 in size than its error."""
+        return (
+            self.multiplier_error <= IMPRECISE
+            and abs(self.growth - 1) > UNCERTAIN * self.multiplier_error * self.growth
+        )
 
     @property
     def checked(self) -> str:

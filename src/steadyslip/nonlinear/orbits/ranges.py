@@ -74,8 +74,8 @@ class CycleChecks:
     open : tuple of float
         Values of the parameter of cycles that do not close.
     undecided : tuple of float
-        Values of the parameter at which the largest multiplier is 1 within its error, small cycles at the edge left
-        out: there the kind of onset decides.
+        Values of the parameter at which multipliers are not known, or the largest is 1 within its error; small cycles
+        at the edge left out: there the kind of onset decides.
     """
 
     count: int
@@ -114,5 +114,5 @@ def is_open(cycle: Cycle) -> bool:
 
 
 def is_undecided(cycle: Cycle) -> bool:
-    """Whether the largest multiplier of a cycle is 1 within its error, and its size does not tell either."""
+    """Whether multipliers do not tell if a cycle attracts, and it is too large for the kind of onset to tell."""
     return not cycle.decided and cycle.amplitude > SMALL

@@ -16,13 +16,12 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure, Point, Track
 from steadyslip.nonlinear.onset.hopf import Onset
-from steadyslip.nonlinear.orbits.cycle import UNCERTAIN, Cycle, End, SpecialCycle
+from steadyslip.nonlinear.orbits.cycle import IMPRECISE, UNCERTAIN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
 from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes, lies_between
-from steadyslip.nonlinear.orbits.verify import IMPRECISE
 
 Array = np.ndarray
 LARGEST_STEP = 0.5

@@ -16,7 +16,7 @@ from steadyslip.core.telling import shown
 from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
-from steadyslip.nonlinear.orbits.cycle import Cycle
+from steadyslip.nonlinear.orbits.cycle import IMPRECISE, Cycle
 from steadyslip.nonlinear.orbits.flow import KINDS_EACH, FlowFailure, FlowSetting, Runs, passages, states_between
 from steadyslip.nonlinear.orbits.measure import amplitude, measured
 from steadyslip.nonlinear.orbits.shooting import Orbit, Shooting
@@ -29,7 +29,6 @@ NEAR = 0.1  # distance, as a share of the cycle's size, to which Newton's method
 CLOSE = 0.05  # distance within which a return may be one to the same place
 SMALLEST = 1e-5  # range, in natural sizes, below which a motion is not told from steady sliding
 MOST_TRIES = 4
-IMPRECISE = 1e-3  # error of the trivial multiplier beyond which a cycle is not believed
 FIRST_SPAN = 60.0  # natural times
 MOST_STEPS = 40_000
 

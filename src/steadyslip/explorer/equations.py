@@ -16,7 +16,7 @@ from steadyslip.core.records import conditions, twin
 from steadyslip.explorer.modes import mode_part
 from steadyslip.explorer.programs import program
 from steadyslip.explorer.sliding import searched, steady_programs
-from steadyslip.kernels.nodes import Node, Program, Value, as_node, select
+from steadyslip.kernels.nodes import Node, Program, Value, select
 from steadyslip.kernels.printers import javascript
 from steadyslip.linear import crossing, cubic
 from steadyslip.linear.boundary import present_zeros
@@ -106,7 +106,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         "solved": SOLVED,
         "observed": [[name, _unit(model, name), meanings.get(name, "")] for name in names],
     } | further
-    programs += [_linear_split(len(coefficients)), *edges]
+    programs += [_linear_split(), *edges]
     text = "".join(javascript.text(one) for one in programs)
     return f"(() => {{\n{text}return {{ {', '.join(one.name for one in programs)} }};\n}})()", facts
 
@@ -184,15 +184,12 @@ def _interval(ingredients: list[Node]) -> Sequence[Value]:
     return cubic.without_gain(low, high, gain, select)
 
 
-def _linear_split(count: int) -> Program:
-    """p and q of coefficients that are linear in a parameter, from them at three values of it; whether they are."""
+def _linear_split() -> Program:
+    """p and q of one coefficient, from it at three values of a parameter, and whether it is linear in that."""
     made = Program("linear")
-    low, own, high = ([made.load(start + i) for i in range(count)] for start in (0, count, 2 * count))
+    low, own, high = ([made.load(place)] for place in range(3))
     p, q, straight = crossing.linear_split(low, own, high, select)
-    largest: Value = 0.0
-    for one in q:
-        largest = abs(one) + largest
-    for place, value in enumerate([*p, *q, select(straight & (as_node(largest) > 0), 1.0, 0.0)]):
+    for place, value in enumerate([*p, *q, select(straight, 1.0, 0.0)]):
         made.store(place, value, "y")
     return made
 

@@ -227,8 +227,14 @@ export class Linear {
     R[place] = own;
     R.set(sigmas, count);
     if (!known || !told.every(Number.isFinite)) return null;
-    const found = this.ask("linear", 2 * many + 1, told);
-    return found[2 * many] === 1 ? { p: found.slice(0, many), q: found.slice(many, 2 * many) } : null;
+    const p = [], q = [];
+    for (let k = 0; k < many; k++) {
+      const [rest, slope, straight] = this.ask("linear", 3, Float64Array.of(told[k], told[many + k], told[2 * many + k]));
+      if (straight !== 1) return null;
+      p.push(rest);
+      q.push(slope);
+    }
+    return q.some((slope) => slope !== 0) ? { p, q } : null;
   }
 
   /** Positive factors on a parameter at which a root is on the axis, rising; null where it does not enter linearly. @param {number} place */

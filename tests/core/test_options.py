@@ -144,7 +144,7 @@ LEFT = {  # parameters that their functions check themselves, with words of thei
     "paths", "over", "of", "x", "v", "step", "fixed", "free", "separate", "weights", "folder", "area", "conditions",
     "candidates", "compute", "cluster", "normal_stress", "sampling", "rate", "time", "friction", "shear", "normal",
     "displacement", "velocity", "stiffness", "v_ref", "states", "trend", "starts", "width", "progress", "kick",
-    "precision", "rtol", "amplitude", "doublings", "most_points", "method", "points", "result",
+    "precision", "rtol", "amplitude", "amplitudes", "periods", "doublings", "most_points", "method", "points", "result",
 }  # fmt: skip
 PUBLIC = {
     name: getattr(ss, name) for name in dir(ss) if inspect.isfunction(getattr(ss, name)) and name not in DECLARE
@@ -160,8 +160,9 @@ def test_every_public_function_is_checked_before_it_is_called(name):
     assert set(parameters) - set(roles) <= LEFT | {
         n for n, item in parameters.items() if str(item.annotation).split(" ")[0] in ("int", "float")
     }
-    needed = [n for n, item in parameters.items() if item.default is item.empty and item.kind != item.VAR_KEYWORD]
-    for wrong in roles:
+    named = {n for n, item in parameters.items() if item.kind not in (item.VAR_KEYWORD, item.VAR_POSITIONAL)}
+    needed = [n for n in named if parameters[n].default is inspect.Parameter.empty]
+    for wrong in roles.keys() & named:
         with pytest.raises(ss.ParameterError, match=rf"{wrong}: got <object object"):
             function(**dict.fromkeys(needed) | {wrong: object()})
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from steadyslip.core.errors import NotAvailable, UnknownNameError
+from steadyslip.core.options import checked
 from steadyslip.machine.bodies import Body, RotatingBody, SlidingBody
 from steadyslip.machine.links import Link, Screw, Shaft, Spring
 from steadyslip.machine.machine import Machine
@@ -16,6 +17,7 @@ from steadyslip.machine.surfaces import Surface
 _SAME = 1e-12  # relative difference of two ratios that are one but for rounding
 
 
+@checked()
 def joined(machine: Machine, *links: str) -> Machine:
     """The machine with links that are rigid: the bodies at both ends of each are one body, and the link is gone.
 

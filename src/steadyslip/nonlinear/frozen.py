@@ -192,9 +192,11 @@ def frozen_verdicts(
 
 def _preload(rig: Slider | Machine, contact: str) -> str:
     """The parameter that a constant change of the normal stress adds to."""
-    name = f"contacts.{contact}.contact.preload" if isinstance(rig, Machine) else "contact.preload"
-    if name not in rig.parameters() or rig.value(name) is None:
-        raise NotAvailable(f"{name} is not given; only the preload of a contact can be changed slowly")
+    law = rig.contacts[contact].contact if isinstance(rig, Machine) else rig.contact
+    prefix = f"contacts.{contact}." if isinstance(rig, Machine) else "contact."
+    name = next((one for one in rig.of_kind("normal stress") if one.startswith(prefix)), None)
+    if name is None or law.load() is None:
+        raise NotAvailable(f"{prefix.rstrip('.')} is not given by its preload; no other can be changed slowly")
     return name
 
 

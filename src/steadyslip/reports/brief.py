@@ -28,7 +28,7 @@ from steadyslip.model import Model
 from steadyslip.reports.elements import STYLE, Markup, figure, heading, letter, math as formula, paragraph, table, typed
 
 _BY_UNIT = {
-    "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times",
+    "s": "time begin end duration recurrence peak_time period time_to_halve time_to_double times periods t departure",
     "m/s": "velocity v speed peak_velocity lowest_velocity velocities slip_rate",
     "m": "slip x displacement",
     "Pa": "normal_stress shear_stress spring_stress stress_drop lowest_normal_stress highest_normal_stress normal "
@@ -50,7 +50,8 @@ PLAIN = frozenset(
     residuals contact closing
     seen worth errors first second first_interval total_interval total missing spacing edge correlation
     log_probability covariance coordinates bounds shares thresholds final samples data events ranges states start
-    sides conditions amplitudes energy speeds links steady characteristic_terms unstable_roots""".split()  # noqa: SIM905 -- a list of words
+    sides conditions amplitudes energy speeds links steady characteristic_terms gain gains phase phases shift
+    mean_friction distortion status linear_to lost_at crossings e_folds unstable_roots""".split()  # noqa: SIM905 -- a list of words
 )
 _BY_TYPE = {"Margin": {"searched"}, "Boundary": {"bracket"}, "Profile": set(), "Threshold": {"amount"}}
 _NOT_SHOWN = frozenset(

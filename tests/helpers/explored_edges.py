@@ -17,7 +17,7 @@ SHARE = 1e-6  # of a value: the same edge
 
 _ASK = """
 const rig = new Rig(data, programs);
-function told(values, coarse) {
+function edgesAt(values, coarse) {
   rig.values = values;
   const found = data.parameters.map((_, i) => changes(rig, i, undefined, coarse));
   const page = { rig, found, answer: rig.assess(), rounded: Page.prototype.rounded, with: Page.prototype.with };
@@ -43,7 +43,7 @@ class Edges:
 
     def __call__(self, values, coarse=False):
         """`found` of each parameter, `edges` as listed with their words, and the `status`."""
-        return self.script("told(values, coarse)", values=list(values), coarse=coarse)
+        return self.script("edgesAt(values, coarse)", values=list(values), coarse=coarse)
 
     def own(self, values):
         """The rig of Python with the values of a page."""

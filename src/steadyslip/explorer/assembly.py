@@ -32,7 +32,8 @@ from steadyslip.model.sliding import ABSENT
 from steadyslip.verdict.analyze import numbers_of
 from steadyslip.verdict.machine import PHRASES
 from steadyslip.verdict.numbers import linear_numbers
-from steadyslip.verdict.words import BEYOND, REMOTE
+from steadyslip.verdict.reasons import page_reasons
+from steadyslip.verdict.words import BEYOND, HEADLINES, REMOTE
 
 MODULES = (
     "dom", "quantities", "polynomials", "modes", "linear", "rig", "search", "words", "plot", "chart", "edges", "banner",
@@ -161,11 +162,18 @@ def _data(rig: Slider | Machine, title: str, branch: int, facts: Mapping[str, An
         "axial": names.index(axial) if axial in names else -1,
         "speed": "drive.velocity",
         "toml": file.pieces,
-        **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else {"stiffness": _stiffness(rig, names)}),
+        **(_of_machine(rig, names, facts) if isinstance(rig, Machine) else _of_slider(rig, names)),
+        "headlines": {kind: first + rest for kind, (first, rest) in HEADLINES.items() if kind != "undecided"},
+        "absent": ABSENT,
         "remote": REMOTE,
         "beyond": BEYOND,
         "checks": _checks(rig, names, branch),
     }
+
+
+def _of_slider(rig: Slider, names: list[str]) -> dict[str, Any]:
+    """What a page says of sliders alone: the parameter of the bar, why they are stable or not."""
+    return {"stiffness": _stiffness(rig, names), "reasons": page_reasons(rig)}
 
 
 def _stiffness(rig: Slider, names: list[str]) -> str | None:
@@ -180,7 +188,7 @@ def _of_machine(rig: Machine, names: list[str], facts: Mapping[str, Any]) -> dic
     return {
         "stiffness": _checked(rig, names),
         "areas": [facts["parameters"].index(name) if name in facts["parameters"] else -1 for name in areas],
-        "phrases": {name: words for name, words in PHRASES.items() if name not in BEYOND} | {"absent": ABSENT},
+        "phrases": {name: words for name, words in PHRASES.items() if name not in BEYOND},
     }
 
 

@@ -53,7 +53,8 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         together), ``degree`` of the characteristic polynomial, ``closed`` (whether the `interval` of the closed form
         exists), ``edge`` (what rounding alone can make), ``grid`` (how many stresses steady sliding is searched on, and
         the powers of ten that it runs from and to), ``solved`` (misfit of a root as a share of the stress),
-        ``observed`` (names, units and meanings of what `observables` gives), of machines also what `mode_part` says.
+        ``observed`` (names, units and meanings of what `observables` gives), of machines also what `mode_part` says,
+        of sliders ``gain`` (the parameter of the drive that acts as a stiffness, or None).
 
     Raises
     ------
@@ -90,6 +91,7 @@ def linear_part(rig: Slider | Machine) -> tuple[str, dict[str, Any]]:
         without, slope = stiffness_split(model)
         programs.append(program(model, "split", [*without, *slope]))
         programs.append(program(model, "stiffness", [model.axial_share or 1, model.gain]))
+        further = {"gain": rig.gain_name()}
     edges = _stable_set(len(coefficients) - 1)
     if closed:
         programs.append(program(model, "interval", interval_ingredients(model), then=_interval))

@@ -277,7 +277,7 @@ def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | No
     equation = steady_equation(point.model, place)
     name = point.model.contacts[place].name
     at = _at(name)
-    force = "force" if name else "stress"
+    force = "stress" if area is None else "force"
     if equation.parts is None:
         return _absence("no solution", name, ABSENT["no solution"].format(at=at, force=force))
     load, offset, slope = (float(part) for part in equation.parts(*point.arguments))

@@ -14,6 +14,7 @@ from steadyslip.reports.document import Parts
 from steadyslip.reports.elements import figure, heading, paragraph, table
 from steadyslip.verdict import MachineAnalysis, Tolerated
 from steadyslip.verdict.machine import machine_facts
+from steadyslip.verdict.words import headline
 
 
 def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Parts:
@@ -31,7 +32,7 @@ def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Part
     ]  # fmt: skip
     question = f"Will this machine slide steadily at {speed}, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
-    return Parts(of_rig.in_a_sentence(analysis), lead, question, body, machine, of_rig.as_file(machine))
+    return Parts(headline(analysis, capitals=False), lead, question, body, machine, of_rig.as_file(machine))
 
 
 def _picture(analysis: MachineAnalysis) -> str:

@@ -46,7 +46,7 @@ def about(analysis: Analysis, prediction: Prediction | None = None, tolerated: T
     ]  # fmt: skip
     question = f"Will this rig slide steadily at {speed}, what would make it, and how far is it from the edge?"
     lead = analysis.reason[:1].upper() + analysis.reason[1:] + "."
-    return Parts(in_a_sentence(analysis), lead, question, body, rig, as_file(rig), analysis.branch)
+    return Parts(headline(analysis, capitals=False), lead, question, body, rig, as_file(rig), analysis.branch)
 
 
 def as_file(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
@@ -55,17 +55,6 @@ def as_file(rig: Slider | Machine, protocol: Protocol | None = None) -> str:
         return rig_to_text(rig, protocol)
     except ParameterError:
         return f"{rig!r}\n[protocol]\n{protocol!r}" if protocol is not None else repr(rig)
-
-
-def in_a_sentence(analysis: Verdict) -> str:
-    """The headline, not shouted."""
-    line = headline(analysis)
-    loud, colon, rest = line.partition(": ")
-    return (
-        f"{loud.capitalize() if loud.isupper() else loud}{colon}{rest}"
-        if colon
-        else line.replace("NO STEADY SLIDING", "No steady sliding")
-    )
 
 
 def inputs(rig: Slider) -> str:

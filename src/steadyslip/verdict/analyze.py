@@ -145,7 +145,7 @@ def _analyze_slider(rig: Slider, branch: int, kicks: tuple[str, ...]) -> Analysi
             version=__version__,
             **numbers,
         )
-    from steadyslip.verdict.words import reason
+    from steadyslip.verdict.reasons import reason
 
     return replace(found, reason=reason(found))
 

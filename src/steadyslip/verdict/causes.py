@@ -100,6 +100,12 @@ def _why_none_in_general(analysis: Findings) -> str:
     return ""
 
 
+ILL_POSED = (
+    "the equations are ill-posed: friction, directly or by way of the normal stress, falls at once by more than "
+    "mass, direct effect and dampings provide, so any small lag grows at once"
+)
+"""What holds of every slider whose equations are ill-posed without a delay."""
+
 LATE = (
     "the equations are ill-posed: on a body without mass, what follows velocity late (by {delays}) outweighs what "
     "follows it at once, so that ever faster oscillations grow; give that body a mass, or make what acts late smaller "
@@ -138,7 +144,4 @@ def why_ill_posed(analysis: Findings) -> str:
             "the equations are ill-posed: velocity relieves the normal stress so that friction falls at once by more "
             "than its direct effect and dampings provide, and there is no mass to slow that down"
         )
-    return (
-        "the equations are ill-posed: friction, directly or by way of the normal stress, falls at once by more than "
-        "mass, direct effect and dampings provide, so any small lag grows at once"
-    )
+    return ILL_POSED

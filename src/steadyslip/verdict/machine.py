@@ -27,6 +27,7 @@ from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
 from steadyslip.verdict.export import common_numbers, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
+from steadyslip.verdict.reasons import ON_EDGE
 from steadyslip.verdict.words import (
     BEYOND,
     beyond,
@@ -150,7 +151,7 @@ def _kicks(machine: Machine, kinds: Sequence[str]) -> tuple[Threshold, ...]:
 PHRASES = {
     "are ill-posed": "the equations are ill-posed: somewhere friction, directly or by way of the normal force, falls "
     "at once by more than mass, direct effect and dampings provide, so any small lag grows at once",
-    "on edge": "neither verdict should be relied on: the least change of a number decides",
+    "on edge": ON_EDGE,
     "dies out": "every small disturbance dies out",
     "nearest": "the nearest edge is that of {name}: {side} {value} {beyond}",
     "stable": "it is stable",

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from steadyslip.core.errors import InternalError
 from steadyslip.core.telling import shown
 from steadyslip.machine.slider import Slider
-from steadyslip.verdict.causes import why_all, why_ill_posed, why_none
 from steadyslip.verdict.checks import UNDECIDED, in_words
 from steadyslip.verdict.holding import gain_words, holding
+from steadyslip.verdict.reasons import NEXT_TO_IT, in_stiffness
 
 if TYPE_CHECKING:
     from steadyslip.linear.boundary import Margin
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from steadyslip.nonlinear.onset.hopf import Onset
     from steadyslip.verdict.findings import Findings, Verdict
 
-NEXT_TO_IT = 1e-6  # change of a parameter that only its weak effect sets apart from the edge that the rig is on
 REMOTE = 100  # times a value, beyond which an edge is of little use
 MOST_WINDOWS = 4  # of stable stiffnesses that are told in words
 
@@ -89,61 +88,31 @@ def _limited(rig: Slider) -> bool:
     return bool(rig.mass or rig.damping or rig.radiation_damping or float(rig.drive.derivative()))
 
 
-def headline(analysis: Verdict) -> str:
+HEADLINES = {
+    "stable": ("Stable", ": steady sliding {speed}"),
+    "unstable": ("Unstable", ": steady sliding {speed}"),
+    "edge": ("On the edge", " of stability to within rounding: steady sliding {speed}"),
+    "none": ("No steady sliding", " {speed}"),
+    "undecided": ("Not decided", ": steady sliding {speed}"),
+}
+"""The first line of a verdict: what stands out, and the rest; pages have it in the same words."""
+
+
+def headline(analysis: Verdict, capitals: bool = True) -> str:
     """The first line: stable, unstable, on the edge, or no steady sliding."""
     drive = analysis.rig.parameters()["drive.velocity"]
     speed = shown(float(drive.value or 0.0), drive.role.unit)
     if analysis.stable is None:
-        return f"NOT DECIDED: steady sliding at {speed}" if is_undecided(analysis) else f"NO STEADY SLIDING at {speed}"
-    if analysis.on_edge:
-        return f"ON THE EDGE of stability to within rounding: steady sliding at {speed}"
-    return f"{'STABLE' if analysis.stable else 'UNSTABLE'}: steady sliding at {speed}"
+        kind = "undecided" if is_undecided(analysis) else "none"
+    else:
+        kind = "edge" if analysis.on_edge else "stable" if analysis.stable else "unstable"
+    first, rest = HEADLINES[kind]
+    return (first.upper() if capitals else first) + rest.format(speed=f"at {speed}")
 
 
 def is_undecided(analysis: Verdict) -> bool:
     """Whether the verdict failed its own check."""
     return analysis.reason.startswith(UNDECIDED)
-
-
-def reason(analysis: Findings) -> str:
-    """Why, in one sentence."""
-    if analysis.growth_rate == math.inf:
-        return why_ill_posed(analysis)
-    held = holding(analysis)
-    own = held.own + held.beside
-    if held.critical is None:
-        if analysis.on_edge and own == 0:
-            return "without stiffness nothing restores the block's place, so a disturbance neither grows nor dies"
-        if not held.stable:
-            return f"no {held.name} makes sliding stable" + why_none(analysis)
-        if held.beside:
-            return "with this controller sliding is stable whatever the stiffness beside it"
-        return f"sliding is stable at every {held.name}" + why_all(analysis)
-    critical = held.critical + held.beside
-    together = held.beside and held.own
-    which = "stiffness and gain kp together, " if together else "gain kp, " if held.name == "gain kp" else "stiffness "
-    ratio = own / critical
-    text = (
-        f"the {which}{_stiffness(analysis, own)}{'' if which == 'stiffness ' else ','} is "
-        f"{'' if analysis.on_edge else f'{ratio:.3g} times '}the critical "
-        f"{'stiffness ' if which == 'stiffness ' else ''}{_stiffness(analysis, critical)}"
-    )
-    if analysis.on_edge and abs(ratio - 1) > 1e-6:  # on another edge than that of the stiffness
-        return "neither verdict should be relied on: the least change of a number decides"
-    if analysis.on_edge:
-        text += " to within rounding, and neither verdict should be relied on"
-    if held.stable == ((held.critical, math.inf) if held.side == "above" else (0.0, held.critical),):
-        return f"{text}, {held.side} which sliding is stable"
-    return f"{text}, the nearest edge of the stable set given below"
-
-
-def _quantity(analysis: Findings, value: float, unit: str) -> str:
-    """A value per unit area, or for the whole area where the rig has one, as in its file."""
-    return shown(value, unit, area=analysis.rig.area)
-
-
-def _stiffness(analysis: Findings, value: float) -> str:
-    return _quantity(analysis, value, "Pa/m")
 
 
 def _stress(analysis: Findings, value: float) -> str:
@@ -170,7 +139,9 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
     if beta:
         rows.append(("at the edge", f"oscillation with period {shown(2 * math.pi / beta, 's')}"))
     if analysis.critical_axial_stiffness is not None:
-        rows.append(("along the axis", f"critical stiffness {_stiffness(analysis, analysis.critical_axial_stiffness)}"))
+        rows.append(
+            ("along the axis", f"critical stiffness {in_stiffness(analysis, analysis.critical_axial_stiffness)}")
+        )
     if analysis.onset is not None:
         rows.append(("onset", onset_words(analysis.onset)))
     return rows + [("a kick", survived(kick)) for kick in analysis.kicks]
@@ -257,11 +228,11 @@ def _stable_set(analysis: Findings) -> str:
         if low == 0 and high == math.inf:
             parts.append(f"every {held.words}{' above zero' if analysis.on_edge else ''}")
         elif high == math.inf:
-            parts.append(f"{held.words} above {_stiffness(analysis, low)}")
+            parts.append(f"{held.words} above {in_stiffness(analysis, low)}")
         elif low == 0:
-            parts.append(f"{held.words} below {_stiffness(analysis, high)}")
+            parts.append(f"{held.words} below {in_stiffness(analysis, high)}")
         else:
-            parts.append(f"{held.words} from {_stiffness(analysis, low)} to {_stiffness(analysis, high)}")
+            parts.append(f"{held.words} from {in_stiffness(analysis, low)} to {in_stiffness(analysis, high)}")
     if len(parts) > MOST_WINDOWS:  # those around the rig's own stiffness, or the lowest
         at = next((i for i, (low, high) in enumerate(held.stable) if low < held.own < high), 0)
         first = max(0, min(at - MOST_WINDOWS // 2, len(parts) - MOST_WINDOWS))

@@ -112,7 +112,7 @@ def test_the_bar_of_a_gain_is_that_of_the_gain(browser, tmp_path):
     ss.explore(own).save(tmp_path / "rig.html")
     (edge,) = [one.value for one in ss.boundary(own, "drive.kp")]
     with Visit(browser, tmp_path / "rig.html") as visit:
-        assert "Stable whatever the stiffness beside the gain, 900 GPa/m." in visit.page.inner_text(".verdict p")
+        assert "The gain kp, 900 GPa/m, is 108 times the critical 8.357 GPa/m" in visit.page.inner_text(".verdict p")
         bar = visit.page.locator(".bar")
         assert "now 900 GPa/m" in bar.inner_text()
         assert bar.get_attribute("aria-label") == f"stable values of drive.kp: above {edge / 1e9:.4g} GPa/m"

@@ -3,7 +3,7 @@ import { make, put, svg, tell } from "./dom.js";
 import { ABSENT, STABLE } from "./linear.js";
 import { ticks } from "./plot.js";
 import { digits, shown, told, unitFor } from "./quantities.js";
-import { asStiffness, beyondWords, headline, kindOf, machineReason, reason } from "./words.js";
+import { asStiffness, besides, beyondWords, headline, kindOf, reason } from "./words.js";
 
 const DECADE = Math.log(10); // on both sides of what is marked
 const ASUNDER = 1e3; // between marks that share a unit
@@ -44,8 +44,8 @@ export class Banner {
   show(answer) {
     const { phrases } = this.data;
     this.box.dataset.kind = kindOf(answer);
-    tell(this.sentence, headline(answer, this.speed(answer)));
-    if (!phrases || !this.page.tracks) tell(this.reason, phrases ? this.told(answer) : reason(answer, this.data));
+    tell(this.sentence, headline(answer, this.speed(answer), this.data));
+    if (!phrases || !this.page.tracks) tell(this.reason, phrases ? this.told(answer) : reason(answer, this.data) + besides(answer, this.data));
     this.showBar(answer);
   }
 
@@ -68,10 +68,10 @@ export class Banner {
 
   told(answer, first) {
     const { rig } = this.page, own = Array.from(rig.set(rig.values).R);
-    if (!first) return machineReason({ ...answer, own }, this.data);
+    if (!first) return reason({ ...answer, own }, this.data);
     const one = this.data.parameters[first.i], beyond = first.beyond === STABLE ? this.data.phrases.stable : beyondWords(first, this.page);
     const edge = { name: one.name, side: first.at > rig.values[first.i] ? "above" : "below", value: told(one, first.at), beyond };
-    return machineReason({ ...answer, own }, this.data, edge);
+    return reason({ ...answer, own }, this.data, edge);
   }
 
   /** What the bar shows, as it is exactly or as the track has it: where it is stable, the own value, a scale from 0 to 1. */

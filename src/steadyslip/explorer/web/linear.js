@@ -6,7 +6,7 @@ import { dampingOfPairs, roots } from "./polynomials.js";
 /** @typedef {import("./polynomials.js").Complex} Complex */
 /** @typedef {{low: number, high: number}} Interval */
 /** @typedef {Record<string, (R: Float64Array, x: number, y: Float64Array) => void>} Programs */
-/** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, degree: number, squares: number, closed: boolean, edge: number, grid: [number, number, number], solved: number,
+/** @typedef {{parameters: string[], contacts: string[], searched: boolean[], joint: boolean, degree: number, squares: number, closed: boolean, gain?: string | null, edge: number, grid: [number, number, number], solved: number,
  *   observed: [string, string, string][], coordinates?: string[], matrix?: any, stores?: any, shape?: any}} Facts */
 
 const NEARLY_REAL = 1e-6; // imaginary part of a root that is tried as real
@@ -153,15 +153,15 @@ export class Linear {
     if (status === ABSENT || status === UNKNOWN) return { ...answer, ...NOTHING, ...this.absence(status) };
     const degree = facts.degree, c = this.ask("coefficients", degree + 3), illPosed = c.splice(degree + 1)[1] === 1, eigenvalues = roots(c);
     const { p, q, own, gain, share, intervals, ends } = this.varied(c, branch), [statics] = this.ask("statics", 1);
-    const critical = ends.length ? ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a)) : null;
+    const held = facts.gain && !own && gain > 0 ? this.valuesOf(facts.parameters.indexOf(facts.gain), branch) : null, { critical, side } = nearestEnd(intervals, ends, own);
     const at = critical === null ? [] : roots(p.map((v, i) => v + critical * q[i]));
     const swing = at.filter((s) => s.im > 0).sort((a, b) => Math.abs(a.re) / a.im - Math.abs(b.re) / b.im)[0];
     const edgewise = swing && Math.abs(swing.re) < 1e-6 * swing.im ? swing.im : 0;
     const observed = this.ask("observables", facts.observed.length);
     return {
       ...answer, eigenvalues, intervals, ends, p, q, critical, share, gain, stiffness: own,
-      illPosed,
-      side: critical === null ? null : intervals?.some((one) => one.low === critical) ? "above" : "below",
+      illPosed, side,
+      held: held && { ...held, ...nearestEnd(held.intervals, held.ends, gain) },
       frequency: critical === null ? null : edgewise,
       onEdge: !illPosed && this.edgeDecides(eigenvalues, statics <= facts.edge),
       observed: Object.fromEntries(facts.observed.map(([name], i) => [name, observed[i]])),
@@ -206,11 +206,17 @@ export class Linear {
       const both = this.ask("split", 2 * degree + 2), p = both.slice(0, degree + 1), q = both.slice(degree + 1), [share, gain] = this.ask("stiffness", 2);
       return { p, q, share, gain, own: this.R[parameters.indexOf("slider.stiffness")], ...this.stableStiffness(p, q) };
     }
-    const own = this.R[this.bar], split = this.bar >= 0 && own > 0 ? this.linearIn(this.bar, branch) : null;
-    if (!split) return { p: c, q: c.map(() => 0), own, share: 1, gain: 0, intervals: null, ends: [] };
+    const found = this.bar >= 0 ? this.valuesOf(this.bar, branch) : null, own = this.R[this.bar];
+    return { ...(found ?? { p: c, q: c.map(() => 0), intervals: null, ends: [] }), own, share: 1, gain: 0 };
+  }
+
+  /** Stable values of a parameter that enters linearly, their ends, p and q; null of others. @param {number} place */
+  valuesOf(place, branch) {
+    const own = this.R[place], split = own > 0 ? this.linearIn(place, branch) : null;
+    if (!split) return null;
     const { intervals, ends } = this.stableSet(split.p, split.q);
     return {
-      p: split.p, q: split.q.map((v) => v / own), own, share: 1, gain: 0,
+      p: split.p, q: split.q.map((v) => v / own),
       intervals: intervals.map(({ low, high }) => ({ low: low * own, high: high * own })), ends: ends.map((k) => k * own),
     };
   }
@@ -286,9 +292,16 @@ export class Linear {
 
 const NOTHING = {
   eigenvalues: /** @type {Complex[]} */ ([]), intervals: /** @type {Interval[]} */ ([]), ends: [], p: [], q: [], critical: null, side: null,
-  frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false,
+  frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false, held: null,
   observed: /** @type {Record<string, number>} */ ({}),
 };
+
+/** The end nearest to a value, and on which side of it is what is stable. @param {Interval[] | null} intervals @param {number[]} ends */
+function nearestEnd(intervals, ends, own) {
+  if (!ends.length) return { critical: null, side: null };
+  const critical = ends.reduce((a, b) => (Math.abs(b - own) < Math.abs(a - own) ? b : a));
+  return { critical, side: intervals?.some((one) => one.low === critical) ? "above" : "below" };
+}
 
 const signedLog = (value, size = SIGNED) => Math.sign(value) * (size + Math.log(Math.abs(value)));
 

@@ -8,7 +8,7 @@ import { exactly } from "./quantities.js";
  *   allowed: string, own: [string, number, string], si?: string, was?: number}} Parameter `own`: unit, its size and the text in the user's file
  * @typedef {{title: string, version: string, parameters: Parameter[], facts: any, places: number[], fixed: number[],
  *   axial: number, toml: any[], branch: number, checks: any[], speed: string, area: number | null,
- *   stiffness: string | null, remote: number, areas?: number[], phrases?: any, motion: any, still: string, sketch: string}} Data
+ *   stiffness: string | null, remote: number, areas?: number[], phrases?: any, reasons?: any, headlines: any, absent: any, motion: any, still: string, sketch: string}} Data
  * @typedef {{at: (position: number) => number, of: (value: number) => number}} Scale positions from 0 to 1
  */
 

@@ -29,49 +29,56 @@ export function kindOf(answer) {
   return answer.onEdge ? "edge" : answer.status === STABLE ? "stable" : "unstable";
 }
 
-/** The sentence. @param {string} speed "at" or "of" what */
-export function headline(answer, speed) {
-  return {
-    none: `No steady sliding ${speed}`, unknown: "Numbers outside what a rig can have", edge: `On the edge of stability: steady sliding ${speed}`,
-    stable: `Stable: steady sliding ${speed}`, unstable: `Unstable: steady sliding ${speed}`,
-  }[kindOf(answer)];
+const UNFIT = "A number leaves its range, or breaks a condition that several obey together.";
+const NEXT_TO_IT = 1e-6; // as in steadyslip/verdict/reasons.py, whose phrases these functions fill
+
+/** The first line. @param {string} speed "at" or "of" what */
+export const headline = (answer, speed, { headlines }) => fill(headlines[kindOf(answer)] ?? "Numbers outside what a rig can have", { speed });
+
+/** Why, as Python says it. @param {any} answer @param {any} data @param {any} [edge] the nearest, of a machine */
+export function reason(answer, data, edge) {
+  if (answer.status === UNKNOWN) return UNFIT;
+  const { phrases, reasons } = data, words = phrases ?? reasons;
+  const text = answer.status === ABSENT ? absence(answer, data) : answer.illPosed ? words["are ill-posed"] : phrases ? ofMachine(answer, data, edge) : ofSlider(answer, data);
+  return text[0].toUpperCase() + text.slice(1) + ".";
 }
 
-/** Why. @param {any} answer @param {any} data */
-export function reason(answer, data) {
-  if (answer.status === ABSENT) {
-    if (answer.slope >= 1) return `Lock-up: the pull raises friction by more than itself (1 − μ dσ/dτ is ${digits(1 - answer.slope)}, must be above 0).`;
-    return answer.load <= 0 ? "Lift-off: the motion takes away more normal stress than the contact has." : "No positive normal stress satisfies the contact law at the steady shear stress.";
-  }
-  if (answer.status === UNKNOWN) return "A number leaves its range, or breaks a condition that several obey together.";
-  if (answer.illPosed) return "The equations are ill-posed here: the model misses an inertia or a direct effect that matters.";
-  const { critical, gain, share } = answer, one = asStiffness(data), stiffness = (k) => told(one, k);
-  if (critical === null) return answer.intervals.length ? (gain > 0 ? `Stable whatever the stiffness beside the gain, ${stiffness(gain)}.` : "Stable at every stiffness.") : "No stiffness makes this sliding stable.";
-  const total = answer.stiffness + gain, edge = critical + gain, by = gain && !answer.stiffness ? "gain" : "stiffness"; // what holds it
-  const what = gain ? (answer.stiffness ? "Stiffness and gain together, " : `The gain ${data.stiffness?.replace(/.*\./, "")}, `) : "The stiffness ", are = gain ? (answer.stiffness ? ", are" : ", is") : " is";
-  const alone = answer.intervals.length === 1 && (answer.side === "above" ? answer.intervals[0].high === Infinity : answer.intervals[0].low === 0);
-  const period = answer.frequency ? ` At the critical ${by} a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / answer.frequency, "s").replace(" ", "\u00a0")}.` : "";
-  const along = data.axial >= 0 ? ` (${stiffness(edge / share)} along the axis)` : "";
-  const tail = alone ? `, ${answer.side} which sliding is stable.${period}` : `, the nearest edge of what is stable.${period}`;
-  return `${what}${stiffness(total)}${are} ${ratio(total / edge)} times the critical ${stiffness(edge)}${along}${tail}`;
+/** Why nothing slides steadily. */
+function absence(answer, { absent, phrases, facts, areas, area }) {
+  const name = facts.contacts[answer.contact], at = name ? fill(absent.at, { name }) : "";
+  const whole = !phrases ? area : areas[answer.contact] < 0 ? 1 : answer.own[areas[answer.contact]];
+  const force = whole === null ? "stress" : "force", size = (stress) => quantity(stress, "Pa", whole);
+  if (answer.searched) return fill(absent["no solution"], { force, at });
+  if (answer.pressing !== undefined) return answer.pressing < 1 ? fill(absent.lifted, { at, left: size(answer.load) }) : fill(absent.together, { at, margin: digits(1 - answer.pressing) });
+  if (!(answer.slope < 1)) return fill(absent["lock-up"], { at, margin: digits(1 - answer.slope) });
+  return fill(absent["lift-off"], { at, force, load: size(answer.had), taken: size(answer.had - answer.load), left: size(answer.load) });
 }
 
-/** What is said of a machine: what becomes of disturbances, and the nearest edge. @param {any} answer @param {any} data @param {any} [edge] */
-export function machineReason(answer, { phrases, beyond, facts, areas }, edge) {
-  const sentence = (text) => text[0].toUpperCase() + text.slice(1) + ".";
-  if (answer.status === UNKNOWN) return "A number leaves its range, or breaks a condition that several obey together.";
-  if (answer.status === ABSENT) {
-    const { absent } = phrases, at = fill(absent.at, { name: facts.contacts[answer.contact] }), area = areas[answer.contact] < 0 ? 1 : answer.own[areas[answer.contact]];
-    const force = (stress) => shown(stress * area, "N");
-    if (answer.searched) return sentence(fill(absent["no solution"], { force: "force", at }));
-    if (answer.pressing !== undefined) return sentence(answer.pressing < 1 ? fill(absent.lifted, { at, left: force(answer.load) }) : fill(absent.together, { at, margin: digits(1 - answer.pressing) }));
-    if (!(answer.slope < 1)) return sentence(fill(absent["lock-up"], { at, margin: digits(1 - answer.slope) }));
-    return sentence(fill(absent["lift-off"], { at, force: "force", load: force(answer.had), taken: force(answer.had - answer.load), left: force(answer.load) }));
-  }
-  if (answer.illPosed) return sentence(phrases["are ill-posed"]);
-  if (answer.onEdge) return sentence(phrases["on edge"]);
+/** What holds a slider beside its critical value. */
+function ofSlider({ onEdge, eigenvalues, stiffness, gain, held, intervals, critical, side }, data) {
+  const { reasons } = data, say = (k) => told(asStiffness(data), k), own = stiffness + gain, name = held ? reasons.name : "stiffness";
+  if (onEdge && !own && eigenvalues.some(({ re, im }) => !re && !im)) return reasons.free;
+  if (held) ({ intervals, critical, side } = held);
+  const edge = critical === null ? NaN : held ? critical : critical + gain, many = own / edge;
+  if (onEdge && !(Math.abs(many - 1) <= NEXT_TO_IT)) return reasons["on edge"];
+  if (critical === null) return intervals.length && gain && !held ? reasons.beside : fill(reasons[intervals.length ? "always" : "never"], { name });
+  const text = fill(reasons[held ? "gain" : gain && stiffness ? "together" : "stiffness"], { name: reasons.name, own: say(own), ratio: onEdge ? reasons["at it"] : fill(reasons.times, { many: ratio(many) }), critical: say(edge) });
+  const alone = intervals.length === 1 && (side === "above" ? intervals[0].high === Infinity : intervals[0].low === 0);
+  return text + (alone ? fill(reasons["one edge"], { side }) : reasons.several) + (onEdge ? `; ${reasons["on edge"]}` : "");
+}
+
+/** What a slider does at its critical value, and that along the axis. */
+export function besides({ critical, illPosed, frequency, gain, stiffness, share }, data) {
+  if (critical === null || illPosed) return "";
+  const by = gain && !stiffness ? "gain" : "stiffness", along = data.axial >= 0 ? ` Along the axis the critical stiffness is ${told(asStiffness(data), (critical + gain) / share)}.` : "";
+  return along + (frequency ? ` At the critical ${by} a small disturbance oscillates, without growing or dying, with a period of ${shown((2 * Math.PI) / frequency, "s").replace(" ", "\u00a0")}.` : "");
+}
+
+/** What becomes of disturbances of a machine, and the nearest edge. */
+function ofMachine(answer, { phrases, beyond }, edge) {
+  if (answer.onEdge) return phrases["on edge"];
   const what = answer.status === STABLE ? phrases["dies out"] : beyond[kindBeyond(answer)];
-  return sentence(edge ? `${what}; ${fill(phrases.nearest, edge)}` : what);
+  return edge ? `${what}; ${fill(phrases.nearest, edge)}` : what;
 }
 
 /** What kind of change an edge is, by what is behind it where that is not stable. @param {any} answer there */

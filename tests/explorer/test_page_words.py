@@ -1,0 +1,116 @@
+"""The first line and the reason on the page of a slider are those of Python, letter by letter."""
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+import steadyslip as ss
+from explored_edges import Edges
+from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
+from steadyslip.core.telling import printed
+from steadyslip.verdict.causes import why_all, why_none
+from steadyslip.verdict.words import headline
+
+BRISTLES = ss.LuGre(
+    mu_coulomb=0.3, mu_static=0.4, v_stribeck=1e-3, bristle_stiffness=1e4, bristle_damping=800.0, viscous=80.0
+)
+HEAVY = ss.Slider(
+    friction=BRISTLES,
+    contact=ss.Linear(steady_normal_stress=1e5, b3=0.0),
+    stiffness=1e6,
+    mass=5e5,
+    drive=ss.Steady(1e-3),
+)
+RIGS = {
+    "plain": rig(),
+    "area": rig(area=0.01, contact=ss.Lift(preload=SIGMA, lift=1e11, v_ref=V0)),
+    "inclined": rig(contact=ss.InclinedSpring(preload=SIGMA, angle=-0.5)),
+    "axial": rig(contact=ss.Triaxial(confining_pressure=SIGMA, angle=0.5), stiffness=None, axial_stiffness=9e10),
+    "lifted": rig(
+        friction=rate_state(mu_ref=0.3, normal_memory=ss.LinkerDieterich(alpha=0.9)),
+        contact=ss.InclinedSpring(preload=SIGMA, angle=1.2),
+    ),
+    "gain": rig(stiffness=None, drive=ss.PD(V0, kp=4e9)),
+    "integrated": rig(stiffness=None, drive=ss.PID(V0, kp=9e9, ki=1e8), mass=1e3),
+    "together": rig(stiffness=1e9, drive=ss.PD(V0, kp=4e9, kd=1e9)),
+    "two states": rig(friction=LAWS["two states"]),
+    "heavy": HEAVY,
+    "undamped": replace(HEAVY, friction=ss.CoulombStribeck(mu_coulomb=0.3, mu_static=0.3, v_stribeck=1e-3)),
+}
+NEAR, FAR = 1.0003, 1e3  # times an edge; to three digits the first would be one
+
+
+@cache
+def page(name):
+    return Edges(RIGS[name])
+
+
+def on_page(there, values):
+    ask = """(() => {
+      rig.values = values;
+      const answer = rig.assess(), speed = Banner.prototype.speed.call({ data, page: { rig } }, answer);
+      return [headline(answer, speed, data), reason(answer, data)].map((text) => text.replaceAll("−", "-"));
+    })()"""
+    return there.script(ask, values=values)
+
+
+def in_python(own):
+    """Without the cause of a verdict on every stiffness, which a page does not look for."""
+    found = ss.analyze(own)
+    why = found.reason
+    if found.stable is not None:
+        why = why.removesuffix(why_all(found) or ":").removesuffix(why_none(found) or ":")
+    else:  # the hint of a contact in its own terms
+        why = why.partition(";")[0]
+    return [
+        printed(text).replace("−", "-") for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")
+    ]
+
+
+def compared(name, **changes):
+    there = page(name)
+    own = {there.own(there.home).resolve(key): value for key, value in changes.items()}
+    values = [own.get(key, value) for key, value in zip(there.names, there.home, strict=True)]
+    mine, theirs = on_page(there, values), in_python(there.own(values))
+    assert mine == theirs
+    return " ".join(mine)
+
+
+@pytest.mark.parametrize(("name", "stiffness"), [
+    ("area", "stiffness"),
+    ("gain", "kp"),
+    *(pytest.param(*one, marks=pytest.mark.campaign) for one in (
+        ("plain", "stiffness"), ("inclined", "stiffness"), ("axial", "axial_stiffness"), ("integrated", "kp"),
+        ("together", "stiffness"), ("two states", "stiffness"),
+    )),
+])  # fmt: skip
+def test_beside_and_on_an_edge_a_page_says_what_python_says(name, stiffness):
+    (edge,) = [one.value for one in ss.boundary(RIGS[name], stiffness) if one.kind == "oscillatory"]
+    for factor, words in ((1 / NEAR, "Unstable:"), (NEAR, "Stable:"), (1 / FAR, "Unstable:"), (FAR, "Stable:")):
+        assert compared(name, **{stiffness: factor * edge}).startswith(words)
+    text = compared(name, **{stiffness: edge})
+    assert text.startswith("On the edge of stability to within rounding: ")
+    assert "to within rounding the critical" in text
+    assert text.endswith("; neither verdict should be relied on: the least change of a number decides.")
+
+
+@pytest.mark.parametrize(("name", "changes", "words"), [
+    ("plain", {"b": 0.01}, "Sliding is stable at every stiffness."),
+    ("plain", {"b": 0.01, "stiffness": 0.0}, "Without stiffness nothing restores the block's place"),
+    ("plain", {"stiffness": 0.0}, "0 times the critical stiffness"),
+    ("gain", {"b": 0.01}, "Sliding is stable at every gain kp."),
+    ("together", {"b": 0.01}, "whatever the stiffness beside it."),
+    ("together", {"stiffness": 0.0}, "The gain kp, 4 GPa/m, is"),
+    ("lifted", {}, "No stiffness makes sliding stable."),
+    ("heavy", {}, "below which sliding is stable."),
+    ("heavy", {"b3": -1e7}, "the nearest edge of the stable set."),
+    ("undamped", {}, "Neither verdict should be relied on: the least change of a number decides."),
+    ("inclined", {"angle": -1.2}, "Lock-up. The pull raises friction by more than itself"),
+    ("axial", {"angle": 1.2}, "Lock-up."),
+    ("area", {"drive.velocity": 1e-4}, "Lift-off. The motion takes away more normal force than the contact has"),
+])  # fmt: skip
+def test_away_from_edges_too(name, changes, words):
+    text = compared(name, **changes)
+    assert words in text
+    assert text.startswith("On the edge") == ("restores" in words or "Neither" in words)

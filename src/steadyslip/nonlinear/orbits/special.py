@@ -75,6 +75,30 @@ def changes(before: Known, now: Known, made: Made, index: int) -> list[SpecialCy
     return sorted(found, key=lambda one: one._length)
 
 
+def may_return(earlier: Known, before: Known, now: Known) -> bool:
+    """Whether something may have changed sign twice between two neighbours, so that both look alike.
+
+    It may where it would change, had it gone on as from the cycle before them; where a multiplier comes closer to the
+    unit circle than it moves in the step, too.
+    """
+    three = (earlier, before, now)
+    lengths = [known.point.length for known in three]
+    if min(known.cycle.amplitude for known in (before, now)) < SMALL or not lengths[0] < lengths[1]:
+        return False
+    ahead = (lengths[2] - lengths[1]) / (lengths[1] - lengths[0])
+    multipliers = [np.array(known.cycle.multipliers) for known in three]
+    kinds = [(doubling, 1.0), (torus, 1.0)] if now.shooting.flow.size > 2 else []
+    measures = [([measure(m) for m in multipliers], moved) for measure, moved in kinds]
+    if earlier.shooting is now.shooting:  # tangents are measured alike; from the onset on they grow by factors
+        measures.append(([known.point.tangent[-1] for known in three], 0.0))
+    for (was, here, there), moved in measures:
+        if min(was, here, there) > -1 and here * there > 0:
+            goes_on = here + ahead * (here - was)
+            if goes_on * here < 0 or min(abs(here), abs(there)) < moved * abs(there - here):
+                return True
+    return False
+
+
 def growth(multipliers: Array) -> float:
     """Logarithm of the size of the largest multiplier."""
     return float(np.log(np.max(np.abs(multipliers))))

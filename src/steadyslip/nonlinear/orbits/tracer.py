@@ -21,10 +21,11 @@ from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
-from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes, lies_between
+from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes, lies_between, may_return
 
 Array = np.ndarray
 LARGEST_STEP = 0.5
+HALVINGS = 3  # of a step in which something may change twice: to an eighth, a sixteenth of a natural size
 SMALLEST_STEP = 1e-9
 WINDINGS = 6  # folds, ever closer together, after which a branch winds round one value without end
 CREEP = 60  # so many steps without growing, below a thousandth of the largest, are no progress
@@ -294,12 +295,25 @@ class Tracer:
 
     def _add_changes(self, sheet: Sheet, before: Known, here: Known) -> None:
         """Special cycles between two neighbours; where there are several, with a cycle between each two."""
-        for one in changes(before, here, self.known, len(sheet.known)):
+        earlier = sheet.known[-2] if len(sheet.known) > 1 else before
+        for one in self._changes(earlier, before, here, len(sheet.known), HALVINGS):
             last = sheet.special[-1] if sheet.special else None
             if last is not None and last.index == len(sheet.known):
                 with suppress(Failure):
                     self._add(sheet, self._on_the_way(before, here, 0.5 * (last._length + one._length)))
             sheet.special.append(replace(one, index=len(sheet.known)))
+
+    def _changes(self, earlier: Known, before: Known, here: Known, index: int, halvings: int) -> list[SpecialCycle]:
+        """Special cycles between two neighbours, also where two of a kind lie between them."""
+        found = changes(before, here, self.known, index)
+        if found or halvings == 0 or not may_return(earlier, before, here):
+            return found
+        try:
+            middle = self._on_the_way(before, here, 0.5 * (before.point.length + here.point.length))
+        except Failure:
+            return found
+        first = self._changes(earlier, before, middle, index, halvings - 1)
+        return first + self._changes(before, middle, here, index, halvings - 1)
 
     def _on_the_way(self, before: Known, here: Known, length: float) -> Known:
         """The cycle at a length of the curve between those of two neighbours.

@@ -8,8 +8,9 @@ import pytest
 import steadyslip as ss
 from dimensionless import two_states
 from doubled_machines import ALONG, closing, drawn, judged, places
+from steadyslip.nonlinear.orbits import tracer
 from steadyslip.nonlinear.orbits.cycle import End
-from steadyslip.nonlinear.orbits.ranges import stretches_of
+from steadyslip.nonlinear.orbits.ranges import Neighbour, Stretch, neighbours, stretches_of
 
 
 @dataclass
@@ -49,6 +50,19 @@ def test_stretches_end_at_special_cycles_gaps_and_ends():
     ]  # fmt: skip
 
 
+def test_windows_are_bounded_by_the_nearest_changes_of_a_branch_and_its_doublings():
+    flip = End("period doubling", 3.0)
+    once = [Stretch(True, (), (End("onset", 4.0), flip)), Stretch(False, (), (flip, End("range", 0.5)))]
+    twice = [Stretch(True, (), (flip, End("not located", 2.0))), Stretch(False, (), (End("not located", 1.9), flip))]
+    levels = ([Located("period doubling", Named(3.0), 1)], once), ([Located("torus", Named(1.5), 1)], twice)
+    assert neighbours(levels, 2.5) == (Neighbour("not located", 2.0, 2), Neighbour("period doubling", 3.0, 1))
+    assert neighbours(levels, 1.7) == (Neighbour("torus", 1.5, 2), Neighbour("not located", 1.9, 2))
+    assert neighbours(levels, 0.4) == (None, Neighbour("range", 0.5, 1))
+    words = [one.words("m", None) for one in neighbours(levels, 1.7)]
+    assert words[0] == "the torus of the cycles of 2 times the period at 1.5 m"
+    assert words[1] == "the change of stability that was not located of the cycles of 2 times the period at 1.9 m"
+
+
 def test_ranges_of_stability_end_where_multipliers_leave_the_unit_circle(doubling):
     """Text, plain data and picture say the same; the doubled cycles attract from the doubling on."""
     (flip,) = [point for point in doubling.special if point.kind == "period doubling"]
@@ -76,6 +90,10 @@ def test_at_a_value_doubled_cycles_follow_and_simulation_finds_the_same(doubling
     assert found[-1].period == pytest.approx(twice.period, rel=1e-8)
     assert found.simulated[-1].multiple == pytest.approx(twice.period / once.period, rel=1e-8)
     assert "comes to a cycle of period" in str(found)
+    below, above = found.between
+    assert (below.kind, above.kind) == ("range", "period doubling")
+    assert below.value < value < above.value == doubling.stable_ranges[0][0]
+    assert f"attracts between {below.words('Pa/m', None)} and the period doubling at" in str(found)
     assert not doubling.at(0.9 * doubling.onset.value).simulated
 
 
@@ -115,3 +133,18 @@ def test_cycles_of_machines_double_between_two_doublings(seed):
     value = flips[0].value * 0.995
     simulated = replace(branch, doubled=None).at(value)  # though the motion has no slip event
     assert simulated[-1].period == pytest.approx(branch.at(value)[-1].period, rel=1e-7)
+
+
+@pytest.mark.campaign
+def test_special_cycles_that_fall_inside_one_step_are_found(monkeypatch):
+    """Two doublings between neighbours with as many multipliers outside the unit circle: as with smaller steps."""
+    machine = drawn(np.random.default_rng(33))
+    edge = ss.hopf(machine, ALONG).value
+    found = []
+    for largest in (tracer.LARGEST_STEP, 4.0):
+        monkeypatch.setattr(tracer, "LARGEST_STEP", largest)
+        branch = ss.cycles(machine, ALONG, between=(0.4 * edge, 1.05 * edge), doublings=0)
+        found.append([point.cycle.value for point in branch.special if point.kind == "period doubling"])
+    assert len({point.index for point in branch.special}) == 2  # with a cycle between the two
+    assert found[1] == pytest.approx(found[0], rel=1e-7)
+    assert len(found[0]) == 2

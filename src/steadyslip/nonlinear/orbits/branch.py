@@ -21,7 +21,7 @@ from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import RANGE_UNITS, Cycle, CycleRange, End, SpecialCycle, quantities
-from steadyslip.nonlinear.orbits.ranges import CycleChecks, Stretch, checks_of, stretches_of
+from steadyslip.nonlinear.orbits.ranges import CycleChecks, Stretch, checks_of, neighbours, stretches_of
 from steadyslip.nonlinear.orbits.values import CyclesAt, cycles_at, simulations
 
 Array = np.ndarray
@@ -121,17 +121,24 @@ class CycleBranch(Displayed):
         If none of them attracts, those of twice the period and so on follow, until one does. If none of these does
         either, motions are simulated at the value; the stable cycle that one comes to, if it does, is the last, and
         ``simulated`` of what comes back says what each motion showed: cycles of several slip events may lie on sheets
-        of their own, in windows among irregular motion.
+        of their own, in windows among irregular motion. ``between`` are the special cycles, or ends of a branch, that
+        bound the window around the value.
         """
         found = list(self._followed(value))
-        branch = self.doubled
-        while not any(cycle.stable for cycle in found) and branch is not None:
-            found += branch._followed(value)
+        branch, levels = self.doubled, [self]
+        while branch is not None:
+            if not any(cycle.stable for cycle in found):
+                found += branch._followed(value)
+            levels.append(branch)
             branch = branch.doubled
         if any(cycle.stable for cycle in found):
             return CyclesAt(found)
         seen = simulations(self.onset, self.steady, self.rtol, value, found)
-        return CyclesAt([*found, *(one.cycle for one in seen if one.cycle is not None)], seen)
+        beside = neighbours([(one.special, one.stretches) for one in levels], value)
+        places = [one.words(self.unit, self._area("value")) for one in beside if one is not None]
+        where = {0: "", 1: " beyond ", 2: " between "}[len(places)] + " and ".join(places)
+        window = "none of the cycles that were followed attracts" + where
+        return CyclesAt([*found, *(one.cycle for one in seen if one.cycle is not None)], seen, beside, window)
 
     def _followed(self, value: float) -> tuple[Cycle, ...]:
         """Those of the branch itself."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from steadyslip.core.telling import shown
 from steadyslip.nonlinear.orbits.cycle import OPEN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.special import NOISE, SMALL
 
@@ -55,6 +56,50 @@ def stretches_of(
             before = [one.cycle for one in (first,) if one.cycle is not None and one.cycle is not inside[0]]
             after = [one.cycle for one in (last,) if one.cycle is not None and one.cycle is not inside[-1]]
             yield Stretch(inside[0].stable, (*before, *inside, *after), (first, last))
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """A place beside a value of the parameter at which cycles of a branch, or of its doublings, change or stop.
+
+    Attributes
+    ----------
+    kind : str
+        That of `SpecialCycle` or of `End`.
+    value : float
+        Of the parameter, SI units.
+    multiple : int
+        1 on the branch itself, 2 on its cycles of twice the period, and so on.
+    """
+
+    kind: str
+    value: float
+    multiple: int
+
+    def words(self, unit: str, area: float | None) -> str:
+        """What is there, of which cycles, and where."""
+        name = WORDS.get(self.kind, self.kind)
+        of = "" if self.multiple == 1 else f" of the cycles of {self.multiple} times the period"
+        return f"the {name}{of} at {shown(self.value, unit, 6, area)}"
+
+
+WORDS = {
+    "last cycle": "last cycle that could be followed", "range": "end of the range",
+    "not located": "change of stability that was not located",
+}  # fmt: skip
+Changing = tuple[Sequence[SpecialCycle], Sequence[Stretch]]
+
+
+def neighbours(levels: Sequence[Changing], value: float) -> tuple[Neighbour | None, Neighbour | None]:
+    """The nearest of such places below a value and above it; levels are a branch, its doublings, and theirs."""
+    places = list[Neighbour]()
+    for i, (special, stretches) in enumerate(levels):
+        places += [Neighbour(one.kind, one.cycle.value, 2**i) for one in special]
+        ends = [end for one in stretches for end in one.ends]
+        places += [Neighbour(end.kind, end.value, 2**i) for end in ends if end.kind != "period doubling"]
+    below = max((one for one in places if one.value <= value), key=lambda one: one.value, default=None)
+    above = min((one for one in places if one.value > value), key=lambda one: one.value, default=None)
+    return below, above
 
 
 @dataclass(frozen=True)

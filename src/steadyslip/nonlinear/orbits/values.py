@@ -13,6 +13,7 @@ from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle
 from steadyslip.nonlinear.orbits.flow import Flow
+from steadyslip.nonlinear.orbits.ranges import Neighbour
 from steadyslip.nonlinear.orbits.search import AHEAD, PATIENCE
 from steadyslip.nonlinear.orbits.tracer import LARGEST_STEP, Tracer, orbit_of
 from steadyslip.nonlinear.orbits.verify import motion_from
@@ -77,14 +78,22 @@ class CyclesAt(tuple[Cycle, ...]):
     simulated : tuple of Simulation
         What motions showed that were simulated because no cycle of the branch or its doublings attracts; empty if one
         does.
+    between : tuple of Neighbour or None
+        Then, the nearest places below the value and above it at which cycles of the branch or its doublings change or
+        stop: they bound the window in which none of these attracts. None where there is no such place.
     """
 
     simulated: tuple[Simulation, ...]
+    between: tuple[Neighbour | None, Neighbour | None]
+    _window: str
 
-    def __new__(cls, cycles: Iterable[Cycle], simulated: Sequence[Simulation] = ()) -> CyclesAt:
-        """The cycles as a tuple, with what motions showed."""
+    def __new__(
+        cls, cycles: Iterable[Cycle], simulated: Sequence[Simulation] = (),
+        between: tuple[Neighbour | None, Neighbour | None] = (None, None), window: str = "",
+    ) -> CyclesAt:  # fmt: skip
+        """The cycles as a tuple, with what motions showed, and the window around the value in words."""
         made = super().__new__(cls, cycles)
-        made.simulated = tuple(simulated)
+        made.simulated, made.between, made._window = tuple(simulated), between, window
         return made
 
     def __str__(self) -> str:
@@ -92,7 +101,7 @@ class CyclesAt(tuple[Cycle, ...]):
             f"{'stable' if one.stable else 'unstable'} cycle of period {shown(one.period, 's')}; {one.checked}"
             for one in self
         ]
-        return "\n".join([*lines, *map(str, self.simulated)]) or "no cycle"
+        return "\n".join([*lines, *map(str, self.simulated), *filter(None, [self._window])]) or "no cycle"
 
 
 def simulations(

@@ -177,7 +177,7 @@ class Parameter(Entry):
                 raise self.refused(value) from error
         if not self.domain.contains(number):
             raise self.refused(value)
-        return number
+        return number + 0.0  # -0.0 is 0: files do not write what equals a default
 
     def given(self, value: Any) -> float:
         """What a constructor takes: as `checked`; or text, a `Total` or `InUnit` where its unit depends on the rig."""
@@ -264,7 +264,8 @@ class Series(Entry):
         """A list of numbers, on as many lines as it needs."""
         factor, unit = outside(self.unit, area)
         each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {self.unit}"' for v in value]
-        text = wrap(", ".join(each), 100, break_on_hyphens=False)
+        each = [one.replace(" ", "\xa0") for one in each]  # a line ends between two, not inside of a text
+        text = [line.replace("\xa0", " ") for line in wrap(", ".join(each), 100, break_on_hyphens=False)]
         return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
 
 

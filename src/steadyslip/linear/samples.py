@@ -40,14 +40,16 @@ def unbounded(domain: Domain, zero: bool, size: float, least: float, most: float
     """
     middle = np.linspace(-DECADES, DECADES, 2 * DECADES * _PER_DECADE // share + 1)
     with np.errstate(all="ignore"):
-        down, up = np.log10(size / least) - DECADES, np.log10(most / size) - DECADES
+        down, up = (np.log10(np.divide(*ends)) - DECADES for ends in ((size, least), (most, size)))  # least may be 0
     step = share / _FURTHER
     lower, upper = (
         DECADES + step * np.arange(1, int(np.ceil(min(max(far, 0.0), 2 * _LARGEST) / step)) + 1) for far in (down, up)
     )
     decades = np.concatenate([-lower[::-1], middle, upper])
-    decades = decades[np.abs(decades + np.log10(size)) < _LARGEST]
-    samples = size * 10.0**decades
+    power = decades + np.log10(size)
+    decades, power = decades[np.abs(power) < _LARGEST], power[np.abs(power) < _LARGEST]
+    with np.errstate(over="ignore"):  # of a size that is nearly nothing
+        samples = np.where(decades < _LARGEST, size * 10.0**decades, 10.0**power)
     nothing = np.zeros(int(zero or domain.low < 0))
     samples = np.concatenate([-samples[::-1] if domain.low < 0 else [], nothing, samples])
     return np.asarray(samples[domain.contains(samples)])

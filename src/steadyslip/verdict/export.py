@@ -38,7 +38,7 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
         "critical_side": analysis.critical_side,
         "critical_angular_frequency": analysis.critical_angular_frequency,
         "critical_axial_stiffness": analysis.critical_axial_stiffness,
-        "stable_stiffness": [[low, _finite(high)] for low, high in analysis.stable_stiffness],
+        "stable_stiffness": [[low, high] for low, high in analysis.stable_stiffness],
         **_held_by(analysis),
         **{name: value for name, value in common.items() if name not in _LAST},
         "onset": None if analysis.onset is None else onset_dict(analysis.onset),
@@ -47,7 +47,8 @@ def as_dict(analysis: Findings) -> dict[str, Any]:
     }
     if analysis.rig.area is not None:
         data["forces"] = _forces(analysis, analysis.rig.area)
-    return data
+    found: dict[str, Any] = finite(data)
+    return found
 
 
 def _held_by(analysis: Findings) -> dict[str, Any]:
@@ -62,7 +63,7 @@ def _held_by(analysis: Findings) -> dict[str, Any]:
             "value": held.own,
             "critical": held.critical,
             "critical_side": held.side,
-            "stable": [[low, _finite(high)] for low, high in held.stable],
+            "stable": [[low, high] for low, high in held.stable],
         }
         | total(held.critical, "Pa/m", analysis.rig.area)
     }
@@ -82,7 +83,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "eigenvalues": [[s.real, s.imag] for s in found.eigenvalues],
         "characteristic_polynomial": list(found.characteristic_polynomial),
         "routh": list(found.routh),
-        "growth_rate": _finite(found.growth_rate),
+        "growth_rate": found.growth_rate,
         "period": found.period,
         "damping_ratio": found.damping_ratio,
         "time_to_halve": found.time_to_halve,
@@ -90,7 +91,7 @@ def common_numbers(found: Verdict) -> dict[str, Any]:
         "boundaries": [row for one in found.margins for row in _edges(one, found.rig.area_of(one.parameter))],
         "warnings": list(found.warnings),
         "checked": in_words(found.checks),
-        "checks": [asdict(check) | {"error": _finite(check.error)} for check in found.checks],
+        "checks": [asdict(check) for check in found.checks],
         **(late if found.characteristic_terms else {}),
     }
 
@@ -102,9 +103,9 @@ def onset_dict(onset: Onset) -> dict[str, Any]:
         "kind": onset.kind,
         "parameter": onset.along,
         "value": onset.value,
-        "coefficient": _finite(onset.coefficient),
-        "coefficient_error": _finite(onset.coefficient_error),
-        "normalised_coefficient": _finite(onset.normalised),
+        "coefficient": finite(onset.coefficient),
+        "coefficient_error": finite(onset.coefficient_error),
+        "normalised_coefficient": finite(onset.normalised),
         "growth_slope": onset.growth_slope,
         "angular_frequency": onset.angular_frequency,
         "meaning": onset.meaning,
@@ -142,9 +143,16 @@ def _forces(analysis: Findings, area: float) -> dict[str, Any]:
         "normal_force": None if steady is None else steady.normal_stress * area,
         "friction_force": None if steady is None else steady.shear_stress * area,
         "critical_stiffness": None if analysis.critical_stiffness is None else analysis.critical_stiffness * area,
-        "stable_stiffness": [[low * area, _finite(high * area)] for low, high in analysis.stable_stiffness],
+        "stable_stiffness": [[low * area, high * area] for low, high in analysis.stable_stiffness],
     }
 
 
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
+def finite(data: Any) -> Any:
+    """Plain data with None for numbers that do not exist, and infinite ones."""
+    if isinstance(data, dict):
+        return {name: finite(one) for name, one in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [finite(one) for one in data]
+    if isinstance(data, float):
+        return float(data) if math.isfinite(data) else None
+    return data

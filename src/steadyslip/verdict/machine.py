@@ -24,7 +24,7 @@ from steadyslip.model.sliding import SteadyMachine, steady_machine
 from steadyslip.nonlinear.onset.hopf import Onset, onset_at
 from steadyslip.verdict.causes import why_late
 from steadyslip.verdict.checks import edge_checks, undecided, verdict_checks
-from steadyslip.verdict.export import common_numbers, onset_dict
+from steadyslip.verdict.export import common_numbers, finite, onset_dict
 from steadyslip.verdict.findings import MachineFindings
 from steadyslip.verdict.numbers import linear_numbers
 from steadyslip.verdict.reasons import ON_EDGE
@@ -215,11 +215,13 @@ def _warnings(machine: Machine, steady: SteadyMachine) -> tuple[str, ...]:
 
 def as_dict(found: MachineAnalysis) -> dict[str, Any]:
     """SI units, forces; numbers that do not exist, and infinite ones, are None."""
-    return common_numbers(found) | {
+    data: dict[str, Any] = common_numbers(found) | {
         "steady": _steady(found.steady), "mode": _mode(found.mode),
         "onset": None if found.onset is None else onset_dict(found.onset),
         "kicks": [kick.to_dict() for kick in found.kicks],
     }  # fmt: skip
+    plain: dict[str, Any] = finite(data)
+    return plain
 
 
 def _steady(steady: SteadyMachine | None) -> dict[str, Any] | None:

@@ -226,8 +226,9 @@ def test_hurwitz_is_the_same_in_any_unit_of_time(rates, decades, flip):
 
 
 @pytest.mark.campaign
-def test_verdicts_at_absurd_sizes_are_those_of_numbers_without_end():
+def test_verdicts_at_absurd_sizes_are_those_of_numbers_without_end(monkeypatch):
     """A sample of `benchmarks/sizes.py`: the same polynomial in 700 digits, whose exponents have no end."""
+    monkeypatch.syspath_prepend(EXAMPLES.parent / "benchmarks")
     spec = importlib.util.spec_from_file_location("sizes", EXAMPLES.parent / "benchmarks" / "sizes.py")
     sizes = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sizes)

@@ -14,6 +14,8 @@ import numpy as np
 from problems import Problem, problems
 from quick import QUICK
 
+from steadyslip.kernels.layout import Final
+from steadyslip.model.reduction import SPEED
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.jobs import Options, prepare
 
@@ -35,7 +37,7 @@ def measured(
         call.go(10**12)
         best = min(best, time.process_time() - begin)
     names = machine.reduction.names
-    return call.final[:, [4 + names.index("w"), 4 + names.index("x")]], best / count
+    return call.final[:, [Final.STATE + names.index(name) for name in (SPEED, "x")]], best / count
 
 
 def main() -> None:

@@ -39,6 +39,7 @@ from steadyslip.kernels.build import machine_code
 from steadyslip.kernels.layout import Final
 from steadyslip.kernels.nodes import Program
 from steadyslip.kernels.record import Evaluator
+from steadyslip.model.reduction import SPEED
 from steadyslip.motion.engine import LANES, Call
 from steadyslip.motion.jobs import Options, prepare
 
@@ -59,7 +60,7 @@ def ours_single(problem: Problem, tolerance: float, variants: np.ndarray) -> tup
     call.go(10**12)
     seconds = time.process_time() - begin
     names = dict(zip(machine.reduction.names, call.final[0, Final.STATE :], strict=True))
-    return np.array([[names["w"], names["x"]]]), seconds
+    return np.array([[names[SPEED], names["x"]]]), seconds
 
 
 def ours_ensemble(

@@ -94,7 +94,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=None)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--limit", type=float, default=60.0, help="processor time of one command, s")
-    given = parsed(parser, what="combinations", count=2)
+    given = parsed(parser, what="combinations", count=1)
     table: dict[tuple[str, str], list[float]] = defaultdict(list)
     start, peak = time.perf_counter(), 0.0
     with tempfile.TemporaryDirectory() as folder:

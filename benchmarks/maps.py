@@ -31,7 +31,7 @@ import steadyslip as ss
 from steadyslip.maps.work import cluster, local
 
 TIMES = 1 if QUICK else 3
-PART = 1000 if QUICK else 1
+PART = 10_000 if QUICK else 1
 RIG = Path(__file__).parents[1] / "examples" / "inclined-spring.toml"
 
 
@@ -166,7 +166,8 @@ def main() -> None:
     print(f"{plan.size:.3g} damped stick-slip runs: {seconds:.1f} s, {plan.size / seconds:.3g} runs/s = {share:.2f} of "
           f"simulate_many ({rate:.3g} runs/s), {peak}")  # fmt: skip
 
-    for name, plan in (("stability", stability(3 * 10**7 // PART)), ("stick-slip", stick_slip(2 * 10**5 // PART))):
+    both = (("stability", stability(3 * 10**7 // PART)), ("stick-slip", stick_slip(2 * 10**5 // PART)))
+    for name, plan in both[: 1 if QUICK else 2]:
         one, _ = run(plan, workers=1)
         two, times = run(plan, workers=2)
         print(f"{name}, {plan.size:.3g} points: two workers {one / two:.2f} x one in all, "

@@ -14,6 +14,7 @@ export const SAME = 1e-9; // relative distance of two edges that are one
 const HUGE = 1e150, SIGNED = 1e4; // sizes whose products are numbers; more than the logarithm of any product of coefficients
 const FORMULA = 4, REAL = 1e-9; // numbers that `steady` gives of a contact; imaginary part of a gain that is real but for rounding
 const APART = [1e-6, 1, 1e6]; // factors on a parameter at which the polynomial is looked at
+const SIZED_APART = 1e12; // times a parameter's size, and its inverse, beyond which rounding decides where it has an edge
 export const ABSENT = 0, STABLE = 1, UNSTABLE = 2, UNKNOWN = 3;
 
 export class Linear {
@@ -214,7 +215,7 @@ export class Linear {
   valuesOf(place, branch) {
     const own = this.R[place], split = own > 0 ? this.linearIn(place, branch) : null;
     if (!split) return null;
-    const { intervals, ends } = this.stableSet(split.p, split.q);
+    const { intervals, ends } = resolved(this.stableSet(split.p, split.q), sizeOfFactor(split.p, split.q));
     return {
       p: split.p, q: split.q.map((v) => v / own),
       intervals: intervals.map(({ low, high }) => ({ low: low * own, high: high * own })), ends: ends.map((k) => k * own),
@@ -295,6 +296,20 @@ const NOTHING = {
   frequency: null, share: NaN, gain: NaN, stiffness: NaN, illPosed: false, onEdge: false, held: null,
   observed: /** @type {Record<string, number>} */ ({}),
 };
+
+/** The size of k in p + k q: 1, its own value, unless p and k q are alike in size only far from there. @param {number[]} p @param {number[]} q */
+function sizeOfFactor(p, q) {
+  const ratios = p.map((v, i) => Math.log(Math.abs(v)) - Math.log(Math.abs(q[i]))).filter(Number.isFinite);
+  const alike = Math.exp(ratios.reduce((a, b) => a + b, 0) / Math.max(ratios.length, 1));
+  return alike < APART[0] || alike > APART[2] ? alike : 1;
+}
+
+/** A stable set whose ends are 0 or infinity where they are rounding of these. @param {{intervals: Interval[], ends: number[]}} found @param {number} size */
+function resolved({ intervals, ends }, size) {
+  const end = (k) => (k < size / SIZED_APART ? 0 : k > size * SIZED_APART ? Infinity : k);
+  const known = intervals.map(({ low, high }) => ({ low: end(low), high: end(high) })).filter(({ low, high }) => low < high);
+  return { intervals: known, ends: ends.filter((k) => end(k) === k) };
+}
 
 /** The end nearest to a value, and on which side of it is what is stable. @param {Interval[] | null} intervals @param {number[]} ends */
 function nearestEnd(intervals, ends, own) {

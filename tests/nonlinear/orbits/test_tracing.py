@@ -18,7 +18,7 @@ from steadyslip.nonlinear.orbits.flow import Flow, Runs
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.shooting import Shooting
 from steadyslip.nonlinear.orbits.special import Known, changes
-from steadyslip.nonlinear.orbits.tracer import STANDING, Tracer, _stands, _winds
+from steadyslip.nonlinear.orbits.tracer import STANDING, Tracer, _retraces, _stands, _winds
 from steadyslip.nonlinear.orbits.verify import cycle_near
 
 
@@ -71,6 +71,24 @@ def test_parameter_that_stands_still_is_an_end(damped):
     assert not _stands(along(rounding, np.geomspace(1.0, 1.2, STANDING)))  # a canard that goes on
     assert not _stands(along(1.0 + 1e-9 * np.arange(STANDING), np.ones(STANDING)))
     assert not _stands(along(rounding[1:], np.ones(STANDING - 1)))
+
+
+def test_a_way_back_passes_the_amplitudes_of_the_way_there(damped):
+    """A branch that rises upright from a degenerate onset does not, though values of its small cycles are rounding."""
+    one = damped.cycles[0]
+
+    def of(value, size):
+        peak, lowest = one.speed * np.exp([size, -size])
+        return replace(one, value=value, peak_velocity=peak, lowest_velocity=lowest, amplitude=size)
+
+    rounding = np.array([-2500, -660, -86, 340, -370, -240, 34, 42, -5.6, -10.5, -8.6, 3]) * 1e-12
+    upright = [of(1 + off, 5e-7 * 2**i) for i, off in enumerate(rounding)]
+    assert not _retraces(upright)
+    sizes = [*np.linspace(0.1, 1, 19), *np.linspace(0.975, 0.5, 19)]
+    back = [of(1 - 0.1 * size, size) for size in sizes]
+    assert [_retraces(back[:19]), _retraces(back)] == [False, True]
+    stopping = [replace(cycle, amplitude=np.inf) for cycle in back]
+    assert [_retraces(stopping[:19]), _retraces(stopping)] == [False, True]
 
 
 def test_multipliers_are_not_read_where_the_parameter_stands_still(damped):

@@ -21,7 +21,7 @@ from steadyslip.nonlinear.orbits.flow import Flow, FlowFailure
 from steadyslip.nonlinear.orbits.measure import measured
 from steadyslip.nonlinear.orbits.segments import MOST_GROWTH, cut
 from steadyslip.nonlinear.orbits.shooting import ONE, Orbit, Shooting
-from steadyslip.nonlinear.orbits.special import ROUNDING, SMALL, Known, changes, lies_between, may_return
+from steadyslip.nonlinear.orbits.special import MET, ROUNDING, SMALL, Known, changes, lies_between, may_return
 
 Array = np.ndarray
 LARGEST_STEP = 0.5
@@ -583,11 +583,22 @@ def _winds(special: list[SpecialCycle]) -> bool:
 
 
 def _retraces(known: list[Cycle]) -> bool:
-    """Whether the last cycles lie between neighbours that were passed before."""
+    """Whether the last cycles lie between neighbours that were passed before, and are no larger or smaller than these.
+
+    Periods and velocities of small cycles are alike, and where a branch begins upright, as at a degenerate onset, their
+    values are rounding: amplitudes tell that it goes on.
+    """
     last, passed = known[-RETRACED:], known[: -2 * RETRACED]
     if len(passed) < 2 or (known[-1].value - known[-2].value) * (known[-2].value - known[-3].value) < 0:
         return False
-    return all(any(lies_between(a, b, one) for a, b in pairwise(passed)) for one in last)
+    return all(any(lies_between(a, b, one) and _sized(a, b, one) for a, b in pairwise(passed)) for one in last)
+
+
+def _sized(a: Cycle, b: Cycle, cycle: Cycle) -> bool:
+    """Whether the amplitude of a cycle is one of those between two neighbours."""
+    *ends, size = (float(np.log(min(one.amplitude, LARGE))) for one in (a, b, cycle))
+    spread = MET + 0.3 * (ends[1] - ends[0]) ** 2
+    return min(ends) - spread < size < max(ends) + spread
 
 
 def _stands(last: list[Cycle]) -> bool:

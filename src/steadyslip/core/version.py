@@ -7,14 +7,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-RELEASE = "0.1.0"
+RELEASE = "0.2.0"
 KINDS = (".py", ".pyi", ".js", ".css", ".json")
 """Endings of the files that the package consists of."""
 
 
 @lru_cache(maxsize=1)
 def version() -> str:
-    """The release and a digest, such as ``0.1.0+s3f9c12ab``: another one as soon as a file of the package is another.
+    """The release and a digest, such as ``0.2.0+s3f9c12ab``: another one as soon as a file of the package is another.
 
     Alike in a checkout, a wheel and a source distribution, on every system; kept from the first call on.
     """

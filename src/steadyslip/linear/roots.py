@@ -5,7 +5,7 @@ Coefficients run along the last axis, lowest power first; the other axes are rig
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import wraps
 from itertools import pairwise
 from typing import Any, ParamSpec, TypeVar
@@ -74,8 +74,9 @@ def roots(c: Array) -> ComplexArray:
         rows = np.flatnonzero(degree == d)
         own = flat[rows, : d + 1]
         found[rows, :d] = _roots_of_degree(own)
-        for i in np.flatnonzero(_are_missed(own, found[rows, :d])):
-            found[rows[i], :d] = _roots_by_size(own[i])
+        missed = np.flatnonzero(_are_missed(own, found[rows, :d]))
+        if missed.size:
+            found[rows[missed], :d] = _roots_by_size(own[missed])
     order = np.argsort(-found.real, axis=-1, kind="stable")
     return np.take_along_axis(found, order, axis=-1).reshape(*c.shape[:-1], n)
 
@@ -136,14 +137,39 @@ def _are_missed(c: Array, s: ComplexArray) -> NDArray[np.bool_]:
 
 
 def _roots_by_size(c: Array) -> ComplexArray:
-    """Roots of one polynomial of full degree that holds some of very different size.
+    """Roots of polynomials of full degree that hold some of very different size, (rows, n).
 
-    The upper hull of the logarithms of its coefficients gives these sizes (Newton's polygon). For roots of about one
-    size, time is counted in units in which they are about one: what the others add to coefficients is then nothing.
+    For roots of about one size, time is counted in units in which they are about one: what the others add to
+    coefficients is then nothing. Polynomials whose roots are grouped alike are solved together.
     """
-    n, low = len(c) - 1, int(np.argmax(c != 0))
+    n = c.shape[-1] - 1
     mantissa, exponent = np.frexp(c)
-    height = np.where(c != 0, np.log2(np.abs(mantissa)) + exponent, -np.inf)
+    alike: dict[tuple[int, int, int, int], list[tuple[int, int, Array]]] = {}
+    for row, (own_mantissa, own_exponent) in enumerate(zip(mantissa, exponent, strict=True)):
+        for first, last, unit in _groups_of_size(own_mantissa, own_exponent):
+            shifted = own_exponent + unit * np.arange(n + 1)
+            own = np.ldexp(own_mantissa, shifted - np.max(shifted[own_mantissa != 0]))
+            present = np.flatnonzero(np.abs(own) > _GONE)
+            ends = min(int(present[0]), n - last), max(int(present[-1]), n - first)
+            alike.setdefault((first, last, *ends), []).append((row, unit, own))
+    found = np.zeros((len(c), n), dtype=complex)
+    for (first, last, bottom, top), members in alike.items():
+        own = np.array([one for _, _, one in members])
+        inner = _of_companion(own[:, bottom : top + 1])
+        inner = np.take_along_axis(inner, np.argsort(-np.abs(inner), axis=-1, kind="stable"), axis=-1)
+        skip = first - (n - top)  # larger roots that are among these
+        rows, units = [row for row, _, _ in members], np.array([unit for _, unit, _ in members])
+        found[rows, first:last] = _scaled(_polished(own, inner[:, skip : skip + last - first]), units[:, None])
+    return found
+
+
+def _groups_of_size(mantissa: Array, exponent: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
+    """First and last of roots of about one size, the largest first, and the power of two that their size is near.
+
+    The upper hull of the logarithms of a polynomial's coefficients gives the sizes (Newton's polygon).
+    """
+    n, low = len(mantissa) - 1, int(np.argmax(mantissa != 0))
+    height = np.where(mantissa != 0, np.log2(np.abs(mantissa)) + exponent, -np.inf)
     corners = [n]
     while corners[-1] > low:  # the least slope first: from the largest roots to the smallest
         at = corners[-1]
@@ -151,22 +177,12 @@ def _roots_by_size(c: Array) -> ComplexArray:
         corners.append(int(steps[np.argmax((height[steps] - height[at]) / (at - steps))]))
     spans = list(pairwise(corners))
     logs = np.repeat([(height[b] - height[a]) / (a - b) for a, b in spans], [a - b for a, b in spans])
-    found = np.zeros(n, dtype=complex)
     ends = [0, *(np.flatnonzero(-np.diff(logs) > np.log2(_APART)) + 1), len(logs)]
     for first, last in pairwise(ends):
-        unit = int(np.rint(np.mean(logs[first:last])))
-        shifted = exponent + unit * np.arange(n + 1)
-        own = np.ldexp(mantissa, shifted - np.max(shifted[c != 0]))
-        present = np.flatnonzero(np.abs(own) > _GONE)
-        bottom, top = min(present[0], n - last), max(present[-1], n - first)
-        inner = _of_companion(own[None, bottom : top + 1])[0]
-        inner = inner[np.argsort(-np.abs(inner), kind="stable")]
-        skip = first - (n - top)  # larger roots that are among these
-        found[first:last] = _scaled(_polished(own[None], inner[None, skip : skip + last - first])[0], unit)
-    return found
+        yield int(first), int(last), int(np.rint(np.mean(logs[first:last])))
 
 
-def _scaled(s: ComplexArray, exponent: int) -> ComplexArray:
+def _scaled(s: ComplexArray, exponent: NDArray[np.int64]) -> ComplexArray:
     """s times a power of two."""
     return np.asarray(np.ldexp(s.real, exponent) + 1j * np.ldexp(s.imag, exponent))
 

@@ -50,6 +50,7 @@ _FLAT = 1e-6  # share by which a measure falls to a dip: less is rounding on a l
 _DIPS = 16  # lowest of a scan that are looked into: contacts that are alike have roots that jitter at every sample
 _ROUNDS = 8  # of narrowing, each of which finds one edge more in a cell that has several
 _CHANGES = 64  # of samples next to each other, of more only those of the status: conditions that rounding decides
+_MORE = 8  # changes beside others that one round of narrowing may bring to light
 _BESIDE = 4  # the status is what is left when kinds are divided by this
 _SPLIT = 32  # pieces into which a bracket is cut at each step of narrowing
 _FEW = 8  # growing roots of rigs with delay, of which a dip between two samples may be a window; of more none is
@@ -201,13 +202,15 @@ class Search:
         """
         x, kind = self._judged(*(self._usual if between is None else self._asked(between)))
         low, high = np.empty(0), np.empty(0)
+        most = len(x)
         for _ in range(_ROUNDS):
             at = np.flatnonzero(kind[1:] != kind[:-1])
             if len(at) > _CHANGES:
                 at = at[(kind[at + 1] - kind[at]) % _BESIDE != 0]
             at = at[~_within(low, x[at], x[at + 1])]
-            if not at.size:
+            if not 0 < at.size <= most:  # more beside the changes than there were: rounding decides them
                 break
+            most = max(at.size, _MORE)
             lower, upper = self._narrowed(x[at], x[at + 1], kind[at], kind[at + 1])
             ends = zip(lower, x[at], upper, x[at + 1], strict=True)
             beside = [samples.towards(*pair, share=self.share) for a, b, c, d in ends for pair in ((a, b), (c, d))]

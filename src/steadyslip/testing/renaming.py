@@ -31,7 +31,8 @@ def _new_names(law: FrictionLaw | ContactLaw, seed: int) -> tuple[dict[str, str]
     """Random names of a law's own parameters, and of its memory or states."""
     random = Random(f"{type(law).__name__} {seed}")
     own = [item.name for item in fields(law) if isinstance(role_of(item), Parameter)]
-    free = [word for word in WORDS.split() if not hasattr(law, word)]
+    taken = {*dir(law), *law.memory()}
+    free = [word for word in WORDS.split() if word not in taken]
     random.shuffle(free)
     free += [f"n{random.getrandbits(40):x}" for _ in range(len(own) + len(law.memory()))]
     return dict(zip(own, free, strict=False)), dict(zip(law.memory(), free[len(own) :], strict=False))

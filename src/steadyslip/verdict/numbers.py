@@ -52,7 +52,7 @@ def linear_numbers(values: OperatingPoint) -> dict[str, Any]:
     if not bad:
         found, good = checked_spectrum(values), shares_of_errors(values)[1]
         if found.refined and found.complete:  # with many digits
-            numbers["stable"] = found.growing == 0
+            numbers["stable"] = bool(found.growing == 0 and np.all(found.values != 0))  # one of zero is neutral
         leading = bool(good[:1].all() and good.size)
         numbers["eigenvalues"] = tuple(complex(s) for s in found.values[good]) if leading else ()
     eigenvalues = numbers["eigenvalues"]

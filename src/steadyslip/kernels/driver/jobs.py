@@ -182,9 +182,10 @@ def go_on(
     if lowest_stress(R, layout) <= R[Row.SIGMA_LOW]:
         return Status.CONTACT_LOST
     status = exhausted(R, 1, 0)
+    if status == Status.STUCK and layout.massless > 0 and highest_velocity(R, layout) >= RUNAWAY * abs(R[Row.V_DRIVE]):
+        return Status.BLOW_UP
     if status != Status.RUNNING:
-        runs_away = layout.massless > 0 and highest_velocity(R, layout) >= RUNAWAY * abs(R[Row.V_DRIVE])
-        return Status.BLOW_UP if runs_away else status
+        return status
     while R[Row.TAU] >= R[Row.END]:
         k = int(R[Row.SEGMENT]) + 1
         s = j if segments.shape[0] > 1 else 0

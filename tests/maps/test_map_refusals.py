@@ -50,9 +50,7 @@ def test_another_version_or_function_is_refused(tmp_path, monkeypatch):
         made(ss.Map(rig(), {"stiffness": [1e9]}, [first]), tmp_path)
     made(chart(), tmp_path, "other.zarr")
     monkeypatch.setattr(ss, "__version__", "9.9")
-    with pytest.raises(
-        ss.NotAvailable, match=r"computed by steadyslip [\d.]+\+s\w{8}, this is 9\.9; .*delete the map"
-    ):
+    with pytest.raises(ss.NotAvailable, match=r"computed by steadyslip [\d.]+\+s\w{8}, this is 9\.9; .*delete the map"):
         made(chart(), tmp_path, "other.zarr")
 
 

@@ -46,6 +46,7 @@ LONG = {
     "SpecialCycle": lambda: ss.SpecialCycle("fold", made("Cycle"), (2.0, 2.1), 1e-6),
     "Basin": lambda: ss.basin(FIRM, [0.0, 1e-6], [V0, 2 * V0], progress=False),
     "FrequencyResponse": lambda: ss.response(FIRM, [1.0, 2.0]),
+    "FrozenVerdicts": lambda: ss.frozen_verdicts(FIRM, ss.VelocityRamp(at=1.0, to=2 * V0, duration=5.0), until=10.0),
     "Record": lambda: lab.record(lab.rig(), lab.STEP, seed=1),
     "Fit": lambda: ss.fit(lab.rig(), made("Record"), free=FREE), "Estimate": lambda: made("Fit")["a"],
     "Draws": lambda: ss.normal_draws(made("Fit"), 50), "Prediction": lambda: ss.predict(lab.rig(), made("Draws")),

@@ -36,15 +36,15 @@ def asked(tmp_path, monkeypatch):
     apart._end_all()
 
 
-def test_answers_come_back_and_the_reader_stays(asked):
+def test_answers_come_back(asked):
     about, (doubled, none) = asked("twice", [1.0, 2.5])
     assert about["sum"] == 3.5
     assert about["reader"] != os.getpid()
     np.testing.assert_array_equal(doubled, [2.0, 5.0])
     assert none.shape == (0, 3)
     assert asked("prints") == ({}, [])
-    readers = {asked("twice", [1.0])[0]["reader"] for _ in range(3)}  # one that is out of time makes place for another
-    assert len(readers) < 3 or apart.resource is None
+    again, _ = asked("twice", [1.0])  # the same reader, or another where it has grown
+    assert again["reader"] != os.getpid()
 
 
 def test_refusals_are_those_of_the_function(asked):

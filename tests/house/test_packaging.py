@@ -44,7 +44,9 @@ def test_wheel_and_source_distribution_are_the_program_of_the_checkout(tmp_path)
     from hatchling.builders.wheel import WheelBuilder
 
     (source,) = SdistBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
-    shutil.unpack_archive(source, tmp_path / "source", filter="data")
+    checked = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # from Python 3.11.4 on
+    with tarfile.open(source) as archive:
+        archive.extractall(tmp_path / "source", **checked)
     (unpacked,) = (tmp_path / "source").iterdir()
     (wheel,) = WheelBuilder(str(unpacked)).build(directory=str(tmp_path), versions=["standard"])
     shutil.unpack_archive(wheel, tmp_path / "wheel", "zip")

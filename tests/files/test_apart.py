@@ -1,8 +1,10 @@
 """Functions in a process of its own: what they use, and how they end, is theirs alone."""
 
 import os
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ import numpy as np
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
 
 def twice(values): return {"sum": sum(values), "reader": os.getpid()}, [2.0 * np.array(values), np.empty((0, 3))]
+def grows(size): return {"reader": os.getpid(), "some": float(np.ones(size // 8)[0])}, []
 def refused(): raise NotAvailable("no such thing")
 def problems(): raise ParameterError([Problem("file", "is damaged", 7)], title="p1.csv")
 def prints(): os.write(1, b"noise of a library"); print("more"); return {}, []
@@ -43,8 +46,29 @@ def test_answers_come_back(asked):
     np.testing.assert_array_equal(doubled, [2.0, 5.0])
     assert none.shape == (0, 3)
     assert asked("prints") == ({}, [])
-    again, _ = asked("twice", [1.0])  # the same reader, or another where it has grown
-    assert again["reader"] != os.getpid()
+    assert asked("twice", [1.0])[0]["reader"] != os.getpid()
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not tell a process its own peak")
+def test_a_reader_stays_whatever_its_parent_had(asked, tmp_path):
+    """`getrusage` of a child begins with the peak of its parent, so that each file had a reader of its own."""
+    program = f"""if True:
+        import numpy as np
+        from steadyslip.files import apart
+        np.ones({apart.LASTING // 8 + 2**22})
+        print(*(apart.call("{HERE}", "twice", [[1.0]], 30.0)[0]["reader"] for _ in range(3)))
+    """
+    found = subprocess.run(
+        [sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE, text=True, check=True,
+    )  # fmt: skip
+    assert len(set(found.stdout.split())) == 1
+
+
+def test_a_reader_that_has_grown_makes_place(asked):
+    first, _ = asked("grows", apart.LASTING)
+    again, _ = asked("twice", [1.0])
+    assert again["reader"] != first["reader"]
 
 
 def test_refusals_are_those_of_the_function(asked):

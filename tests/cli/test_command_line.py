@@ -9,7 +9,7 @@ import pytest
 
 import steadyslip as ss
 from command import run, without_laws_of_tests
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inclined-spring.toml"
 
@@ -95,7 +95,7 @@ def test_answers_come_in_the_units_of_the_file(tmp_path):
     told = run("analyze", own).stdout
     assert "critical stiffness 290.7 bar/mm" in told
     assert "normal stress 166.7 bar" in told
-    assert shown(2e5, "Pa") == "200 kPa"  # whoever comes after the command is told as ever
+    assert format_quantity(2e5, "Pa") == "200 kPa"  # whoever comes after the command is told as ever
     assert "slider.damping                0 Pa s/m" in told
     assert "critical stiffness 29.07 GPa/m" in run("analyze", EXAMPLE).stdout
     found, same = (json.loads(run("analyze", rig, "--json").stdout) for rig in (own, EXAMPLE))

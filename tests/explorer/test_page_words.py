@@ -8,7 +8,7 @@ import pytest
 import steadyslip as ss
 from explored_edges import Edges
 from rigs_of_theory import LAWS, SIGMA, V0, rate_state, rig
-from steadyslip.core.telling import printed
+from steadyslip.core.format import typeset
 from steadyslip.verdict.causes import why_all, why_none
 from steadyslip.verdict.words import headline
 
@@ -64,7 +64,7 @@ def in_python(own):
     else:  # the hint of a contact in its own terms
         why = why.partition(";")[0]
     return [
-        printed(text).replace("−", "-") for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")
+        typeset(text).replace("−", "-") for text in (headline(found, capitals=False), f"{why[0].upper()}{why[1:]}.")
     ]
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import lab_records as lab
 import steadyslip as ss
 from dimensionless import unit_rig
-from steadyslip.core.telling import percent
+from steadyslip.core.format import format_percent
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.map_axes import Scale, spaced_by_ratio
 from steadyslip.maps.view.cut import _quantiles, _with_failures
@@ -54,8 +54,8 @@ def test_a_settled_run_is_drawn_flat_with_ticks_that_differ():
 def test_no_probability_is_rounded_to_certainty():
     assert probability_text(1.0, 4000) == "more than 99.92 %"
     assert probability_text(0.99975, 4000) == "99.975 %"
-    assert percent(0.0001) == "0.01 %"
-    assert percent(1e-9) != "0 %"
+    assert format_percent(0.0001) == "0.01 %"
+    assert format_percent(1e-9) != "0 %"
 
 
 def test_a_dollar_in_a_name_is_a_dollar(tmp_path):

@@ -11,7 +11,7 @@ import steadyslip as ss
 from command import run
 from file_schema import file_schema
 from machines import brake, rate_state, surface, three_bodies, two_blocks, two_mass
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "machines").glob("*.toml"))
 AXIS = EXAMPLES[0].with_name("feed-axis.toml")
@@ -29,7 +29,7 @@ def test_verdict_is_that_of_the_comment(path):
     assert analysis.warnings == ()
     (edge,) = ss.boundary(machine, name)
     assert edge.stable == side
-    assert shown(edge.value, edge.unit, area=machine.area_of(name)) == value
+    assert format_quantity(edge.value, edge.unit, area=machine.area_of(name)) == value
     if "compliant" not in path.read_text("utf-8"):  # there the normal force depends on every stiffness
         ((low, high),) = ss.stable_values(machine, name)
         assert edge.value == (low if side == "above" else high)

@@ -183,7 +183,7 @@ class Reference:
 
     def __init__(self, case: Drawn) -> None:
         kicked, rig = case.kicked(), by_preload(case.rig)
-        self.length = float(kicked.rest.way[0])
+        self.length = float(kicked.rest.natural_slip[0])
         friction, contact = rig.friction, rig.contact
         bristles = isinstance(friction, ss.LuGre)
         length, speed = (1.0, 1.0) if bristles else (D_C, V_REF)

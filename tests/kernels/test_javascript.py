@@ -16,7 +16,7 @@ from javascript import Script
 from moved import DRIVER, moved, slip_events
 from rigs_of_theory import ONE_MEMORY, SIGMA, V0, rate_state, rig
 from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.core.telling import printed, shown
+from steadyslip.core.format import format_quantity, typeset
 from steadyslip.kernels import primitives
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Program, primitive, select
 from steadyslip.kernels.printers import javascript, python
@@ -264,5 +264,5 @@ def test_pages_tell_quantities_as_texts_do():
     cases = [[float(size), str(unit)] for size, unit in zip(sizes, units, strict=True)] + [[0.0, "m/s"]]
     told = script("cases.map(([value, unit]) => shown(value, unit))", cases=cases)
     for (value, unit), words in zip(cases, told, strict=True):
-        plain = re.sub(r"e([+-])0*", lambda sign: "e" + sign[1].strip("+"), printed(shown(value, unit)))
+        plain = re.sub(r"e([+-])0*", lambda sign: "e" + sign[1].strip("+"), typeset(format_quantity(value, unit)))
         assert words.replace("\N{MINUS SIGN}", "-") == plain, (value, unit)

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 import lab_records as lab
 import steadyslip as ss
 from steadyslip.core.areas import outside
-from steadyslip.core.telling import shown, shown_range
+from steadyslip.core.format import format_quantity, format_range
 from steadyslip.maps import Map, run_map
 from steadyslip.nonlinear.kicks.kicks import KICKS
 from steadyslip.nonlinear.kicks.threshold import Threshold
@@ -46,9 +46,9 @@ def test_one_place_knows_what_a_contact_has():
     ):
         factor, total = outside(unit, AREA)
         assert factor == AREA
-        assert shown(2.0 / AREA, unit, area=AREA) == shown(2.0, total)
+        assert format_quantity(2.0 / AREA, unit, area=AREA) == format_quantity(2.0, total)
         assert not PER_AREA.search(total), total
-        assert shown_range(1.0 / AREA, 2.0 / AREA, unit, AREA) == shown_range(1.0, 2.0, total)
+        assert format_range(1.0 / AREA, 2.0 / AREA, unit, AREA) == format_range(1.0, 2.0, total)
     for unit in ("m/s", "s", "1", "rad", "1/m"):
         assert outside(unit, AREA) == (1.0, unit)
 

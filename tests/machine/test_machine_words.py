@@ -10,7 +10,7 @@ import steadyslip as ss
 from command import run
 from machines import brake, rate_state, two_mass
 from steadyslip.core.errors import ParameterError
-from steadyslip.core.telling import shown, shown_range, told_in
+from steadyslip.core.format import display_units, format_quantity, format_range
 from steadyslip.model.point import operating_point
 from steadyslip.motion.status import remedy
 from steadyslip.nonlinear import commands
@@ -81,21 +81,25 @@ def test_what_turns_is_in_angles():
 
 def test_speeds_stay_in_the_unit_of_the_file_however_small():
     """Rad/s has no prefixes that would read better."""
-    with told_in(["rpm", "mm/yr"]):
-        assert shown(2.396e-5, "rad/s") == "0.0002288 rpm"
-        assert shown(1.0, "m/s") == "1 m/s"
+    with display_units(["rpm", "mm/yr"]):
+        assert format_quantity(2.396e-5, "rad/s") == "0.0002288 rpm"
+        assert format_quantity(1.0, "m/s") == "1 m/s"
 
 
 def test_quantities_are_told_in_those_units_of_a_file_in_which_they_read_best():
     """A fault in mm/yr whose friction is told at 1 um/s; areas and inertias in powers of a unit; never ms/m."""
-    with told_in(["mm/yr", "um/s", "km^2", "mm^2", "kg cm^2", "kg m^2", "GN/m"]):
-        assert shown(1.2675e-9, "m/s") == "40 mm/yr"
-        assert shown(1e-6, "m/s") == "1 um/s"
-        assert (shown(2e6, "m^2"), shown(1.2e-4, "m^2")) == ("2 km^2", "120 mm^2")
-        assert (shown(3e-5, "kg m^2"), shown(0.8, "kg m^2")) == ("0.3 kg cm^2", "0.8 kg m^2")
-        assert shown(8e13, "N/m") == "80000 GN/m"
-    assert (shown(1.6e14, "N"), shown(0.1, "s/m"), shown(0.1, "s")) == ("160 TN", "0.1 s/m", "100 ms")
-    assert shown_range(1.432e13, 1.97e13, "N/m") == "14320 to 19700 GN/m"
+    with display_units(["mm/yr", "um/s", "km^2", "mm^2", "kg cm^2", "kg m^2", "GN/m"]):
+        assert format_quantity(1.2675e-9, "m/s") == "40 mm/yr"
+        assert format_quantity(1e-6, "m/s") == "1 um/s"
+        assert (format_quantity(2e6, "m^2"), format_quantity(1.2e-4, "m^2")) == ("2 km^2", "120 mm^2")
+        assert (format_quantity(3e-5, "kg m^2"), format_quantity(0.8, "kg m^2")) == ("0.3 kg cm^2", "0.8 kg m^2")
+        assert format_quantity(8e13, "N/m") == "80000 GN/m"
+    assert (format_quantity(1.6e14, "N"), format_quantity(0.1, "s/m"), format_quantity(0.1, "s")) == (
+        "160 TN",
+        "0.1 s/m",
+        "100 ms",
+    )
+    assert format_range(1.432e13, 1.97e13, "N/m") == "14320 to 19700 GN/m"
 
 
 def test_what_takes_the_load_off_is_told_in_forces_where_the_rig_is():

@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import steadyslip as ss
 from protocols_at_random import drives, others, protocols, sizes, spans, tables, times
-from steadyslip.core.records import parameters, replaced, shape_of, twin
+from steadyslip.core.records import parameters, replaced, shape_of, with_values
 from steadyslip.protocol import (
     DisplacementStep,
     DisturbanceHarmonic,
@@ -160,7 +160,7 @@ def test_lanes_together_are_lanes_alone(data, drive, rest, lanes):
             numbers[f"pieces.{i}.at"] = data.draw(column)
     velocity = np.array(data.draw(st.lists(sizes, min_size=lanes, max_size=lanes)))
     until = np.array(data.draw(st.lists(spans, min_size=lanes, max_size=lanes)))
-    many = pack(twin(protocol, {k: np.array(v) for k, v in numbers.items()}), velocity, until)
+    many = pack(with_values(protocol, {k: np.array(v) for k, v in numbers.items()}), velocity, until)
     assert np.array_equal(many.start[:, 1:], many.end[:, :-1])
     assert np.array_equal(many.end[:, -1], until)
     for lane in range(lanes):
@@ -181,16 +181,16 @@ def test_lanes_together_are_lanes_alone(data, drive, rest, lanes):
 def test_times_of_setting_pieces_may_differ_between_lanes():
     protocol = VelocityStep(at=1, to=2) + SlideHoldSlide(at=10, hold=1, slide=1, factor=2, repeats=2)
     at, hold = np.array([0.0, 3.0, 10.0]), np.array([1.0, 2.0, 0.5])
-    many = pack(twin(protocol, {"pieces.1.at": at, "pieces.2.hold": hold}), 1.0, np.array([20.0, 5.0, 11.25]))
+    many = pack(with_values(protocol, {"pieces.1.at": at, "pieces.2.hold": hold}), 1.0, np.array([20.0, 5.0, 11.25]))
     assert many.start.tolist() == [[0, 10, 11, 12, 14], [0, 3, 5, 5, 5], [0, 10, 10.5, 11.25, 11.25]]
     assert many.value[2, :3, 0].tolist() == [1, 0, 2]
     assert many.end[:, -1].tolist() == [20, 5, 11.25]
     with pytest.raises(ss.ParameterError, match="overlap, or are not in the order of time, in some lanes"):
-        pack(twin(protocol, {"pieces.1.at": at + 5}), 1.0, 20.0)
+        pack(with_values(protocol, {"pieces.1.at": at + 5}), 1.0, 20.0)
     with pytest.raises(ss.ParameterError, match=r"different lengths \[2, 3\]"):
-        pack(twin(protocol, {"pieces.1.at": at}), np.ones(2), 20.0)
+        pack(with_values(protocol, {"pieces.1.at": at}), np.ones(2), 20.0)
     with pytest.raises(ss.ParameterError, match="same number of holds"):
-        pack(twin(protocol, {"pieces.2.repeats": np.array([1, 2, 2])}), 1.0, 20.0)
+        pack(with_values(protocol, {"pieces.2.repeats": np.array([1, 2, 2])}), 1.0, 20.0)
 
 
 @given(tables(LoadPointTable, "displacement", start=0.0))
@@ -240,7 +240,9 @@ def test_long_tables_and_many_lanes():
     assert s.start.shape == (1, 200_001)
     middle = rng.uniform(time[0], time[-1], 1000)
     assert evaluate(s, middle)[2] == pytest.approx(np.interp(middle, time + 0.05, time), rel=1e-9)
-    lanes = twin(Hold(at=1, duration=1) + NormalStressStep(at=0, by=1), {"pieces.2.at": rng.uniform(0, 9, 100_000)})
+    lanes = with_values(
+        Hold(at=1, duration=1) + NormalStressStep(at=0, by=1), {"pieces.2.at": rng.uniform(0, 9, 100_000)}
+    )
     assert pack(lanes, 1.0, 10.0).value.shape == (100_000, 4, 3)
 
 

@@ -10,7 +10,7 @@ import lab_records as lab
 import steadyslip as ss
 from machines import rate_state, surface
 from moving_machines import two_tables
-from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.input_units import in_units_of
 
 FOLDER = Path(__file__).parents[2] / "examples"
 AXIS = ss.read_rig(FOLDER / "machines/feed-axis.toml")

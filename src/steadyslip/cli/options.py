@@ -12,12 +12,12 @@ import typer
 def _speak(context: typer.Context, rig: Path) -> Path:
     """Answer in the units of the file."""
     from steadyslip.core.errors import ParameterError
-    from steadyslip.core.telling import told_in
+    from steadyslip.core.format import display_units
     from steadyslip.files.specifications.read import text_of
     from steadyslip.files.specifications.written import units_of
 
     with suppress(ParameterError):  # whoever reads the rig says what is wrong with the file
-        context.with_resource(told_in(units_of(text_of(rig))))
+        context.with_resource(display_units(units_of(text_of(rig))))
     return rig
 
 

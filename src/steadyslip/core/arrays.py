@@ -10,7 +10,7 @@ import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem, QuantityError
 from steadyslip.core.quantities import parse
-from steadyslip.core.records import FrozenRecord, conditions, twin
+from steadyslip.core.records import FrozenRecord, conditions, with_values
 from steadyslip.core.roles import Parameter
 
 Array = np.ndarray
@@ -72,7 +72,7 @@ def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any])
     ParameterError
         Naming the parameter, the first bad value and its position.
     """
-    found = conditions(twin(record, varied, prefix), prefix)
+    found = conditions(with_values(record, varied, prefix), prefix)
     problems = [p for name, condition in found if (p := condition.problem(name)) is not None]
     if problems:
         raise ParameterError(problems)
@@ -81,13 +81,13 @@ def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any])
 def valid_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> Any:
     """Where all those conditions hold."""
     valid: Any = True
-    for _, condition in conditions(twin(record, varied, prefix), prefix):
+    for _, condition in conditions(with_values(record, varied, prefix), prefix):
         valid = valid & np.asarray(condition.holds)
     return valid
 
 
 @dataclass(frozen=True)
-class Together:
+class BroadcastArrays:
     """Arrays of one broadcast shape.
 
     Attributes
@@ -125,7 +125,7 @@ def _bare(array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) ->
     return array if np.ndim(array) else np.asarray(array).item()
 
 
-def broadcast(named: Mapping[str, Any]) -> Together:
+def broadcast(named: Mapping[str, Any]) -> BroadcastArrays:
     """Arrays as NumPy broadcasts them, DataArrays by the names of their dimensions.
 
     Raises
@@ -153,4 +153,4 @@ def broadcast(named: Mapping[str, Any]) -> Together:
         problems.append(Problem("vary", f"shapes do not broadcast: {shapes}"))
     if problems:
         raise ParameterError(problems)
-    return Together(values, shape, dims, coords)
+    return BroadcastArrays(values, shape, dims, coords)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from steadyslip import units
-from steadyslip.core.errors import QuantityError, came
+from steadyslip.core.errors import QuantityError, repr_short
 
 
 class Dimension(NamedTuple):
@@ -93,7 +93,7 @@ def unit(text: str) -> tuple[float, Dimension]:
         If the text is none, or a word is not that of a unit.
     """
     if len(text) > MOST_TEXT:
-        raise QuantityError(f"{came(text)} is not a unit: too long")
+        raise QuantityError(f"{repr_short(text)} is not a unit: too long")
     factor, dimension = 1.0, Dimension()
     for word, power in factors(text):
         value, base = _TABLE.get(word) or _from_pint(word)

@@ -18,10 +18,10 @@ def one(name: str) -> str:
     return f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
 
 
-def came(value: object) -> str:
-    """What came, for a message: its repr, cut where it is long, and never a fault of its own.
+def repr_short(value: object) -> str:
+    """The repr of a value for a message: cut after `MOST_SHOWN` characters; raises nothing.
 
-    >>> came("5 MPa"), came("a" * 1000)[-32:]
+    >>> repr_short("5 MPa"), repr_short("a" * 1000)[-32:]
     ("'5 MPa'", 'aaa... (1002 characters in all)')
     """
     try:
@@ -153,7 +153,7 @@ class InternalError(SteadyslipError, RuntimeError):
 
 def legible(name: str) -> str:
     """A name for a message: as it is, or quoted and cut where it would break the line."""
-    return name if name.isprintable() and len(name) <= MOST_SHOWN // 2 else came(name)
+    return name if name.isprintable() and len(name) <= MOST_SHOWN // 2 else repr_short(name)
 
 
 def unknown_name(what: str, name: object, allowed: Iterable[str], guess: bool = True) -> str:
@@ -164,4 +164,4 @@ def unknown_name(what: str, name: object, allowed: Iterable[str], guess: bool = 
         last = {full.rpartition(".")[2]: full for full in allowed}
         close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"unknown {what} {came(name)}; {hint}allowed: {', '.join(allowed) or 'none'}"
+    return f"unknown {what} {repr_short(name)}; {hint}allowed: {', '.join(allowed) or 'none'}"

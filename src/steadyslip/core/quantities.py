@@ -16,7 +16,7 @@ import numpy as np
 
 from steadyslip.core.areas import AREA, TOTALS, total_unit
 from steadyslip.core.dimensions import MICRO, MOST_TEXT, Dimension, unit
-from steadyslip.core.errors import QuantityError, came
+from steadyslip.core.errors import QuantityError, repr_short
 
 _MASS, _WEIGHT = Dimension(1), Dimension(1, 1, -2)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.I | re.A)
@@ -46,7 +46,7 @@ def parse(text: str, expected: str) -> float:
     cleaned = text.translate(MICRO).strip()
     match = _NUMBER.match(cleaned) if len(text) <= MOST_TEXT else None
     if match is None:
-        raise QuantityError(f"{came(text)} is not {described(expected)}; write for example {example(expected)}")
+        raise QuantityError(f"{repr_short(text)} is not {described(expected)}; write for example {example(expected)}")
     digits, name = match.group(), cleaned[match.end() :].strip()
     _, wanted = unit(expected)
     if not name:
@@ -120,7 +120,9 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
     if isinstance(values, np.ndarray) and values.ndim == 1:
         values = values.tolist()
     if not isinstance(values, (list, tuple)):
-        raise QuantityError(f"got {came(values)}; allowed: a list of numbers in {expected}, or of texts with units")
+        raise QuantityError(
+            f"got {repr_short(values)}; allowed: a list of numbers in {expected}, or of texts with units"
+        )
     found = []
     for place, value in enumerate(values, start=1):
         try:
@@ -128,7 +130,7 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
         except QuantityError as error:
             raise QuantityError(f"value {place}: {error}") from error
         if not math.isfinite(number):
-            raise QuantityError(f"value {place}: got {came(value)}; allowed: a finite number")
+            raise QuantityError(f"value {place}: got {repr_short(value)}; allowed: a finite number")
         found.append(number)
     return tuple(found)
 
@@ -138,11 +140,11 @@ def _plain(value: Any) -> float:
     if type(value) is float:  # long columns are of these
         return value
     if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__") or np.ndim(value) != 0:
-        raise QuantityError(f"got {came(value)}; allowed: a finite number or text with a unit")
+        raise QuantityError(f"got {repr_short(value)}; allowed: a finite number or text with a unit")
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise QuantityError(f"got {came(value)}; allowed: a finite number or text with a unit") from error
+        raise QuantityError(f"got {repr_short(value)}; allowed: a finite number or text with a unit") from error
 
 
 _EXAMPLES = {

@@ -20,7 +20,7 @@ from steadyslip.core.areas import total_unit
 from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import Domain
 from steadyslip.core.entries import Option
-from steadyslip.core.errors import ParameterError, Problem, came, one
+from steadyslip.core.errors import ParameterError, Problem, one, repr_short
 from steadyslip.core.members import Members
 from steadyslip.core.names import unfit_name
 from steadyslip.core.pages import Displayed
@@ -48,12 +48,12 @@ class Part(Role):
         if not self.many:
             return self._member(value, "")
         if not isinstance(value, (list, tuple)):
-            raise fault(f"got {came(value)}; allowed: a list of {self.family.__name__}")
+            raise fault(f"got {repr_short(value)}; allowed: a list of {self.family.__name__}")
         return tuple(self._member(one, f"{i}") for i, one in enumerate(value, start=1))
 
     def _keyed(self, value: Any) -> Members:
         if not isinstance(value, Mapping):
-            raise fault(f"got {came(value)}; allowed: names, and {one(self.family.__name__)} for each")
+            raise fault(f"got {repr_short(value)}; allowed: names, and {one(self.family.__name__)} for each")
         problems = [Problem(str(name), wrong) for name in value if (wrong := unfit_name(name))]
         found = {}
         for name, member in value.items():
@@ -68,7 +68,7 @@ class Part(Role):
     def _member(self, value: Any, index: str) -> FrozenRecord:
         if isinstance(value, self.family):
             return value
-        raise ParameterError([Problem(index, f"got {came(value)}; allowed: {self.allowed()}")])
+        raise ParameterError([Problem(index, f"got {repr_short(value)}; allowed: {self.allowed()}")])
 
     def allowed(self) -> str:
         known = ", ".join(law.__name__ for law in self.family.registry.values())
@@ -88,7 +88,7 @@ class Named(Role):
             raise self.refused(value)
         for name, found in value.items():
             if not (isinstance(found, self.family) or (self.listed and isinstance(found, (list, tuple)))):
-                raise ParameterError([Problem(name, f"got {came(found)}; allowed: {one(self.family.__name__)}")])
+                raise ParameterError([Problem(name, f"got {repr_short(found)}; allowed: {one(self.family.__name__)}")])
         return dict(value)
 
     def allowed(self) -> str:
@@ -239,7 +239,7 @@ class FrozenRecord(Displayed):
         yield from ()
 
     def conditions(self) -> Iterator[Condition]:
-        """Relations between several numbers; valid for single numbers, and for arrays in a `twin`."""
+        """Relations between several numbers; valid for single numbers, and for arrays in a copy by `with_values`."""
         yield from ()
 
     def __repr__(self) -> str:
@@ -385,7 +385,7 @@ def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
     return replace(record, **own)  # type: ignore[type-var]
 
 
-def twin(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
+def with_values(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
     """The same record with other things, usually symbols, in place of its numbers; nothing is checked.
 
     Law methods read their own fields, so the same method serves numbers and symbols.
@@ -394,7 +394,7 @@ def twin(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
     for field_name, own_name, role in _layout(record):
         value, name = getattr(record, field_name), prefix + own_name
         if isinstance(role, Part):
-            value = _each(role, value, name, prefix, lambda member, at: twin(member, values, at))
+            value = _each(role, value, name, prefix, lambda member, at: with_values(member, values, at))
         elif isinstance(role, Parameter):
             value = values.get(name, value)
         object.__setattr__(copy, field_name, value)

@@ -17,7 +17,7 @@ import numpy as np
 
 from steadyslip.core.areas import is_per_area, outside, total_unit
 from steadyslip.core.domains import Domain
-from steadyslip.core.errors import ParameterError, Problem, QuantityError, came, unknown_name
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short, unknown_name
 from steadyslip.core.quantities import example, numbers, parse
 
 Schema = dict[str, Any]
@@ -42,7 +42,7 @@ class Role:
 
     def refused(self, value: Any) -> ParameterError:
         """The exception for a value that is not allowed."""
-        return fault(f"got {came(value)}; allowed: {self.allowed()}")
+        return fault(f"got {repr_short(value)}; allowed: {self.allowed()}")
 
 
 def fault(message: str) -> ParameterError:

@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.records import conditions, twin
+from steadyslip.core.records import conditions, with_values
 from steadyslip.explorer.modes import mode_part
 from steadyslip.explorer.programs import program
 from steadyslip.explorer.sliding import searched, steady_programs
@@ -199,6 +199,6 @@ def _linear_split() -> Program:
 def _allowed(rig: Slider | Machine, model: Model) -> sp.Expr:
     """1 where the conditions that several numbers obey together hold, else 0."""
     symbols: dict[str, Any] = dict(model.parameters)
-    relations = [condition.holds for _, condition in conditions(twin(rig, symbols))]
+    relations = [condition.holds for _, condition in conditions(with_values(rig, symbols))]
     holds = [one if isinstance(one, sp.Basic) else sp.sympify(bool(np.all(one))) for one in relations]
     return sp.Piecewise((1, sp.And(*holds)), (0, True))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 import math
 
-from steadyslip.core.telling import printed
+from steadyslip.core.format import typeset
 from steadyslip.machine.drawing import DRIVEN, FORCED, INK, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
 
@@ -71,7 +71,7 @@ class SvgPencil(Pencil):
     def _text(
         self, x: float, y: float, text: str, ha: str, va: str, color: str, large: bool, paper: bool
     ) -> str:  # fmt: skip
-        lines, size = printed(text).split("\n"), LETTERS[large]
+        lines, size = typeset(text).split("\n"), LETTERS[large]
         step = 1.2 * size / UNIT
         first = y + {"center": (len(lines) - 1) / 2, "bottom": len(lines) - 1, "top": 0}[va] * step
         first -= {"center": 0.36, "bottom": 0.1, "top": 0.8}[va] * size / UNIT

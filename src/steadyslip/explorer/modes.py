@@ -6,7 +6,7 @@ from typing import Any
 
 import sympy as sp
 
-from steadyslip.core.records import twin
+from steadyslip.core.records import with_values
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.nodes import Program
 from steadyslip.linear.modes import HARDLY, MOVES, WORDS, stores
@@ -35,7 +35,7 @@ def mode_part(machine: Machine, model: Model) -> tuple[list[Program], dict[str, 
         for powers, value in entry.items()
     ]
     names = [one.name for one in model.coordinates]
-    held = stores(twin(machine, dict(model.parameters)).mechanism())
+    held = stores(with_values(machine, dict(model.parameters)).mechanism())
     weights = [sp.sympify(value) for one in held for value in (one.weight, *one.row.values())]
     speeds = [model.parameters["drive.velocity"], *(one.speed for one in model.coordinates)]
     programs = [

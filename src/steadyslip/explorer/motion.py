@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.records import twin
+from steadyslip.core.records import with_values
 from steadyslip.explorer.moving import Shares, scales_program, start_program
 from steadyslip.explorer.programs import program
 from steadyslip.kernels.driver.places import searched
@@ -102,7 +102,7 @@ def motion_part(rig: Slider | Machine, branch: int) -> tuple[str, dict[str, Any]
 
 def _through(rig: Slider | Machine, model: Model) -> Any:
     """The dashpots through which the load point pulls: a jump of it would be an infinite force."""
-    elements = twin(rig, dict(model.parameters)).mechanism().elements
+    elements = with_values(rig, dict(model.parameters)).mechanism().elements
     return sp.Add(*(abs(sp.sympify(one.damping)) for one in elements if LOAD_POINT in one.senses))
 
 

@@ -25,7 +25,7 @@ from steadyslip.model.equations import Contact, Coordinate, Model
 from steadyslip.model.posed import rising
 from steadyslip.model.reducing import share_of
 from steadyslip.model.reduction import Reduction
-from steadyslip.model.scales import felt, joined_sizes, moving_parts, shortest_time, sizes
+from steadyslip.model.scales import direct_effect_scale, joined_sizes, moving_parts, shortest_time, sizes
 from steadyslip.model.weights import Weights, weighed
 from steadyslip.motion.jobs import Options, numbers
 
@@ -137,7 +137,7 @@ def _scaled(
     way: Any
     if model.contacts[0].name:
         count = len(moving_parts(model))
-        directs = [felt(one, select) for one in weights]
+        directs = [direct_effect_scale(one, select) for one in weights]
         scales, searched = joined_sizes(reduction, rest[:count], speeds, stresses, directs, own, select)
         way, searched, rest = speeds[0] * shortest_time(scales, select), searched or (1.0,), rest[count:]
     else:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from steadyslip.core.areas import outside
-from steadyslip.core.records import twin
+from steadyslip.core.records import with_values
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.files.specifications.written import Given, Written, written
 from steadyslip.machine.machine import Machine
@@ -88,7 +88,7 @@ def _template(rig: Slider | Machine, names: Sequence[str]) -> list[Any]:
     """A rig file made for the page, with a place for each value."""
     marks = {name: _SENTINEL * (1 + i) for i, name in enumerate(names)}
     pieces: list[Any] = []
-    for line in rig_to_text(twin(rig, marks)).splitlines():
+    for line in rig_to_text(with_values(rig, marks)).splitlines():
         key, _, value = line.partition(" = ")
         for name in names:
             unit = rig.parameters()[name].role.unit

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, display_unit, labelled
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def frequency_response(found: FrequencyResponse, ax: Any = None) -> Any:
         style = {"color": colour, "marker": mark, "linestyle": "none", "fillstyle": "none", "markersize": 5}
         for one, values in zip(axes, (found.gains[j], found.phases[j], found.shift[j] / factor), strict=True):
             one.plot(found.periods, values, **style)
-        axes[0].plot([], [], **style, label=f"amplitude {shown(amplitude, found.units[0])}")
+        axes[0].plot([], [], **style, label=f"amplitude {format_quantity(amplitude, found.units[0])}")
         if np.any(lost := ~np.isfinite(found.gains[j])):
             place = np.full(np.count_nonzero(lost), np.min(found.gain))
             axes[0].plot(found.periods[lost], place, "x", color=colour, label="no answer of that period")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -67,7 +67,7 @@ def history(run: History, panels: np.ndarray) -> np.ndarray:
     )
     if run.status != "done":
         where = f" ({run.contact})" if run.contact else ""
-        title = f"{run.status}{where} at {shown(run.end, 's')}"
+        title = f"{run.status}{where} at {format_quantity(run.end, 's')}"
         panels[0].set_title(title, color=VERMILION, fontsize="medium", pad=22)
     return panels
 

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.telling import percent, shown
-from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, axes_or_new, printed
+from steadyslip.core.format import format_percent, format_quantity, typeset
+from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, axes_or_new
 from steadyslip.linear.boundary import Margin
 from steadyslip.machine.mechanism import NORMAL
 from steadyslip.verdict import MachineAnalysis
@@ -112,7 +112,7 @@ def _edge_text(found: MachineAnalysis, ax: Axes, row: int, margin: Margin) -> No
     edge = margin.edge
     if edge is None:
         return
-    text = printed(shown(edge.value, margin.unit, area=found.rig.area_of(margin.parameter)))
+    text = typeset(format_quantity(edge.value, margin.unit, area=found.rig.area_of(margin.parameter)))
     ratio = edge.value / margin.value
     left = 1 / _SPAN**0.75 < ratio < 1 or ratio > _SPAN**0.75  # on the side that has room
     ax.annotate(
@@ -148,7 +148,7 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
                 ha="left" if size < 0 else "right", fontsize=7.5)  # fmt: skip
     for row, (_, share) in enumerate(energy.items(), start=len(names)):
         ax.barh(row, share, height=0.6, color=ORANGE)
-        ax.text(-0.03, row, percent(round(share, 3)), va="center", ha="right", fontsize=7.5)
+        ax.text(-0.03, row, format_percent(round(share, 3)), va="center", ha="right", fontsize=7.5)
     labels = [name.replace(NORMAL, " (normal)") for name in names]
     labels += [f"energy in {name.partition('.')[2]}" for name in energy]
     ax.axvline(0.0, color=BLACK, linewidth=1)
@@ -159,8 +159,12 @@ def mode_shape(found: MachineAnalysis, ax: Axes | None = None) -> Axes:
     for side in ("top", "right", "left"):
         ax.spines[side].set_visible(False)
     does = "grows" if mode.eigenvalue.real > 0 else "decays"
-    kind = f"period {shown(2 * math.pi / abs(mode.eigenvalue.imag), 's')}" if mode.eigenvalue.imag else "no oscillation"
-    ax.set_xlabel(printed(f"leading mode\n{does}, {kind}"), fontsize=8)
+    kind = (
+        f"period {format_quantity(2 * math.pi / abs(mode.eigenvalue.imag), 's')}"
+        if mode.eigenvalue.imag
+        else "no oscillation"
+    )
+    ax.set_xlabel(typeset(f"leading mode\n{does}, {kind}"), fontsize=8)
     ax.tick_params(axis="x", labelsize=8)
     return ax
 

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Polygon, Rectangle
 
-from steadyslip.figures.style import BLACK, BLUE, VERMILION, axes_or_new, printed
+from steadyslip.core.format import typeset
+from steadyslip.figures.style import BLACK, BLUE, VERMILION, axes_or_new
 from steadyslip.machine.drawing import DRIVEN, FORCED, INK, LONG, PALE, Drawing, Pencil, Point
 from steadyslip.machine.machine import Machine
 
@@ -66,7 +67,7 @@ class AxesPencil(Pencil):
         large: bool = False, paper: bool = False,
     ) -> None:  # fmt: skip
         style: dict[str, Any] = {"bbox": {"facecolor": "white", "edgecolor": "none", "pad": 1.2}} if paper else {}
-        self.ax.text(x, y, printed(text), ha=ha, va=va, color=COLORS[color], fontsize=LARGE if large else SMALL,
+        self.ax.text(x, y, typeset(text), ha=ha, va=va, color=COLORS[color], fontsize=LARGE if large else SMALL,
                      linespacing=1.25, **style)  # fmt: skip
         lines = text.count("\n") + 1
         wide = 0.105 * max(map(len, text.splitlines()))

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from steadyslip.core.areas import stress_name
-from steadyslip.core.telling import percent
+from steadyslip.core.format import format_percent
 from steadyslip.figures.style import (
     BLACK,
     BLUE,
@@ -72,7 +72,7 @@ def missing_note(view: View, name: str) -> str:
     if share == 0:
         return ""
     up_to = "" if np.min(view.missing[name]) == share else "up to "
-    return f"; {up_to}{percent(share)} without one {'count as failures' if name in FAILING else 'left out'}"
+    return f"; {up_to}{format_percent(share)} without one {'count as failures' if name in FAILING else 'left out'}"
 
 
 class Scale:

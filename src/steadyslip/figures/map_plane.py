@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.figures.chart import absence_reasons
 from steadyslip.figures.map_axes import (
     KIND_COLOURS,
@@ -223,7 +223,7 @@ def _mark_own(
         return
     ax.plot(*zip(at, nearest, strict=True), color=VERMILION, linewidth=1.2, linestyle=":", zorder=4)
     words = ", ".join(
-        f"{short(name)} {shown(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
+        f"{short(name)} {format_quantity(float(value * scale.factor), found.unit(name), 3, found.area(name))}"
         for name, value, scale in zip(view.names, nearest, scales, strict=True)
     )
     ax.plot(*([v] for v in nearest), "X", color=VERMILION, markeredgecolor=BLACK, markersize=9, linestyle="none",

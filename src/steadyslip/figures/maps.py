@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, unknown_name
+from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
-from steadyslip.core.telling import shown
 from steadyslip.figures.map_axes import legend, short, shown_name
 from steadyslip.figures.map_curves import curve, scatter
 from steadyslip.figures.map_plane import colour_scale, plane
@@ -110,7 +110,8 @@ def _facets(found: MapResult, names: Sequence[str], show: str | None, third: str
     for ax, view, value in zip(flat, views, chosen, strict=False):
         _draw(ax, found, view, show, scale)
         ax.set_title(
-            f"{short(third)} = {shown(float(value), found.unit(third), area=found.area(third))}", fontsize="medium"
+            f"{short(third)} = {format_quantity(float(value), found.unit(third), area=found.area(third))}",
+            fontsize="medium",
         )
     for ax in flat[len(chosen) :]:
         ax.set_axis_off()

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding, ParameterError, Problem
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.figures import machine_motion
 from steadyslip.figures.style import (
     BLACK,
@@ -90,7 +90,9 @@ def history(run: History, ax: Sequence[Axes] | None = None) -> np.ndarray:
             panel.axvline(run.end / factor, color=VERMILION, linewidth=1, linestyle="--")
     if run.status != "done":
         pad = 36 if "creep" in run.data else 22  # the legend has a second line
-        panels[0].set_title(f"{run.status} at {shown(run.end, 's')}", color=VERMILION, fontsize="medium", pad=pad)
+        panels[0].set_title(
+            f"{run.status} at {format_quantity(run.end, 's')}", color=VERMILION, fontsize="medium", pad=pad
+        )
     return panels
 
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.figures.map_axes import short, spaced_by_ratio
 from steadyslip.figures.style import (
     BLACK,
@@ -62,7 +62,7 @@ def cycle_branch(branch: CycleBranch, ax: Axes | None = None) -> Axes:
     if 0 < reach < NARROW * abs(branch.onset.value):  # an axis of values would have them all alike
         origin = branch.onset.value
         factor, unit = display_unit(branch.unit, reach, area)
-        along = f"{along} less {shown(origin, branch.unit, 6, area)}"
+        along = f"{along} less {format_quantity(origin, branch.unit, 6, area)}"
     drive = branch.cycles[0].speed if len(branch) and branch.cycles[0].contact else branch.rig.drive.velocity
     speed, speed_unit = display_unit("m/s", drive)
     onset_speed, driven = drive, branch.along == "drive.velocity"

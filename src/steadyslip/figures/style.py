@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from steadyslip.core.areas import outside
 from steadyslip.core.dimensions import unit
-from steadyslip.core.telling import printed as printed, shown
+from steadyslip.core.format import format_quantity, typeset
 
 # Okabe & Ito (2008): told apart with every common kind of colour vision
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE = (
@@ -65,9 +65,9 @@ def display_unit(si_unit: str, typical: float, area: float | None = None) -> tup
     >>> display_unit("Pa/m", 9e9), display_unit("rad", 0.1)[1]
     ((1000000000.0, 'GPa/m'), 'deg')
     """
-    name = shown(typical, si_unit, area=area).partition(" ")[2]
+    name = format_quantity(typical, si_unit, area=area).partition(" ")[2]
     factor = (unit(name)[0] if name else 1.0) / outside(si_unit, area)[0]
-    return factor, printed(name)
+    return factor, typeset(name)
 
 
 def arrows(ax: Axes, x: Any, y: Any, color: str) -> None:

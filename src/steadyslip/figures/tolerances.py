@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from steadyslip.core.telling import shown_range
+from steadyslip.core.format import format_range
 from steadyslip.figures.style import BLACK, BLUE, GREY, ORANGE, SKY, axes_or_new
 from steadyslip.linear.stable_values import safety_factor
 from steadyslip.linear.stiffness import STIFFNESS, growth_rate
@@ -41,7 +41,7 @@ def tolerances(found: Tolerated, ax: Axes | None = None) -> Axes:
     known = values[np.isfinite(values)]
     if len(known):
         ax.barh(0, known.max() - known.min(), 0.55, left=known.min(), color=SKY, label="all together")
-    ranges = [f"{one.parameter}\n{shown_range(one.low, one.high, one.unit, one.area)}" for one in shown]
+    ranges = [f"{one.parameter}\n{format_range(one.low, one.high, one.unit, one.area)}" for one in shown]
     ax.set_yticks(
         range(len(shown) + 1), ["all together", *(text.replace(" um", " µm").replace("-", "−") for text in ranges)]
     )

@@ -10,14 +10,14 @@ import numpy as np
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
-from steadyslip.core.telling import percent, shown
 from steadyslip.laws.contact import Motion
 from steadyslip.linear.pencil import best_spectrum, matrix_function
 from steadyslip.machine.machine import Machine
-from steadyslip.machine.mechanism import NORMAL, Mechanism, Touch
+from steadyslip.machine.mechanism import NORMAL, ContactPort, Mechanism
 from steadyslip.model import Model
 from steadyslip.model.linearisation import characteristic_rows
 from steadyslip.model.point import OperatingPoint, operating_point
@@ -65,14 +65,16 @@ class Mode(Displayed):
         if len(leads) == 2 and self._opposed(*leads):
             parts[0] += WORDS["opposed"]
         if rest:
-            shares = [WORDS["share"].format(name=_called(name), share=percent(sizes[name])) for name in rest]
+            shares = [WORDS["share"].format(name=_called(name), share=format_percent(sizes[name])) for name in rest]
             parts.append(", ".join(shares))
         if still:
             parts.append(f"{_listed(still)} {_does('still', still)}")
         text = ", ".join(parts)
         if self.energy:
             most = max(self.energy, key=lambda name: self.energy[name])
-            text += WORDS["energy"].format(share=percent(round(self.energy[most], 3)), name=most.partition(".")[2])
+            text += WORDS["energy"].format(
+                share=format_percent(round(self.energy[most], 3)), name=most.partition(".")[2]
+            )
         return text
 
     def _opposed(self, one: str, other: str) -> bool:
@@ -84,9 +86,9 @@ class Mode(Displayed):
         rows += [
             f"  {name:<20} {abs(a):.4g} at {np.degrees(np.angle(a)):.4g} deg" for name, a in self.amplitudes.items()
         ]
-        rows += [f"  {name:<20} {percent(round(share, 3))} of the energy" for name, share in self.energy.items()]
+        rows += [f"  {name:<20} {format_percent(round(share, 3))} of the energy" for name, share in self.energy.items()]
         if self.eigenvalue.imag:
-            rows.append(f"  period {shown(2 * np.pi / abs(self.eigenvalue.imag), 's')}")
+            rows.append(f"  period {format_quantity(2 * np.pi / abs(self.eigenvalue.imag), 's')}")
         return "\n".join(rows)
 
 
@@ -193,7 +195,7 @@ def stores(mechanism: Mechanism) -> list[EnergyStore]:
         beside = not element.delay and row == dict(element.acts)
         if element.stiffness and (element.name or beside):  # a controller that sees where it acts is a spring, too
             found.append(EnergyStore(element.name or "drive.controller", False, element.stiffness, row))
-    for touch in mechanism.touches:
+    for touch in mechanism.contacts:
         if touch.separation and touch.contact.is_compliant():
             found.append(
                 EnergyStore(f"contacts.{touch.name}", False, touch.area * _stiffness_of(touch), touch.separation)
@@ -212,7 +214,7 @@ def _energies(rig: Machine, places: Mapping[str, complex], s: complex) -> dict[s
     return {name: value / total for name, value in found.items()} if total > 0 and np.isfinite(total) else {}
 
 
-def _stiffness_of(touch: Touch) -> Any:
+def _stiffness_of(touch: ContactPort) -> Any:
     """Normal stiffness of a contact, from its law."""
     at_rest = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     apart = replace(at_rest, separation=1.0)

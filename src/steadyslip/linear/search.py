@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from steadyslip.core.dimensions import Dimension, unit
 from steadyslip.core.errors import NoSteadySliding, NotAvailable
 from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
-from steadyslip.core.telling import shown
 from steadyslip.linear import samples
 from steadyslip.linear.linear_sets import linear_set
 from steadyslip.linear.polynomials import StableSet
@@ -95,11 +95,11 @@ class Boundary(Displayed):
     contact: str = ""
 
     def __str__(self) -> str:
-        text = f"{self.parameter} = {shown(self.value, self.unit, 6, self.area)}: {self.kind}"
+        text = f"{self.parameter} = {format_quantity(self.value, self.unit, 6, self.area)}: {self.kind}"
         if self.contact:
             text += f" at contact {self.contact}"
         if self.kind == "oscillatory":
-            text += f", period {shown(2 * np.pi / self.angular_frequency, 's')}"
+            text += f", period {format_quantity(2 * np.pi / self.angular_frequency, 's')}"
         return f"{text}, stable {self.stable}" if self.stable != "neither" else text
 
 

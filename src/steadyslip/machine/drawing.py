@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.machine.links import Link
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import GROUND, LOAD_POINT
@@ -149,7 +149,7 @@ class Drawing:
     def _body(self, name: str) -> None:
         body, place = self.machine.bodies[name], self.places[name]
         inertia = body.inertia_of()
-        weighs = shown(inertia, "kg m^2" if body.turns else "kg") if inertia else "no mass"
+        weighs = format_quantity(inertia, "kg m^2" if body.turns else "kg") if inertia else "no mass"
         text = self._told(name, weighs)
         if body.turns:
             for side in (-1, 1):
@@ -167,13 +167,13 @@ class Drawing:
             y, way = place.y + _HIGH / 2 + 0.22, math.copysign(0.7, along)
             x = place.x + (0.95 if self.machine.drive.driven() == name else 0.0)  # beside what the drive does
             self.pencil.arrow((x - way / 2, y), (x + way / 2, y), color=FORCED)
-            size = shown(abs(along), "N m" if body.turns else "N") if self.values else "force"
+            size = format_quantity(abs(along), "N m" if body.turns else "N") if self.values else "force"
             self.pencil.words(x, y + 0.2, size, color=FORCED, va="bottom")
         if away:
             x, y = place.x + 0.6, place.y + _HIGH / 2
             start, end = ((x, y + 0.75), (x, y + 0.04)) if away < 0 else ((x, y + 0.04), (x, y + 0.75))
             self.pencil.arrow(start, end, color=FORCED)
-            size = shown(abs(away), "N") if self.values else "force"
+            size = format_quantity(abs(away), "N") if self.values else "force"
             self.pencil.words(x + 0.12, y + 0.6, size, color=FORCED, ha="left")
 
     def _contacts(self, name: str) -> None:
@@ -224,7 +224,7 @@ class Drawing:
 
     def _load(self, name: str, one: Surface) -> str:
         """What presses it, in a few words, and at which radius it rubs."""
-        return self._pressed(name, one) + (f" at {shown(one.radius, 'm')}" if one.radius is not None else "")
+        return self._pressed(name, one) + (f" at {format_quantity(one.radius, 'm')}" if one.radius is not None else "")
 
     def _pressed(self, name: str, one: Surface) -> str:
         if one.loaded_by is not None:
@@ -232,7 +232,7 @@ class Drawing:
         for full, known in self.machine.parameters().items():
             told = known.role.kind in ("normal stress", "stiffness") and known.value is not None
             if told and full.startswith(f"contacts.{name}.contact."):
-                return shown(float(known.value or 0.0), known.role.unit, area=self.machine.area_of(full))
+                return format_quantity(float(known.value or 0.0), known.role.unit, area=self.machine.area_of(full))
         return one.contact.name
 
     # -- links
@@ -335,7 +335,9 @@ class Drawing:
             self.pulled = True
             begin = (x - 0.55, y + 0.58) if abs(along) > abs(up) else (x - 0.4, y + 0.2)
             self.pencil.arrow(begin, (begin[0] + 0.9, begin[1]))
-            speed = shown(float(self.machine.drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
+            speed = format_quantity(
+                float(self.machine.drive.velocity), self.machine.parameters()["drive.velocity"].role.unit
+            )
             self.pencil.words(
                 begin[0] + 0.45, begin[1] + 0.12, speed if self.values else "drive", color=DRIVEN, va="bottom"
             )
@@ -347,11 +349,11 @@ class Drawing:
         known = self.machine.parameters()
         key = "stiffness" if link.rigidity() is not None else "damping"
         one = known[f"links.{name}.{key}"]
-        words = [name, shown(float(one.value or 0.0), one.role.unit)]
+        words = [name, format_quantity(float(one.value or 0.0), one.role.unit)]
         if link.turning[0] and link.ratio() != 1:
             ratio = next(known[f"links.{name}.{key}"] for key in ("lead", "gear") if f"links.{name}.{key}" in known)
             words[0] += ", " + (
-                shown(float(ratio.value or 0), ratio.role.unit)
+                format_quantity(float(ratio.value or 0), ratio.role.unit)
                 if ratio.role.unit == "m/rad"
                 else f"gear {float(ratio.value or 0):.3g}"
             )
@@ -365,8 +367,8 @@ class Drawing:
         if body is None:
             return
         place = self.places[body]
-        speed = shown(float(drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
-        late = f"\n{shown(float(drive.lateness()), 's')} late" if drive.lateness() else ""
+        speed = format_quantity(float(drive.velocity), self.machine.parameters()["drive.velocity"].role.unit)
+        late = f"\n{format_quantity(float(drive.lateness()), 's')} late" if drive.lateness() else ""
         top = max(p.y for p in self.places.values()) + _HIGH / 2 + 0.9 + 0.95 * self.storeys
         self.pencil.frame(place.x - 1.0, top, 2.0, 0.75)
         self.pencil.words(place.x, top + 0.375, self._told(drive.name, speed + late, ", "), color=DRIVEN)
@@ -407,8 +409,8 @@ def _places(machine: Machine) -> dict[str, _Place]:
             order += [end for end in tie if one in tie and end not in order]
     row = [name for name in order if name in machine.bodies]
     partner: dict[str, str] = {}
-    for touch in machine.contacts.values():
-        for end, other in ((touch.against, touch.body), (touch.body, touch.against)):
+    for surface in machine.contacts.values():
+        for end, other in ((surface.against, surface.body), (surface.body, surface.against)):
             if end in machine.bodies and end not in row and other in row:
                 partner.setdefault(end, other)
     row += [name for name in machine.bodies if name not in row and name not in partner]

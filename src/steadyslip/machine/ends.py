@@ -17,17 +17,17 @@ def unknown_ends(tables: Mapping[str, Any]) -> Iterator[Problem]:
         ends = link.get("between")
         for end in ends if isinstance(ends, list) else ():
             yield from _unknown(f"links.{name}.between", end, [*bodies, GROUND, LOAD_POINT])
-    for name, touch in contacts.items():
-        yield from _unknown(f"contacts.{name}.body", touch.get("body"), [*bodies, LOAD_POINT])
-        yield from _unknown(f"contacts.{name}.against", touch.get("against"), [*bodies, GROUND, LOAD_POINT])
-        if isinstance(by := touch.get("loaded_by"), str) and by not in links:
+    for name, surface in contacts.items():
+        yield from _unknown(f"contacts.{name}.body", surface.get("body"), [*bodies, LOAD_POINT])
+        yield from _unknown(f"contacts.{name}.against", surface.get("against"), [*bodies, GROUND, LOAD_POINT])
+        if isinstance(by := surface.get("loaded_by"), str) and by not in links:
             yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", by, links))
     drive = tables.get("drive")
     driven = drive if isinstance(drive, dict) else {}
     for key in ("body", "measured", "speed_measured"):
         yield from _unknown(f"drive.{key}", driven.get(key), list(bodies))
     named = [end for link in links.values() if isinstance(link.get("between"), list) for end in link["between"]]
-    named += [touch.get(key) for touch in contacts.values() for key in ("body", "against")]
+    named += [surface.get(key) for surface in contacts.values() for key in ("body", "against")]
     lost = list(unnamed(bodies, [*named, driven.get("body")]))
     yield from lost
     if all(end in (*bodies, GROUND, LOAD_POINT) for end in named if isinstance(end, str)):

@@ -63,8 +63,8 @@ def _without(machine: Machine, name: str) -> Machine:
             )
         if machine.bodies[end].lifts or "y" in link.directions():
             raise NotAvailable(f"links.{name} cannot be rigid: it holds a body that moves away from the surface")
-    for contact, touch in machine.contacts.items():
-        if touch.loaded_by == name:
+    for contact, surface in machine.contacts.items():
+        if surface.loaded_by == name:
             raise NotAvailable(f"links.{name} cannot be rigid: contacts.{contact} sees its force (loaded_by)")
     ratio = float(link.ratio())
     trials = [(first, second, ratio), (second, first, 1 / ratio)]
@@ -142,12 +142,12 @@ def _tied(machine: Machine, name: str, link: Link, kept: str, gone: str, ratio: 
     return Spring(between=(other, kept), **values(own))
 
 
-def _rubbing(machine: Machine, name: str, touch: Surface, kept: str, gone: str, ratio: float) -> Surface:
+def _rubbing(machine: Machine, name: str, surface: Surface, kept: str, gone: str, ratio: float) -> Surface:
     """A contact of the body that goes, as one of the body that is kept."""
-    if touch.against == gone or not machine.bodies[kept].turns:
+    if surface.against == gone or not machine.bodies[kept].turns:
         if not _is_one(ratio) or machine.bodies[kept].turns != machine.bodies[gone].turns:
             raise NotAvailable(
                 f"contacts.{name}: {kept!r} cannot rub there in place of {gone!r}, which moves otherwise"
             )
-        return replace(touch, against=kept) if touch.against == gone else replace(touch, body=kept)
-    return replace(touch, body=kept, radius=ratio * (1.0 if touch.radius is None else touch.radius))
+        return replace(surface, against=kept) if surface.against == gone else replace(surface, body=kept)
+    return replace(surface, body=kept, radius=ratio * (1.0 if surface.radius is None else surface.radius))

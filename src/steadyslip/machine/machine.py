@@ -20,11 +20,11 @@ from steadyslip.machine.mechanism import (
     GROUND,
     LOAD_POINT,
     NORMAL,
+    ContactPort,
     DegreeOfFreedom,
     Element,
     Integral,
     Mechanism,
-    Touch,
 )
 from steadyslip.machine.motion import Tie, rigid_motion
 from steadyslip.machine.rig import Rig
@@ -57,7 +57,7 @@ class Machine(Rig):
             yield from self._floating()
         else:
             ends = [end for link in self.links.values() for end in link.between]
-            ends += [end for touch in self.contacts.values() for end in (touch.body, touch.against)]
+            ends += [end for surface in self.contacts.values() for end in (surface.body, surface.against)]
             yield from unnamed(self.bodies, [*ends, self.drive.driven()])
 
     def _nameless(self) -> Iterator[Problem]:
@@ -94,15 +94,15 @@ class Machine(Rig):
                 yield Problem(f"links.{name}", message)
             if set(link.between) == {GROUND, LOAD_POINT}:
                 yield Problem(f"links.{name}.between", "links no body; allowed: a body at one end at least")
-        for name, touch in self.contacts.items():
-            yield from self._end(f"contacts.{name}.body", touch.body, (LOAD_POINT,))
-            yield from self._end(f"contacts.{name}.against", touch.against)
-            if touch.body == touch.against:
-                yield Problem(f"contacts.{name}.against", f"{touch.body!r} cannot slide on itself")
-            if {touch.body, touch.against} == {GROUND, LOAD_POINT}:
+        for name, surface in self.contacts.items():
+            yield from self._end(f"contacts.{name}.body", surface.body, (LOAD_POINT,))
+            yield from self._end(f"contacts.{name}.against", surface.against)
+            if surface.body == surface.against:
+                yield Problem(f"contacts.{name}.against", f"{surface.body!r} cannot slide on itself")
+            if {surface.body, surface.against} == {GROUND, LOAD_POINT}:
                 yield Problem(f"contacts.{name}.against", "no body slides there; name one as body or against")
-            if touch.loaded_by is not None and touch.loaded_by not in self.links:
-                yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", touch.loaded_by, self.links))
+            if surface.loaded_by is not None and surface.loaded_by not in self.links:
+                yield Problem(f"contacts.{name}.loaded_by", unknown_name("link", surface.loaded_by, self.links))
         if self.drive.driven() is not None:
             for key in ("body", "measured", "speed_measured"):
                 end = getattr(self.drive, key, None)
@@ -125,26 +125,30 @@ class Machine(Rig):
         return end in self.bodies and bool(self.bodies[end].lifts)
 
     def _wrong_contacts(self) -> Iterator[Problem]:
-        for name, touch in self.contacts.items():
-            where, ends = f"contacts.{name}", (touch.body, touch.against)
+        for name, surface in self.contacts.items():
+            where, ends = f"contacts.{name}", (surface.body, surface.against)
             turning = [bool(self._turns(end)) for end in ends]
-            if turning[0] and touch.radius is None:
-                yield Problem(f"{where}.radius", f"missing; {touch.body!r} turns, so slip is a radius times its angle")
-            if touch.radius is not None and not turning[0]:
-                yield Problem(f"{where}.radius", f"given, but {touch.body!r} does not turn")
+            if turning[0] and surface.radius is None:
+                yield Problem(
+                    f"{where}.radius", f"missing; {surface.body!r} turns, so slip is a radius times its angle"
+                )
+            if surface.radius is not None and not turning[0]:
+                yield Problem(f"{where}.radius", f"given, but {surface.body!r} does not turn")
             if turning[1]:
-                yield Problem(f"{where}.against", f"{touch.against!r} turns; name the body that turns as body")
+                yield Problem(f"{where}.against", f"{surface.against!r} turns; name the body that turns as body")
             lifting = any(map(self._lifts, ends))
-            if touch.contact.is_compliant() and not lifting:
+            if surface.contact.is_compliant() and not lifting:
                 yield Problem(
                     f"{where}.contact", "a compliant contact needs a body that moves away from the surface; write "
-                    f"motion = 'plane' for {touch.body!r}",
+                    f"motion = 'plane' for {surface.body!r}",
                 )  # fmt: skip
-            link = self.links.get(touch.loaded_by)
-            if link is not None and touch.held not in link.between:
-                yield Problem(f"{where}.loaded_by", f"the link {touch.loaded_by!r} does not hold {touch.held!r}")
+            link = self.links.get(surface.loaded_by)
+            if link is not None and surface.held not in link.between:
+                yield Problem(f"{where}.loaded_by", f"the link {surface.loaded_by!r} does not hold {surface.held!r}")
             elif link is not None and "x" not in link.directions():
-                message = f"the link {touch.loaded_by!r} pulls away from the surface only; allowed: one along the slide"
+                message = (
+                    f"the link {surface.loaded_by!r} pulls away from the surface only; allowed: one along the slide"
+                )
                 yield Problem(f"{where}.loaded_by", message)
         for name, body in self.bodies.items():
             carried = any(name in (c.body, c.against) and c.contact.is_compliant() for c in self.contacts.values())
@@ -171,8 +175,8 @@ class Machine(Rig):
             message = f"the links contradict each other: {tie.second} would move at {{}} and at {{}} in steady sliding"
             same = np.abs(np.asarray(speed - other)) <= _SAME * np.abs(np.asarray(speed))
             yield Condition("drive" if tie.name == "drive" else "links", same, message, (speed, other))
-        for name, touch in self.contacts.items():
-            slip = self._slip_rate(touch, speeds)
+        for name, surface in self.contacts.items():
+            slip = self._slip_rate(surface, speeds)
             message = (
                 "its slip rate in steady sliding is {} m/s; allowed: > 0; bodies that move together "
                 "do not slide, and where it is negative exchange body and against"
@@ -199,9 +203,9 @@ class Machine(Rig):
         speeds, _ = self._speeds()
         return {name: speeds[name] for name in self.bodies}
 
-    def _slip_rate(self, touch: Surface, speeds: dict[str, Any]) -> Any:
-        lever = 1 if touch.radius is None else touch.radius
-        return lever * speeds[touch.body] - speeds[touch.against]
+    def _slip_rate(self, surface: Surface, speeds: dict[str, Any]) -> Any:
+        lever = 1 if surface.radius is None else surface.radius
+        return lever * speeds[surface.body] - speeds[surface.against]
 
     def area_of(self, name: str) -> float | None:
         kind, _, rest = name.partition(".")
@@ -233,23 +237,23 @@ class Machine(Rig):
                 coordinates.append(DegreeOfFreedom(name + NORMAL, body.inertia_of(), 0, body.away()))
         elements = [self._element(name, link) for name, link in self.links.items()]
         controls, integral = self._control(speeds)
-        touches = tuple(
-            Touch(
-                name, touch.friction, touch.contact, self._row((touch.body, touch.against), touch.radius),
-                self._apart(touch), 1 if touch.area is None else touch.area,
-                "" if touch.loaded_by is None else f"links.{touch.loaded_by}",
+        contacts = tuple(
+            ContactPort(
+                name, surface.friction, surface.contact, self._row((surface.body, surface.against), surface.radius),
+                self._apart(surface), 1 if surface.area is None else surface.area,
+                "" if surface.loaded_by is None else f"links.{surface.loaded_by}",
             )
-            for name, touch in self.contacts.items()
+            for name, surface in self.contacts.items()
         )  # fmt: skip
-        return Mechanism(tuple(coordinates), (*elements, *controls), integral, touches, self.drive.velocity)
+        return Mechanism(tuple(coordinates), (*elements, *controls), integral, contacts, self.drive.velocity)
 
     def _row(self, ends: tuple[str, str], lever: Any = None) -> dict[str, Any]:
         """The first end ahead of the second."""
         row = {ends[0]: 1 if lever is None else lever, ends[1]: -1}
         return {end: share for end, share in row.items() if end != GROUND}
 
-    def _apart(self, touch: Surface) -> dict[str, Any]:
-        row = {touch.held: 1, touch.base: -1}
+    def _apart(self, surface: Surface) -> dict[str, Any]:
+        row = {surface.held: 1, surface.base: -1}
         return {end + NORMAL: share for end, share in row.items() if self._lifts(end)}
 
     def _element(self, name: str, link: Link) -> Element:

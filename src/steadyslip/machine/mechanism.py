@@ -71,7 +71,7 @@ class Integral:
 
 
 @dataclass(frozen=True)
-class Touch:
+class ContactPort:
     """Where a body slides on another, or on the ground.
 
     Attributes
@@ -113,7 +113,7 @@ class Mechanism:
     coordinates: tuple[DegreeOfFreedom, ...]
     elements: tuple[Element, ...]
     integral: Integral | None
-    touches: tuple[Touch, ...]
+    contacts: tuple[ContactPort, ...]
     velocity: Any
     gain: Any = 0
     axial_share: Any = None

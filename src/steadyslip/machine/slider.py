@@ -14,7 +14,7 @@ from steadyslip.core.records import parameter, part
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.laws.friction import FrictionLaw
 from steadyslip.machine.drive import Drive
-from steadyslip.machine.mechanism import LOAD_POINT, DegreeOfFreedom, Element, Integral, Mechanism, Touch
+from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, DegreeOfFreedom, Element, Integral, Mechanism
 from steadyslip.machine.rig import Rig
 
 
@@ -104,7 +104,7 @@ class Slider(Rig, section="slider"):
                 Element("", {"x": 1}, {"x": 1}, 0, self.radiation_damping, grounded=True),
             ),
             integral=None if ki is None else Integral({"x": 1}, {"x": 1}, ki, late),
-            touches=(Touch("", self.friction, self.contact, {"x": 1}, {}, 1),),
+            contacts=(ContactPort("", self.friction, self.contact, {"x": 1}, {}, 1),),
             velocity=drive.velocity,
             gain=drive.proportional(),
             axial_share=None if self.axial_stiffness is None else self.contact.sliding_stiffness(1),

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import SEVERAL, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown
 from steadyslip.files.output import write_text
 from steadyslip.files.specifications import protocol_from_text
 from steadyslip.files.specifications.layout import find_law
@@ -79,7 +79,8 @@ class Refined(ReadOnly):
         ]
         for name, size in self.spacing.items():
             lines.append(
-                f"  {name:<24}known to {shown(0.5 * size, self.map.unit(name), 3, self.map.area(name))} or better"
+                f"  {name:<24}known to "
+                f"{format_quantity(0.5 * size, self.map.unit(name), 3, self.map.area(name))} or better"
             )
         lines.append(f"  {len(self.sides):,} points on the edge")
         return "\n".join(lines)

@@ -13,7 +13,7 @@ from steadyslip.core.roles import Parameter
 from steadyslip.core.symbols import Letters
 from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Shares
 from steadyslip.model.equations import HELD, MOVED, TIME, V_LP, Contact, Coordinate, Model, P, Q, Variable
-from steadyslip.model.forces import INTEGRAL, Forces, SymbolicTouch
+from steadyslip.model.forces import INTEGRAL, Forces, SymbolicContact
 from steadyslip.model.names import Observables, check_names, joined
 from steadyslip.model.statics import row_of
 
@@ -90,15 +90,15 @@ class _Assembly(Forces):
 
     def _contact(self, i: int) -> Contact:
         place, motion = self.places[i], self.motions[i]
-        friction, contact = place.touch.friction, place.touch.contact
-        own = f"{place.touch.name}." if place.touch.name else ""
+        friction, contact = place.port.friction, place.port.contact
+        own = f"{place.port.name}." if place.port.name else ""
         units = friction.memory_units()
         remembered = zip(friction.memory(), place.memory, units, strict=True)
         inertial = self.single and self.inertial[self.mechanism.coordinates[0].name]
         own_unknown = place.acceleration if inertial else place.velocity
         load = contact.load()
         return Contact(
-            name=place.touch.name,
+            name=place.port.name,
             slip=place.slip,
             velocity=place.velocity,
             acceleration=place.acceleration,
@@ -118,18 +118,18 @@ class _Assembly(Forces):
             steady_load=None if load is None else sp.sympify(load),
             imposed=sp.sympify(contact.imposed(TIME)),
             direction=sp.sympify(friction.direction(place.velocity, place.speed)),
-            area=sp.sympify(place.touch.area),
+            area=sp.sympify(place.port.area),
             press=place.press,
             outside=place.outside if contact.has_pores() else None,
         )
 
-    def _strength(self, place: SymbolicTouch) -> sp.Expr:
+    def _strength(self, place: SymbolicContact) -> sp.Expr:
         """Friction as its law states it."""
-        law, now = place.touch.friction, (place.sigma, place.memory, place.tau)
+        law, now = place.port.friction, (place.sigma, place.memory, place.tau)
         delay = law.lateness()
         if delay == 0:
             return sp.sympify(law.strength(place.velocity, *now))
-        late = row_of(place.touch.slip, self._before(delay, self.moving))
+        late = row_of(place.port.slip, self._before(delay, self.moving))
         return sp.sympify(law.late_strength(place.velocity, late, *now))
 
     def _variables(
@@ -148,9 +148,9 @@ class _Assembly(Forces):
                 rates.append(one.acceleration)
         for contact, place, motion in zip(contacts, self.places, self.motions, strict=True):
             variables += [*contact.memory, *contact.own_states]
-            law = place.touch.friction
+            law = place.port.friction
             rates += [sp.sympify(e) for e in law.rates(place.velocity, place.sigma, place.memory, place.tau)]
-            rates += [sp.sympify(e) for e in place.touch.contact.rates(motion)]
+            rates += [sp.sympify(e) for e in place.port.contact.rates(motion)]
         integral = self.mechanism.integral
         if integral is not None:
             what = "time integral of x (controller)" if self.single else "time integral of the controller's error"
@@ -182,7 +182,7 @@ class _Assembly(Forces):
             found[place.velocity] = place.speed
             found |= {place.spring: sp.sympify(motion.steady_spring), place.tau: place.tau_ss}
             found[place.sigma] = place.sigma_ss
-            memory = place.touch.friction.steady_memory(place.speed, place.sigma_ss)
+            memory = place.port.friction.steady_memory(place.speed, place.sigma_ss)
             found |= dict(zip(place.memory, map(sp.sympify, memory), strict=True))
             found |= dict(zip(place.states, motion.steady_memory, strict=True))
         found |= {late: found[symbol] for late, (symbol, _) in self.late.items()}
@@ -205,9 +205,9 @@ class _Assembly(Forces):
         every = joined([*tables, *((owner, remembered) for owner, remembered, _ in laws)])
         return {name: every[name] for _, table in tables for name in table}
 
-    def _observed(self, place: SymbolicTouch) -> Observables:
+    def _observed(self, place: SymbolicContact) -> Observables:
         """What is seen at every contact."""
-        own, area = (f"{place.touch.name}.", place.touch.area) if place.touch.name else ("", 1)
+        own, area = (f"{place.port.name}.", place.port.area) if place.port.name else ("", 1)
         words = ("friction_force", "normal_force") if own else ("shear_stress", "normal_stress")
         unit = "N" if own else "Pa"
         seen = {
@@ -219,20 +219,20 @@ class _Assembly(Forces):
             seen["spring_stress"] = (place.spring, "Pa")
         return seen
 
-    def _stated(self, place: SymbolicTouch) -> list[tuple[str, Observables, Observables]]:
+    def _stated(self, place: SymbolicContact) -> list[tuple[str, Observables, Observables]]:
         """Of both laws of a contact: whose they are, what they remember, and what they let see."""
-        touch, own = place.touch, f"{place.touch.name}." if place.touch.name else ""
-        stated = touch.friction.observables(place.velocity, place.sigma, place.memory, place.tau)
+        port, own = place.port, f"{place.port.name}." if place.port.name else ""
+        stated = port.friction.observables(place.velocity, place.sigma, place.memory, place.tau)
         found: list[tuple[str, Observables, Observables]] = []
         for kind, law, symbols in (
-            ("friction", touch.friction, place.memory),
-            ("contact", touch.contact, place.states),
+            ("friction", port.friction, place.memory),
+            ("contact", port.contact, place.states),
         ):
             remembered = dict(zip(law.memory(), zip(symbols, law.memory_units(), strict=True), strict=True))
             seen = remembered if kind == "contact" else {n: (sp.sympify(e), unit) for n, (e, unit) in stated.items()}
             check_names(f"contacts.{own}{kind}" if own else kind, law, [*law.memory(), *(seen.keys() - remembered)])
             kept, shown = ({f"{own}{name}": one for name, one in table.items()} for table in (remembered, seen))
-            found.append((f"the {kind} law of {touch.name}" if own else f"the {kind} law", kept, shown))
+            found.append((f"the {kind} law of {port.name}" if own else f"the {kind} law", kept, shown))
         return found
 
     def _carried(self, element: Element) -> Observables:

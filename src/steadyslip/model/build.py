@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 
 from steadyslip.core.options import checked
-from steadyslip.core.records import Address, parameters, shape_of, twin
+from steadyslip.core.records import Address, parameters, shape_of, with_values
 from steadyslip.core.symbols import Letters
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -72,7 +72,7 @@ def _build_cached(structure: _Structure) -> Model:
     for name in rig.instead:
         given.pop(name, None)
     roles = {name: address.role for name, address in rig.parameters().items()}
-    mechanism = twin(rig, symbols).mechanism()
+    mechanism = with_values(rig, symbols).mechanism()
     return assemble(mechanism, given, roles, Letters({*RESERVED, *known.values()}, known), structure.drive)
 
 

@@ -18,7 +18,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.expressions import derivative
 from steadyslip.core.symbols import Letters, inner_symbol
 from steadyslip.laws.contact import Motion
-from steadyslip.machine.mechanism import LOAD_POINT, Element, Mechanism, Touch
+from steadyslip.machine.mechanism import LOAD_POINT, ContactPort, Element, Mechanism
 from steadyslip.model.equations import EITHER, MOVED, V_LP, LettingGo, P, Q
 from steadyslip.model.statics import Press, Statics, row_of, statics
 
@@ -26,10 +26,10 @@ INTEGRAL = inner_symbol("I_x", real=True)
 
 
 @dataclass(frozen=True, eq=False)
-class SymbolicTouch:
+class SymbolicContact:
     """A contact on its way into the Model: its symbols, and what the laws say in them."""
 
-    touch: Touch
+    port: ContactPort
     slip: sp.Expr
     velocity: sp.Symbol
     acceleration: sp.Expr
@@ -46,7 +46,7 @@ class SymbolicTouch:
     @cached_property
     def tau_ss(self) -> sp.Expr:
         """Friction in steady sliding."""
-        return sp.sympify(self.touch.friction.steady_strength(self.speed, self.sigma_ss))
+        return sp.sympify(self.port.friction.steady_strength(self.speed, self.sigma_ss))
 
 
 class Forces:
@@ -60,8 +60,8 @@ class Forces:
         if self.imposed:
             self._check_loading()
         names = [one.name for one in mechanism.coordinates]
-        self.single = len(names) == 1 and [dict(touch.slip) for touch in mechanism.touches] == [{names[0]: 1}]
-        self.bare = not all(touch.name for touch in mechanism.touches)
+        self.single = len(names) == 1 and [dict(port.slip) for port in mechanism.contacts] == [{names[0]: 1}]
+        self.bare = not all(port.name for port in mechanism.contacts)
 
         def symbols(of: str, alone: str) -> dict[str, sp.Symbol]:
             if self.single:
@@ -72,7 +72,7 @@ class Forces:
         self.push = {names[0]: Q} if self.single else symbols("q", "q")
         self.moving = self.v | {LOAD_POINT: V_LP}
         self.speeds = {c.name: sp.sympify(c.speed) for c in mechanism.coordinates} | {LOAD_POINT: mechanism.velocity}
-        self.places = [self._place(i, touch) for i, touch in enumerate(mechanism.touches)]
+        self.places = [self._place(i, port) for i, port in enumerate(mechanism.contacts)]
         self.definitions: dict[sp.Symbol, sp.Expr] = {}
         self.late: dict[sp.Symbol, tuple[sp.Symbol, sp.Expr]] = {}
         self._define()
@@ -86,7 +86,7 @@ class Forces:
                 f"a drive that pulls with a force of its own needs one link that carries it; {names or 'none'} "
                 "would share it, and how is open"
             )
-        if any(LOAD_POINT in touch.slip for touch in self.mechanism.touches):
+        if any(LOAD_POINT in port.slip for port in self.mechanism.contacts):
             raise NotAvailable(
                 "a drive that pulls with a force of its own is not offered where a contact slides on the drive"
             )
@@ -96,29 +96,29 @@ class Forces:
     def _of_the_drive(self, what: str) -> sp.Symbol:
         return self.letters.symbol(f"drive_{what}", f"drive.{what}", real=True)
 
-    def _place(self, index: int, touch: Touch) -> SymbolicTouch:
+    def _place(self, index: int, port: ContactPort) -> SymbolicContact:
         def symbol(name: str, **assumptions: Any) -> sp.Symbol:
             if self.single:
                 return inner_symbol(name, **assumptions)
-            return self.letters.symbol(f"at_{index:03d}_{name}", f"{touch.name}.{name}", **assumptions)
+            return self.letters.symbol(f"at_{index:03d}_{name}", f"{port.name}.{name}", **assumptions)
 
         def remembered(names: tuple[str, ...], kind: str) -> tuple[sp.Symbol, ...]:
             each = enumerate(names)
             return tuple(
-                self.letters.symbol(f"at_{index:03d}_{kind}_{i:03d}", f"{touch.name or kind}.{name}", real=True)
+                self.letters.symbol(f"at_{index:03d}_{kind}_{i:03d}", f"{port.name or kind}.{name}", real=True)
                 for i, name in each
             )
 
-        body = next(iter(touch.slip))
+        body = next(iter(port.slip))
         memory, states = (
-            remembered(law.memory(), kind) for law, kind in ((touch.friction, "memory"), (touch.contact, "contact"))
+            remembered(law.memory(), kind) for law, kind in ((port.friction, "memory"), (port.contact, "contact"))
         )
-        return SymbolicTouch(
-            touch,
-            row_of(touch.slip, self.x),
+        return SymbolicContact(
+            port,
+            row_of(port.slip, self.x),
             self.v[body] if self.single else symbol("v", real=True),
-            row_of(touch.slip, self.a),
-            row_of(touch.slip, self.speeds),
+            row_of(port.slip, self.a),
+            row_of(port.slip, self.speeds),
             symbol("T", real=True),
             symbol("tau", real=True),
             symbol("sigma", positive=True),
@@ -126,7 +126,7 @@ class Forces:
             memory,
             states,
             P if self.single else symbol("p", real=True),
-            self.letters.symbol(f"at_{index:03d}_p_out", f"{touch.name or 'contact'}.p_out", real=True),
+            self.letters.symbol(f"at_{index:03d}_p_out", f"{port.name or 'contact'}.p_out", real=True),
         )
 
     @cached_property
@@ -140,13 +140,13 @@ class Forces:
         distance = inner_symbol("distance", real=True)
         friction, normal = {}, {}
         for place, held in zip(self.places, self.friction, strict=True):
-            touch = place.touch
-            friction[touch.name] = held
-            normal[touch.name] = Press(place.sigma_ss, sp.Integer(0))
-            if touch.separation and touch.contact.is_compliant():
+            port = place.port
+            friction[port.name] = held
+            normal[port.name] = Press(place.sigma_ss, sp.Integer(0))
+            if port.separation and port.contact.is_compliant():
                 still = replace(self._motion(place, sp.nan, sp.nan, distance, distance), separation_rate=0)
-                pressed = sp.sympify(touch.contact.normal_stress(still))
-                normal[touch.name] = Press(pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance))
+                pressed = sp.sympify(port.contact.normal_stress(still))
+                normal[port.name] = Press(pressed.xreplace({distance: sp.Integer(0)}), derivative(pressed, distance))
         return statics(self.mechanism, friction, normal, self.letters.symbol)
 
     def _known(self, expression: sp.Expr) -> sp.Expr:
@@ -156,12 +156,12 @@ class Forces:
         return sp.cancel(sp.together(expression)).xreplace(self.friction)
 
     def _motion(
-        self, place: SymbolicTouch, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any
+        self, place: SymbolicContact, spring_ss: Any, stiffness: Any, separation: Any, steady_separation: Any
     ) -> Motion:
         return Motion(
             place.slip, place.velocity, place.acceleration, place.spring, spring_ss, place.tau, place.tau_ss,
-            stiffness, place.speed, separation, steady_separation, row_of(place.touch.separation, self.v),
-            place.states, tuple(map(sp.sympify, place.touch.contact.steady_memory(place.speed))), place.outside,
+            stiffness, place.speed, separation, steady_separation, row_of(place.port.separation, self.v),
+            place.states, tuple(map(sp.sympify, place.port.contact.steady_memory(place.speed))), place.outside,
         )  # fmt: skip
 
     # -- forces
@@ -255,7 +255,7 @@ class Forces:
     def _steady_force(self) -> sp.Expr:
         """Force of the drive in steady sliding."""
         if self.single:
-            return self.motions[0].steady_spring * self.places[0].touch.area / self._per_area()
+            return self.motions[0].steady_spring * self.places[0].port.area / self._per_area()
         pull = sp.Add(*(self._known(self.statics.tension(one)) for one in self.driven))
         pull += sp.Add(*(self._tension(one, {}, self.speeds) for one in self.driven))
         if self.mechanism.integral is not None:
@@ -264,7 +264,7 @@ class Forces:
 
     def _per_area(self) -> Any:
         """What a unit of the force of the drive is: of a slider a stress."""
-        return self.places[0].touch.area if self.bare else 1
+        return self.places[0].port.area if self.bare else 1
 
     def _before(self, delay: Any, now: Mapping[str, sp.Symbol]) -> Mapping[str, sp.Symbol]:
         """What moves as it was a delay ago, as symbols of its own; what the drive does is steady and has none."""
@@ -297,10 +297,10 @@ class Forces:
         """Velocities of slip, then T, τ and σ of the contacts."""
         for place in self.places:
             if place.velocity not in self.v.values():
-                self.definitions[place.velocity] = row_of(place.touch.slip, self.moving)
+                self.definitions[place.velocity] = row_of(place.port.slip, self.moving)
         self.motions = [self._seen(place) for place in self.places]
         self.normal = [
-            sp.sympify(p.touch.contact.normal_stress(m)) + p.press
+            sp.sympify(p.port.contact.normal_stress(m)) + p.press
             for p, m in zip(self.places, self.motions, strict=True)
         ]
         self.inertial = {
@@ -311,34 +311,34 @@ class Forces:
             self.definitions[self.places[0].tau] = self._friction_of_balance()
         self.definitions |= {place.sigma: law for place, law in zip(self.places, self.normal, strict=True)}
 
-    def _seen(self, place: SymbolicTouch) -> Motion:
+    def _seen(self, place: SymbolicContact) -> Motion:
         """What a contact law sees; defines T, the pull at the body as a stress of the contact."""
-        touch, body = place.touch, next(name for name in place.touch.slip if name != LOAD_POINT)
-        belt = LOAD_POINT in touch.slip  # the drive is what it slides on, and links to the ground hold it against that
+        port, body = place.port, next(name for name in place.port.slip if name != LOAD_POINT)
+        belt = LOAD_POINT in port.slip  # the drive is what it slides on, and links to the ground hold it against that
         elements = self.mechanism.elements
         pulling = [one for one in elements if not (LOAD_POINT in one.senses if belt else one.grounded)]
-        if touch.loaded_by:
-            pulling = [one for one in self.mechanism.elements if one.name == touch.loaded_by]
-            body = next(name for name in touch.slip if name in pulling[0].acts)
-        lever = touch.slip[body] * touch.area
+        if port.loaded_by:
+            pulling = [one for one in self.mechanism.elements if one.name == port.loaded_by]
+            body = next(name for name in port.slip if name in pulling[0].acts)
+        lever = port.slip[body] * port.area
         steady = self._single_pull() if self.single else self._steady_pull(body, pulling) / lever
         moving = sp.Add(*(-one.acts.get(body, 0) * self._tension(one, {}, self.speeds) for one in pulling)) / lever
         self.definitions[place.spring] = steady + self._pull(body, pulling) / lever
         behind = (
             pulling
-            if touch.loaded_by
+            if port.loaded_by
             else [one for one in pulling if (one.grounded if belt else LOAD_POINT in one.senses)]
         )
         stiffness = sp.Add(*(sp.sympify(e.acts.get(body, 0) * e.stiffness * e.senses.get(body, 0)) for e in behind))
-        distance = self._known(row_of(touch.separation, self.statics.displacement)) if touch.separation else 0
-        apart = distance + row_of(touch.separation, self.x)
-        return self._motion(place, steady + moving, stiffness / (lever * touch.slip[body]), apart, distance)
+        distance = self._known(row_of(port.separation, self.statics.displacement)) if port.separation else 0
+        apart = distance + row_of(port.separation, self.x)
+        return self._motion(place, steady + moving, stiffness / (lever * port.slip[body]), apart, distance)
 
     def _single_pull(self) -> sp.Expr:
         """The pull at a block in steady sliding, which no statics are needed for: friction, and what holds it back."""
         (place,), (body,) = self.places, self.mechanism.coordinates
         held = sp.Add(*(self._tension(one, {}, self.speeds) for one in self._held()))
-        return place.tau_ss + (held - body.force) / place.touch.area
+        return place.tau_ss + (held - body.force) / place.port.area
 
     def _held(self) -> list[Element]:
         return [one for one in self.mechanism.elements if one.grounded]
@@ -347,8 +347,8 @@ class Forces:
         """τ of a single block."""
         (place,), (body,) = self.places, self.mechanism.coordinates
         held = -sp.Add(*(self._tension(one, self.x, self.moving) for one in self._held()))
-        found = place.spring + (held + body.force - body.inertia * self.a[body.name]) / place.touch.area
-        return found + self.push[body.name] / place.touch.area
+        found = place.spring + (held + body.force - body.inertia * self.a[body.name]) / place.port.area
+        return found + self.push[body.name] / place.port.area
 
     def _balance(self, name: str, inertia: Any) -> sp.Expr | None:
         """Inertia less forces of a coordinate, those that are the same in steady sliding left out on both sides."""
@@ -358,9 +358,9 @@ class Forces:
         for one in self.mechanism.elements:  # what a dashpot that moves steadily carries, springs carry the other way
             total -= one.acts.get(name, 0) * self._tension(one, {}, self.speeds)
         for place in self.places:
-            area = place.touch.area
-            total += place.touch.slip.get(name, 0) * area * (place.tau - place.tau_ss)
-            total -= place.touch.separation.get(name, 0) * area * (place.sigma - place.sigma_ss)
+            area = place.port.area
+            total += place.port.slip.get(name, 0) * area * (place.tau - place.tau_ss)
+            total -= place.port.separation.get(name, 0) * area * (place.sigma - place.sigma_ss)
         return total
 
     def _beyond(self, element: Element) -> sp.Expr:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.arrays import Together, broadcast, check_together, checked_array, valid_together
+from steadyslip.core.arrays import BroadcastArrays, broadcast, check_together, checked_array, valid_together
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.questions import Keeper, question
@@ -210,7 +210,7 @@ def _own_point(rig: Rig, branch: int) -> OperatingPoint:
     return _placed(model_of(rig), rig, _varied(rig, {}), branch, False)
 
 
-def _placed(model: Model, rig: Rig, together: Together, branch: int, scan: bool) -> OperatingPoint:
+def _placed(model: Model, rig: Rig, together: BroadcastArrays, branch: int, scan: bool) -> OperatingPoint:
     varied, valid = together.values, True
     if varied and scan:
         valid = valid_together(rig, "", varied)
@@ -239,7 +239,7 @@ def _axial_share(model: Model) -> Callable[[Mapping[str, Any]], Any]:
     return lambda values: function(*(values[name] for name in names))[0]
 
 
-def _varied(rig: Rig, vary: Vary) -> Together:
+def _varied(rig: Rig, vary: Vary) -> BroadcastArrays:
     """Checked values by full name."""
     known, problems = rig.parameters(), []
     checked: dict[str, Any] = {}

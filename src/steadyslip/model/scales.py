@@ -84,7 +84,7 @@ def _together(
 ) -> tuple[dict[str, Any], tuple[Any, ...]]:
     """Scales of a machine, from those at its contacts."""
     numbers = [np.asarray(e, dtype=float) for e in point.evaluate(_moving_function(point.model))]
-    directs = [felt(weights(point, i), np.where) for i in range(len(point.model.contacts))]
+    directs = [direct_effect_scale(weights(point, i), np.where) for i in range(len(point.model.contacts))]
     scales, searched = joined_sizes(reduction, numbers, speeds, point.sigmas, directs, each, np.where)
     return scales, searched or (np.ones(1),)
 
@@ -168,7 +168,7 @@ def shortest_time(scales: Mapping[str, Any], choose: Choose = np.where) -> Any:
     return found
 
 
-def felt(found: Weights, choose: Choose) -> Any:
+def direct_effect_scale(found: Weights, choose: Choose) -> Any:
     """The size of the direct effect as far as it sets scales, Pa; zero where there is none."""
     direct, least = abs(found.direct), _FELT * abs(found.stress)
     return choose(direct > 0, choose(direct > least, direct, least), 0.0)
@@ -189,7 +189,7 @@ def sizes(
     index : int, optional
         The contact.
     """
-    direct, by_slip = felt(found, choose), abs(found.by_slip)
+    direct, by_slip = direct_effect_scale(found, choose), abs(found.by_slip)
     x: Any = np.inf
     for distance in (*(drive / abs(n) for n in found.decay), direct / by_slip):
         x = choose((distance > 0) & (distance < x), distance, x)

@@ -12,10 +12,10 @@ import sympy as sp
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding
 from steadyslip.core.expressions import ArrayFunction
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.questions import question
-from steadyslip.core.telling import shown
 from steadyslip.laws.contact import ContactLaw
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.rig import Rig
@@ -65,11 +65,14 @@ class SteadySliding(Displayed):
 
     def __str__(self) -> str:
         rows = [
-            f"steady sliding at {shown(self.velocity, 'm/s')}: {stress_name('normal stress', self.area)} "
-            f"{shown(self.normal_stress, 'Pa', area=self.area)}, {stress_name('shear stress', self.area)} "
-            f"{shown(self.shear_stress, 'Pa', area=self.area)}, friction {self.friction:.4g}"
+            f"steady sliding at {format_quantity(self.velocity, 'm/s')}: {stress_name('normal stress', self.area)} "
+            f"{format_quantity(self.normal_stress, 'Pa', area=self.area)}, {stress_name('shear stress', self.area)} "
+            f"{format_quantity(self.shear_stress, 'Pa', area=self.area)}, friction {self.friction:.4g}"
         ]
-        rows += [f"  {name} = {shown(value, self.units[name], area=self.area)}" for name, value in self.states.items()]
+        rows += [
+            f"  {name} = {format_quantity(value, self.units[name], area=self.area)}"
+            for name, value in self.states.items()
+        ]
         return "\n".join(rows)
 
 
@@ -117,14 +120,17 @@ class SteadyMachine(Displayed):
     units: dict[str, str] = field(repr=False)
 
     def __str__(self) -> str:
-        rows = [f"steady sliding at {shown(self.velocity, self.units['drive'])}"]
-        rows += [f"  {name} moves at {shown(speed, self.units[name])}" for name, speed in self.speeds.items()]
+        rows = [f"steady sliding at {format_quantity(self.velocity, self.units['drive'])}"]
+        rows += [f"  {name} moves at {format_quantity(speed, self.units[name])}" for name, speed in self.speeds.items()]
         for name, one in self.contacts.items():
             rows.append(
-                f"  {name} slides at {shown(one.slip_rate, 'm/s')}: normal force {shown(one.normal_force, 'N')}, "
-                f"friction force {shown(one.friction_force, 'N')}, friction {one.friction:.4g}"
+                f"  {name} slides at {format_quantity(one.slip_rate, 'm/s')}: normal force "
+                f"{format_quantity(one.normal_force, 'N')}, "
+                f"friction force {format_quantity(one.friction_force, 'N')}, friction {one.friction:.4g}"
             )
-        rows += [f"  {name} carries {shown(f, self.units[f'links.{name}'])}" for name, f in self.links.items()]
+        rows += [
+            f"  {name} carries {format_quantity(f, self.units[f'links.{name}'])}" for name, f in self.links.items()
+        ]
         return "\n".join(rows)
 
 
@@ -288,7 +294,7 @@ def _absent(point: OperatingPoint, place: int, law: ContactLaw, area: float | No
         words = ABSENT["lock-up"].format(at=at, margin=f"{margin:.4g}") + (f"; {hint}" if hint else "")
         return _absence("lock-up", name, words, margin)
     left = load + offset
-    had, taken, remains = (shown(one, "Pa", area=area) for one in (load, -offset, left))
+    had, taken, remains = (format_quantity(one, "Pa", area=area) for one in (load, -offset, left))
     words = ABSENT["lift-off"].format(at=at, force=force, load=had, taken=taken, left=remains)
     return _absence("lift-off", name, words, left)
 
@@ -314,7 +320,7 @@ def _jointly_absent(point: OperatingPoint, joint: JointEquation) -> NoSteadySlid
         return _absence("lock-up", name, words, float(1 - gain))
     least = int(np.argmin(sigma))
     force = point.evaluate(point.model.function([contacts[least].area]))[0] * sigma[least]
-    words = ABSENT["lifted"].format(at=_at(contacts[least].name), left=shown(float(force), "N"))
+    words = ABSENT["lifted"].format(at=_at(contacts[least].name), left=format_quantity(float(force), "N"))
     return _absence("lift-off", contacts[least].name, words, float(force))
 
 

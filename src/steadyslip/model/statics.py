@@ -60,9 +60,9 @@ def row_of(row: Shares, values: Mapping[str, Any]) -> sp.Expr:
 
 @dataclass(frozen=True)
 class Press:
-    """Normal stress of a contact: `at_touch` where surfaces just touch, and its `slope` in their distance."""
+    """Normal stress of a contact: `at_contact` where surfaces just touch, and its `slope` in their distance."""
 
-    at_touch: sp.Expr
+    at_contact: sp.Expr
     slope: sp.Expr
 
 
@@ -108,11 +108,11 @@ def _balances(
             total -= share * (tensions[id(element)] + element.damping * row_of(element.senses, speeds))
         if integral is not None:
             total -= integral.acts.get(one.name, 0) * integral.gain * held
-        for touch in mechanism.touches:
-            own = normal[touch.name]
-            total -= touch.slip.get(one.name, 0) * touch.area * friction[touch.name]
-            pressed = own.at_touch + own.slope * row_of(touch.separation, places)
-            total += touch.separation.get(one.name, 0) * touch.area * pressed
+        for port in mechanism.contacts:
+            own = normal[port.name]
+            total -= port.slip.get(one.name, 0) * port.area * friction[port.name]
+            pressed = own.at_contact + own.slope * row_of(port.separation, places)
+            total += port.separation.get(one.name, 0) * port.area * pressed
         equations.append(total)
     return equations
 
@@ -139,7 +139,7 @@ def _carried(
     equations += [row_of(one.senses, places) - tensions[id(one)] / one.stiffness for one in springs]
     unknowns = [*places.values(), *([held] if mechanism.integral is not None else []), *tensions.values()]
     frictions = [*friction.values()]
-    stresses = [own.at_touch if own.slope == 0 else None for own in normal.values()]
+    stresses = [own.at_contact if own.slope == 0 else None for own in normal.values()]
     nothing = dict.fromkeys((*unknowns, *frictions, *filter(None, stresses)), sp.Integer(0))
 
     def slopes(along: Sequence[sp.Symbol | None], sign: int) -> Entries:

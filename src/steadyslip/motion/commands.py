@@ -10,9 +10,9 @@ import numpy as np
 
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.progress import progress_text
 from steadyslip.core.roles import Parameter
-from steadyslip.core.telling import shown
 from steadyslip.files.output import FIGURES, write_by_ending
 from steadyslip.files.specifications import piece_from_text, read_protocol, read_rig
 from steadyslip.files.standalone import write_page
@@ -79,7 +79,10 @@ def run_file(
     with progress_text("simulating") as said:
 
         def progress(time: float) -> None:
-            said(f"simulating, at {shown(time, 's')} of {shown(end, 's')}; Ctrl-C keeps what there is")
+            said(
+                f"simulating, at {format_quantity(time, 's')} of {format_quantity(end, 's')}; Ctrl-C keeps "
+                "what there is"
+            )
 
         return simulate(
             rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol,

@@ -12,12 +12,12 @@ from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknow
 from steadyslip.core.expressions import ArrayFunction
 from steadyslip.core.options import INTEGRATION
 from steadyslip.core.questions import question
-from steadyslip.core.records import twin
+from steadyslip.core.records import with_values
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.layout import Setting
 from steadyslip.kernels.methods import METHODS as TABLEAUS
 from steadyslip.kernels.runner import Runner, runner
-from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.mechanism import LOAD_POINT
 from steadyslip.machine.slider import Slider
@@ -292,7 +292,7 @@ def _refuse_endless(reduction: Reduction, method: str) -> None:
 
 def _refuse_singular(rig: Slider | Machine, point: OperatingPoint, varied: bool) -> None:
     """What the friction laws say cannot be followed beyond small motions."""
-    own = twin(rig, point.named()) if varied else rig
+    own = with_values(rig, point.named()) if varied else rig
     laws = {"friction": own.friction} if isinstance(own, Slider) else {}
     if isinstance(own, Machine):
         laws = {f"contacts.{name}.friction": surface.friction for name, surface in own.contacts.items()}

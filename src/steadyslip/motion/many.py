@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from steadyslip.core.arrays import Together, broadcast
+from steadyslip.core.arrays import BroadcastArrays, broadcast
 from steadyslip.core.errors import InternalError, ParameterError, Problem, UnknownNameError, unknown_name
 from steadyslip.core.names import resolve
 from steadyslip.core.options import NUMBERS, checked, finite
@@ -242,7 +242,7 @@ def simulate_many(
 
 def broadcast_arrays(
     rig: Slider | Machine, plan: Protocol, vary: Mapping[str, Any], initial: Mapping[str, Any]
-) -> tuple[dict[str, Any], dict[str, Any], Together]:
+) -> tuple[dict[str, Any], dict[str, Any], BroadcastArrays]:
     """Flat arrays of equal length by full name, the starting values apart, and how they go together."""
     known = dict.fromkeys([*rig.parameters(), *parameters(plan, "protocol.")])
     problems, named = [], {}

@@ -11,9 +11,9 @@ import numpy as np
 
 from steadyslip.core.areas import stress_name, totals
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
-from steadyslip.core.telling import shown
 from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -38,7 +38,7 @@ class History(HistoryData):  # noqa: D101 -- its base has it
     def message(self) -> str:
         """The status in a sentence, with what to do where the run ended early."""
         where = f" ({self.contact})" if self.contact else ""
-        head = f"{self.status}{where} at {shown(self.end, 's')}"
+        head = f"{self.status}{where} at {format_quantity(self.end, 's')}"
         area = None if isinstance(self.rig, Machine) else self.rig.area
         advice = remedy(self.status, isinstance(self.rig, Machine), area)
         return f"{head}: {advice}" if advice else head
@@ -59,8 +59,8 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         lines = [f"{self.message}", *(self._contacts() if isinstance(self.rig, Machine) else self._block())]
         until = self.protocol.until or np.inf
         begins = [(piece.name, float(getattr(piece, "at", 0.0))) for piece in self.protocol.pieces]
-        if late := [f"{name} at {shown(at, 's')}" for name, at in begins if at >= until]:
-            lines.append(f"left out        {', '.join(late)}: the run is to end at {shown(until, 's')}")
+        if late := [f"{name} at {format_quantity(at, 's')}" for name, at in begins if at >= until]:
+            lines.append(f"left out        {', '.join(late)}: the run is to end at {format_quantity(until, 's')}")
         lines += self._caveats()
         arrests = sum(event.kind == "arrest" for event in self.events)
         if arrests:
@@ -96,17 +96,25 @@ class History(HistoryData):  # noqa: D101 -- its base has it
             v, forces = self.data[f"{name}.slip_rate"], self.data[f"{name}.normal_force"]
             if not len(v):
                 continue
-            rates = f"{shown(lowest, 'm/s')} to {shown(highest, 'm/s')}, at the end {shown(v[-1], 'm/s')}"
-            low, high = shown(float(forces.min()), "N"), shown(float(forces.max()), "N")
+            rates = (
+                f"{format_quantity(lowest, 'm/s')} to {format_quantity(highest, 'm/s')}, at the end "
+                f"{format_quantity(v[-1], 'm/s')}"
+            )
+            low, high = format_quantity(float(forces.min()), "N"), format_quantity(float(forces.max()), "N")
             lines.append(f"{name:<15} slip rate {rates}; normal force {low} to {high}")
             slips = [one for one in self.slip_events if isinstance(one, ContactSlip) and one.contact == name]
             if slips:
                 last = slips[-1]
-                again = f", {shown(last.recurrence, 's')} after the one before" if np.isfinite(last.recurrence) else ""
+                again = (
+                    f", {format_quantity(last.recurrence, 's')} after the one before"
+                    if np.isfinite(last.recurrence)
+                    else ""
+                )
                 lines.append(
-                    f"{'':<15} {len(slips)} slip events; the last: peak {shown(last.peak_velocity, 'm/s')}, force drop "
-                    f"{shown(last.force_drop, 'N')}, slip {shown(last.slip, 'm')}, lasting "
-                    f"{shown(last.duration, 's')}{again}"
+                    f"{'':<15} {len(slips)} slip events; the last: peak "
+                    f"{format_quantity(last.peak_velocity, 'm/s')}, force drop "
+                    f"{format_quantity(last.force_drop, 'N')}, slip {format_quantity(last.slip, 'm')}, lasting "
+                    f"{format_quantity(last.duration, 's')}{again}"
                 )
         return lines
 
@@ -119,21 +127,22 @@ class History(HistoryData):  # noqa: D101 -- its base has it
         if len(v):
             lowest, highest = self.velocities
             lines.append(
-                f"velocity        {shown(lowest, 'm/s')} to {shown(highest, 'm/s')}, at the end {shown(v[-1], 'm/s')}"
+                f"velocity        {format_quantity(lowest, 'm/s')} to {format_quantity(highest, 'm/s')}, "
+                f"at the end {format_quantity(v[-1], 'm/s')}"
             )
             stress = [*self.data["normal_stress"], *(e.normal_stress for e in self.events if isinstance(e, Event))]
-            low, high = (shown(float(x), "Pa", area=area) for x in (min(stress), max(stress)))
+            low, high = (format_quantity(float(x), "Pa", area=area) for x in (min(stress), max(stress)))
             lines.append(f"{stress_name('normal stress', area):<16}{low} to {high}")
         slips = [one for one in self.slip_events if isinstance(one, SlipEvent)]
         if slips:
             last = slips[-1]
             lines.append(
-                f"slip events     {len(slips)}; the last: peak {shown(last.peak_velocity, 'm/s')}, "
-                f"{stress_name('stress drop', area)} {shown(last.stress_drop, 'Pa', area=area)}, "
-                f"slip {shown(last.slip, 'm')}, lasting {shown(last.duration, 's')}"
+                f"slip events     {len(slips)}; the last: peak {format_quantity(last.peak_velocity, 'm/s')}, "
+                f"{stress_name('stress drop', area)} {format_quantity(last.stress_drop, 'Pa', area=area)}, "
+                f"slip {format_quantity(last.slip, 'm')}, lasting {format_quantity(last.duration, 's')}"
             )
             if np.isfinite(last.recurrence):
-                lines.append(f"recurrence      {shown(last.recurrence, 's')} between the last two")
+                lines.append(f"recurrence      {format_quantity(last.recurrence, 's')} between the last two")
         return lines
 
     def __str__(self) -> str:

@@ -16,7 +16,7 @@ from steadyslip.core.options import NUMBERS, checked, finite
 from steadyslip.core.questions import question
 from steadyslip.kernels.layout import Final, Recorded, Sampled
 from steadyslip.kernels.runner import TALLY, Runner
-from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, OperatingPoint

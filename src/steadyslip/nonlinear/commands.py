@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, QuantityError
+from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.progress import progress_text
 from steadyslip.core.quantities import parse
-from steadyslip.core.telling import shown
 from steadyslip.files.output import FIGURES, write_by_ending, write_dataset
 from steadyslip.files.specifications import read_rig
 from steadyslip.files.standalone import write_page
@@ -50,7 +50,7 @@ def cycles_of_file(
     with progress_text("following cycles; Ctrl-C keeps what there is") as said:
 
         def progress(count: int, cycle: Cycle) -> None:
-            said(f"{count} cycles, period {shown(cycle.period, 's')}; Ctrl-C keeps what there is")
+            said(f"{count} cycles, period {format_quantity(cycle.period, 's')}; Ctrl-C keeps what there is")
 
         return cycles(rig, along, between=between, doublings=doublings, progress=progress)
 

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import FLAG, NAME, NUMBERS, checked
 from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.records import parameters
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown
 from steadyslip.files.output import write_text
 from steadyslip.linear.state_space import state_matrices
 from steadyslip.linear.stiffness import growth_rate
-from steadyslip.machine.doing import unit_of
+from steadyslip.machine.input_units import unit_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model import Model, build_model
@@ -119,13 +119,15 @@ class FrequencyResponse(ReadOnly):
         if not self.stable:
             lines.append("  steady sliding is UNSTABLE: this answer is never reached, any disturbance outgrows it")
         for i in _some(len(self.periods)):
-            lines.append(f"  {shown(self.periods[i], 's'):>12}  {self.gain[i]:.5g}{unit}  {self.phase[i]:.4g} deg")
+            lines.append(
+                f"  {format_quantity(self.periods[i], 's'):>12}  {self.gain[i]:.5g}{unit}  {self.phase[i]:.4g} deg"
+            )
         if (found := self.resonance) is not None:
-            lines.append(f"resonance  period {shown(found[0], 's')}, gain {found[1]:.5g}{unit}")
+            lines.append(f"resonance  period {format_quantity(found[0], 's')}, gain {found[1]:.5g}{unit}")
         for j, amplitude in enumerate(self.amplitudes):
-            lines.append(f"amplitude {shown(amplitude, self.units[0])}")
+            lines.append(f"amplitude {format_quantity(amplitude, self.units[0])}")
             for i in _some(len(self.periods)):
-                lines.append(f"  {shown(self.periods[i], 's'):>12}  {self._at(j, i)}")
+                lines.append(f"  {format_quantity(self.periods[i], 's'):>12}  {self._at(j, i)}")
         lines += self._limits()
         return "\n".join(lines)
 
@@ -134,7 +136,7 @@ class FrequencyResponse(ReadOnly):
             return str(self.status[j, i])
         return (
             f"{self.gains[j, i]:.5g}{_ratio(*self.units)}  {self.phases[j, i]:.4g} deg, mean shifted by "
-            f"{shown(self.shift[j, i], self.units[1])}, distortion {100 * self.distortion[j, i]:.3g} %"
+            f"{format_quantity(self.shift[j, i], self.units[1])}, distortion {100 * self.distortion[j, i]:.3g} %"
         )
 
     def _limits(self) -> list[str]:
@@ -143,8 +145,10 @@ class FrequencyResponse(ReadOnly):
         for words, found in limits:
             if np.any(np.isfinite(found)):
                 least = int(np.nanargmin(found))
-                place = shown(self.periods[least], "s")
-                lines.append(f"{words} an amplitude of {shown(found[least], self.units[0])}, at period {place}")
+                place = format_quantity(self.periods[least], "s")
+                lines.append(
+                    f"{words} an amplitude of {format_quantity(found[least], self.units[0])}, at period {place}"
+                )
             elif np.any(np.isinf(found)):
                 lines.append(f"{words} no amplitude below the steady value")
         return lines

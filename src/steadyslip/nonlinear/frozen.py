@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate
-from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.reducing import PORES
@@ -66,7 +66,7 @@ class FrozenVerdicts(ReadOnly):
     def __str__(self) -> str:
         lines = [f"at the start: {_verdict(self.growth_rate[0])}"]
         for time, verdict in self.crossings:
-            lines.append(f"from {shown(time, 's')} on: {verdict}, {self._at(time)}")
+            lines.append(f"from {format_quantity(time, 's')} on: {verdict}, {self._at(time)}")
         if not self.crossings:
             lines.append("the verdict is the same at every moment")
         begun = next((time for time, verdict in self.crossings if verdict == UNSTABLE), None)
@@ -74,7 +74,8 @@ class FrozenVerdicts(ReadOnly):
             begun = 0.0
         if begun is not None and np.isfinite(self.departure):
             lines.append(
-                f"motion departs at {shown(self.departure, 's')}, {shown(self.departure - begun, 's')} later: "
+                f"motion departs at {format_quantity(self.departure, 's')}, "
+                f"{format_quantity(self.departure - begun, 's')} later: "
                 f"small disturbances have grown by {self.e_folds:.3g} e-folds by then"
             )
         elif begun is not None:
@@ -84,7 +85,7 @@ class FrozenVerdicts(ReadOnly):
     def _at(self, time: float) -> str:
         known = self.rig.parameters()
         found = ((name, float(np.interp(time, self.t, own))) for name, own in self.values.items())
-        return ", ".join(f"{n} {shown(v, known[n].role.unit, area=self.rig.area_of(n))}" for n, v in found)
+        return ", ".join(f"{n} {format_quantity(v, known[n].role.unit, area=self.rig.area_of(n))}" for n, v in found)
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-ready dict, SI units; what does not exist is null."""

@@ -10,8 +10,8 @@ import numpy as np
 from steadyslip.core.arrays import check_together, checked_array
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, unknown_name
-from steadyslip.core.records import FrozenRecord, parameter, parameters, parts, twin
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
+from steadyslip.core.records import FrozenRecord, parameter, parameters, parts, with_values
 from steadyslip.protocol.creep import ROUNDING, spans_of
 from steadyslip.protocol.curves import Curve, Jump, Wave
 
@@ -147,7 +147,7 @@ class Protocol(FrozenRecord):
         if problems:
             raise ParameterError(problems)
         check_together(self, "protocol.", found)
-        return twin(self, found, "protocol.")
+        return with_values(self, found, "protocol.")
 
     def __add__(self, other: Piece | Protocol) -> Protocol:
         return _joined(self, other)
@@ -169,8 +169,9 @@ class Protocol(FrozenRecord):
             if start < last_end - ROUNDING * abs(last_end):
                 yield Problem(
                     f"pieces.{number}",
-                    f"{piece.name or type(piece).__name__} starts at {shown(start, 's')}, before {earlier} ends at "
-                    f"{shown(last_end, 's')}; give the pieces that set the velocity in the order of time, "
+                    f"{piece.name or type(piece).__name__} starts at {format_quantity(start, 's')}, before "
+                    f"{earlier} ends at "
+                    f"{format_quantity(last_end, 's')}; give the pieces that set the velocity in the order of time, "
                     "without overlap",
                 )
             earlier, last_end = f"piece {number} ({piece.name or type(piece).__name__})", max(end, last_end)

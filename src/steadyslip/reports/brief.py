@@ -16,9 +16,9 @@ import numpy as np
 
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.pictures import draw
 from steadyslip.core.records import FrozenRecord, parameters
-from steadyslip.core.telling import shown, shown_range
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn
 from steadyslip.machine.machine import Machine
@@ -147,7 +147,7 @@ def _record(record: FrozenRecord) -> Iterator[str]:
             values = np.asarray(one.value)
             area = record.area_of(path) if isinstance(record, Rig) else None
             words = (
-                shown(float(values), one.role.unit, 6, area)
+                format_quantity(float(values), one.role.unit, 6, area)
                 if values.ndim == 0
                 else _array(values, one.role.unit, area)
             )
@@ -208,7 +208,7 @@ def _cell(value: Any, unit: str, area: float | None) -> Any:
     if isinstance(value, int | np.integer) and unit == "1":
         return str(value)
     if isinstance(value, int | float | np.integer | np.floating):
-        return "" if math.isnan(value) else shown(float(value), unit, area=area)
+        return "" if math.isnan(value) else format_quantity(float(value), unit, area=area)
     if isinstance(value, complex):
         sign = "+" if value.imag >= 0 else "-"
         return f"{value.real:.4g} {sign} {abs(value.imag):.4g} i {'' if unit == '1' else unit}"
@@ -216,7 +216,7 @@ def _cell(value: Any, unit: str, area: float | None) -> Any:
         return _array(value, unit, area)
     if isinstance(value, Mapping):
         plain = {k: v for k, v in value.items() if isinstance(v, int | float)}
-        return Markup("<br>".join(f"{typed(k)}: {typed(shown(float(v), '1'))}" for k, v in plain.items()))
+        return Markup("<br>".join(f"{typed(k)}: {typed(format_quantity(float(v), '1'))}" for k, v in plain.items()))
     if isinstance(value, tuple | list) and value and not is_dataclass(value[0]):
         cells = [str(_cell(one, unit, area)) for one in value[:_ROWS]]
         return Markup("<br>".join(one if isinstance(one, Markup) else typed(one) for one in cells))
@@ -234,9 +234,9 @@ def _array(values: np.ndarray, unit: str, area: float | None) -> str:
     if not finite.size:
         return f"{values.size} values, none a number"
     if values.size <= _ARRAY:
-        return ", ".join(shown(float(one), unit, area=area) for one in values.ravel())
+        return ", ".join(format_quantity(float(one), unit, area=area) for one in values.ravel())
     shape = " × ".join(map(str, values.shape))
-    return f"{shape} values, {shown_range(float(finite.min()), float(finite.max()), unit, area)}"
+    return f"{shape} values, {format_range(float(finite.min()), float(finite.max()), unit, area)}"
 
 
 def _series(result: Any) -> Iterator[tuple[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from steadyslip import figures
-from steadyslip.core.telling import percent, shown
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments import Draws, Fit, LawComparison, Population, Prediction
 from steadyslip.experiments.fitting.words import warnings
 from steadyslip.figures.inline import drawn
@@ -53,8 +53,8 @@ def _drawn(result: Draws) -> list[str]:
     """Values, errors and intervals of draws beside those of the fit, and how they came about."""
     rows = []
     for one in result.fit.estimates:
-        low, high = (shown(end, one.unit, area=one.area) for end in result.interval(one.name))
-        error = shown(result.error(one.name), one.unit, 3, one.area)
+        low, high = (format_quantity(end, one.unit, area=one.area) for end in result.interval(one.name))
+        error = format_quantity(result.error(one.name), one.unit, 3, one.area)
         rows.append((one.name, one.shown(), error, f"{low} to {high}"))
     details = ", ".join(f"{name} {value:.4g}" for name, value in result.details.items())
     many = f"{len(result)} draws, {result.kind}{f' ({details})' if details else ''}."
@@ -96,7 +96,7 @@ def _comparison(result: LawComparison) -> Parts:
             len(one.names),
             f"{one.ssq:.4g}",
             *(f"{x:.6g}" for x in result.criteria[label]),
-            percent(result.weights[label]),
+            format_percent(result.weights[label]),
         )
         for label, one in result.fits.items()
     ]

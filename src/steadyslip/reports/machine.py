@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steadyslip import figures
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.figures.inline import drawn
 from steadyslip.figures.machine_verdict import left_out
 from steadyslip.reports import rig as of_rig
@@ -21,7 +21,7 @@ def about(analysis: MachineAnalysis, tolerated: Tolerated | None = None) -> Part
     """The document of a verdict on a machine."""
     machine = analysis.rig
     drive = machine.parameters()["drive.velocity"]
-    speed = shown(float(drive.value or 0.0), drive.role.unit)
+    speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
     body = [
         heading("The machine"), inside(machine),
         heading("The verdict"), *_verdict(analysis),
@@ -51,8 +51,8 @@ def _verdict(analysis: MachineAnalysis) -> Iterator[str]:
         return
     yield table(row for row in machine_facts(analysis) if row[0] != "steady sliding")  # which has a table of its own
     contacts = [
-        (name, shown(one.slip_rate, "m/s"), shown(one.normal_force, "N"), shown(one.friction_force, "N"),
-         f"{one.friction:.4g}")
+        (name, format_quantity(one.slip_rate, "m/s"), format_quantity(one.normal_force, "N"),
+         format_quantity(one.friction_force, "N"), f"{one.friction:.4g}")
         for name, one in analysis.steady.contacts.items()
     ]  # fmt: skip
     yield heading("Steady sliding", 3)
@@ -64,7 +64,11 @@ def _verdict(analysis: MachineAnalysis) -> Iterator[str]:
 def _eigenvalue(s: complex) -> tuple[str, str, str]:
     from math import log, pi
 
-    period = shown(2 * pi / s.imag, "s") if s.imag else "none"
+    period = format_quantity(2 * pi / s.imag, "s") if s.imag else "none"
     if s.real == 0:
         return "0 1/s", period, "stays"
-    return f"{s.real:.4g} 1/s", period, f"{'doubles' if s.real > 0 else 'halves'} in {shown(log(2) / abs(s.real), 's')}"
+    return (
+        f"{s.real:.4g} 1/s",
+        period,
+        f"{'doubles' if s.real > 0 else 'halves'} in {format_quantity(log(2) / abs(s.real), 's')}",
+    )

@@ -11,10 +11,10 @@ import numpy as np
 
 from steadyslip import figures
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_percent, format_quantity, format_range
 from steadyslip.core.pages import Displayed
 from steadyslip.core.records import key_of
 from steadyslip.core.roles import Parameter
-from steadyslip.core.telling import percent, shown, shown_range
 from steadyslip.experiments import Fit, predict
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn
@@ -79,7 +79,7 @@ def _threshold(result: Threshold) -> Parts:
 def _thresholds(result: Thresholds) -> Parts:
     rows = [str(one).split(": ", 1) for one in result.found]
     limits = [
-        f"a {one.kick} kick up to {shown(one.survived, one.unit, 4, one.area)}"
+        f"a {one.kick} kick up to {format_quantity(one.survived, one.unit, 4, one.area)}"
         for one in result.found
         if one.bracket[0] > 0 and not np.isinf(one.size)
     ]
@@ -118,7 +118,7 @@ def _basin(result: Basin) -> Parts:
 def _sensitivity(result: Sensitivity) -> Parts:
     known = result.rig.parameters()
     ranges = [
-        (name, shown_range(low, high, known[name].role.unit, result.rig.area_of(name)), spacing, known[name].role.doc)
+        (name, format_range(low, high, known[name].role.unit, result.rig.area_of(name)), spacing, known[name].role.doc)
         for name, (low, high, spacing) in result.ranges.items()
     ]
     body = [*about_rig(result.rig), heading("What varied"), table(ranges, ("parameter", "range", "spacing", "meaning"))]
@@ -194,10 +194,13 @@ def _history(result: History) -> Parts:
         *_slips(result),
     ]  # fmt: skip
     slips = len(result.slip_events)
-    head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {shown(result.end, 's')}"
+    head = f"{slips or 'No'} slip event{'' if slips == 1 else 's'} in {format_quantity(result.end, 's')}"
     if result.undisturbed:
         head = "Undisturbed: steady sliding goes on, which does not tell whether it is stable"
-    question = f"What does this rig do in {shown(result.protocol.until or result.end, 's')} under the protocol below?"
+    question = (
+        f"What does this rig do in {format_quantity(result.protocol.until or result.end, 's')} "
+        "under the protocol below?"
+    )
     return Parts(head, sentence(result.message), question, body, rig, text)
 
 
@@ -219,7 +222,7 @@ def done_to(rig: Slider | Machine, protocol: Protocol) -> Iterator[str]:
                 continue
             if isinstance(role, Parameter) and isinstance(value, float | int):
                 unit = {"m/s": "rad/s", "m": "rad"}.get(role.unit, role.unit) if turns else role.unit
-                told.append(f"{key_of(item)} {shown(value, unit, area=area)}")
+                told.append(f"{key_of(item)} {format_quantity(value, unit, area=area)}")
             else:
                 told.append(f"{key_of(item)} {value if isinstance(value, str) else f'{np.size(value)} numbers'}")
         rows.append((piece.name.replace("-", " "), ", ".join(told)))
@@ -233,9 +236,10 @@ def _slips(result: History) -> Iterator[str]:
     yield heading("Slip events", 3)
     area = result.rig.area if isinstance(result.rig, Slider) else None
     rows = [
-        (one.contact if isinstance(one, ContactSlip) else i, shown(one.begin, "s"), shown(one.duration, "s"),
-         shown(one.slip, "m"), shown(one.peak_velocity, "m/s"),
-         shown(one.force_drop, "N") if isinstance(one, ContactSlip) else shown(one.stress_drop, "Pa", area=area))
+        (one.contact if isinstance(one, ContactSlip) else i, format_quantity(one.begin, "s"),
+         format_quantity(one.duration, "s"), format_quantity(one.slip, "m"), format_quantity(one.peak_velocity, "m/s"),
+         format_quantity(one.force_drop, "N") if isinstance(one, ContactSlip)
+         else format_quantity(one.stress_drop, "Pa", area=area))
         for i, one in enumerate(slips, start=1)
     ]  # fmt: skip
     drop = "force drop" if isinstance(slips[0], ContactSlip) else "stress drop"
@@ -251,14 +255,16 @@ def _branch(result: CycleBranch) -> Parts:
     drop = "stress drop" if isinstance(result.rig, Slider) else "force drop"
     first, _, rest = str(result).partition("\n")
     rows = [
-        (shown(one.value, unit, area=area), shown(one.period, "s"), shown(one.peak_velocity, "m/s"),
-         shown(one.stress_drop, stress, area=area if stress == "Pa" else None),
+        (format_quantity(one.value, unit, area=area), format_quantity(one.period, "s"),
+         format_quantity(one.peak_velocity, "m/s"),
+         format_quantity(one.stress_drop, stress, area=area if stress == "Pa" else None),
          "attracts" if one.stable else "unstable")
         for one in result.cycles
     ]  # fmt: skip
     listed = _told_apart(rows)
     special = [
-        (one.kind, shown(one.cycle.value, unit, area=area), shown(one.cycle.period, "s")) for one in result.special
+        (one.kind, format_quantity(one.cycle.value, unit, area=area), format_quantity(one.cycle.period, "s"))
+        for one in result.special
     ]
     body = [
         *about_rig(result.rig),
@@ -304,7 +310,9 @@ def _verdicts(result: MapResult) -> str:
     if "status" not in result.results:
         return ""
     shares = sorted(result.statistics()["status"].items(), key=lambda one: -one[1])
-    return sentence(", ".join(f"{word} at {percent(share)}" for word, share in shares) + " of the points").rstrip(".")
+    return sentence(
+        ", ".join(f"{word} at {format_percent(share)}" for word, share in shares) + " of the points"
+    ).rstrip(".")
 
 
 def _pictures(result: MapResult) -> Iterator[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from steadyslip import figures
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NotAvailable, ParameterError
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.experiments import Prediction
 from steadyslip.explorer.sketch import sketch
 from steadyslip.figures.inline import drawn
@@ -35,7 +35,7 @@ SMALL = (
 def about(analysis: Analysis, prediction: Prediction | None = None, tolerated: Tolerated | None = None) -> Parts:
     """The document of a verdict; with the friction of a fit, or tolerances, how sure that is."""
     rig = analysis.rig
-    speed = shown(rig.drive.velocity, "m/s")
+    speed = format_quantity(rig.drive.velocity, "m/s")
     body = [
         heading("The rig"), figure(sketch(rig)), inputs(rig),
         heading("The verdict"), table(facts(analysis)), *(paragraph(text) for text in meaning(analysis)),
@@ -69,7 +69,7 @@ def inputs(rig: Slider) -> str:
             (
                 name,
                 known,
-                shown(one.value, one.role.unit, 6, rig.area_of(name)),
+                format_quantity(one.value, one.role.unit, 6, rig.area_of(name)),
                 stress_name(one.role.doc, rig.area_of(name)),
             )
         )

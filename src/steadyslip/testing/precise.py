@@ -13,7 +13,7 @@ import mpmath
 import sympy as sp
 
 from steadyslip.core.errors import SteadyslipError
-from steadyslip.core.records import FrozenRecord, parameters, twin
+from steadyslip.core.records import FrozenRecord, parameters, with_values
 
 DIGITS = 50
 #: Allowed error relative to the terms that cancel: far above rounding at fifty digits and above constants
@@ -45,7 +45,7 @@ def in_symbols(law: FrozenRecord) -> tuple[Any, dict[sp.Symbol, float]]:
         positive = low == 0 and not address.role.domain.low_allowed
         symbol = sp.Dummy(name.replace(".", "_"), real=True, positive=positive or None, nonnegative=low == 0 or None)
         values[name], numbers[symbol] = symbol, address.value
-    return twin(law, values), numbers
+    return with_values(law, values), numbers
 
 
 def stated(law: FrozenRecord, what: str, method: Callable[..., Any], *arguments: Any) -> Any:

@@ -13,9 +13,9 @@ import numpy as np
 
 from steadyslip.core.areas import stress_name
 from steadyslip.core.errors import NoSteadySliding, NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.pictures import draw
-from steadyslip.core.telling import shown
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, present_zeros
 from steadyslip.linear.status import decided_by_rounding, on_edge
@@ -204,11 +204,12 @@ def _warnings(
     if on_the_edge:
         found.append("the rig is on the edge of stability to within rounding; neither verdict should be relied on")
     if len(states) > 1:
-        stresses = ", ".join(shown(s.normal_stress, "Pa", area=rig.area) for s in states)
+        stresses = ", ".join(format_quantity(s.normal_stress, "Pa", area=rig.area) for s in states)
         found.append(
             f"steady sliding is possible at {len(states)} values of {stress_name('normal stress', rig.area)} "
             f"({stresses}); "
-            f"this verdict is for the one at {shown(states[values.branch].normal_stress, 'Pa', area=rig.area)}"
+            "this verdict is for the one at "
+            f"{format_quantity(states[values.branch].normal_stress, 'Pa', area=rig.area)}"
         )
     if not rig.friction.memory() and rig.friction.lateness() == 0:
         found.append(

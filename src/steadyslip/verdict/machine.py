@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from steadyslip.core.errors import NoSteadySliding, ParameterError
+from steadyslip.core.format import format_quantity
 from steadyslip.core.pictures import draw
-from steadyslip.core.telling import shown
 from steadyslip.linear import formula as linear_formula
 from steadyslip.linear.boundary import Margin, margins, oscillatory_edge
 from steadyslip.linear.modes import Mode, mode_of
@@ -179,7 +179,7 @@ def _nearest(found: MachineAnalysis, margin: Margin) -> str:
     if edge is None:
         return ""
     side = "above" if edge.value > margin.value else "below"
-    value = shown(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
+    value = format_quantity(edge.value, margin.unit, area=found.rig.area_of(margin.parameter))
     what = PHRASES["stable"] if edge.stable == side else beyond(edge)
     return PHRASES["nearest"].format(name=margin.parameter, side=side, value=value, beyond=what)
 
@@ -188,8 +188,9 @@ def _sliding(steady: SteadyMachine | None) -> str:
     if steady is None:
         return ""
     return "; ".join(
-        f"{name} slides at {shown(one.slip_rate, 'm/s')}, normal force {shown(one.normal_force, 'N')}, friction force "
-        f"{shown(one.friction_force, 'N')}, friction {one.friction:.4g}"
+        f"{name} slides at {format_quantity(one.slip_rate, 'm/s')}, normal force "
+        f"{format_quantity(one.normal_force, 'N')}, friction force "
+        f"{format_quantity(one.friction_force, 'N')}, friction {one.friction:.4g}"
         for name, one in steady.contacts.items()
     )
 

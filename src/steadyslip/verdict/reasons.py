@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.verdict.causes import ILL_POSED, why_all, why_ill_posed, why_none
 from steadyslip.verdict.holding import gain_words, holding
 
@@ -73,9 +73,9 @@ def page_reasons(rig: Slider) -> dict[str, str]:
 def _many(ratio: float) -> str:
     """A ratio, with as many digits as tell it from one."""
     apart = np.floor(np.log10(abs(ratio - 1) or 1.0))
-    return shown(ratio, "1", int(np.clip(1 - apart, 3, 8)))
+    return format_quantity(ratio, "1", int(np.clip(1 - apart, 3, 8)))
 
 
 def in_stiffness(analysis: Findings, value: float) -> str:
     """A stiffness (Pa/m), or that of the whole area where the rig has one, as in its file."""
-    return shown(value, "Pa/m", area=analysis.rig.area)
+    return format_quantity(value, "Pa/m", area=analysis.rig.area)

@@ -11,6 +11,7 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.format import format_percent, format_range
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
@@ -18,7 +19,6 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.records import Address
 from steadyslip.core.results import ReadOnly
 from steadyslip.core.roles import Parameter
-from steadyslip.core.telling import percent, shown_range
 from steadyslip.linear.boundary import present_zeros
 from steadyslip.linear.stable_values import edge_along, name_along, safety_factor
 from steadyslip.linear.status import ABSENT, STABLE, UNKNOWN, status
@@ -100,9 +100,9 @@ class Tolerated(ReadOnly):
         count, share = len(self.stable), self.share
         whole = {1.0: f"Stable in all {count} rigs", 0.0: f"Stable in none of {count} rigs"}
         wide = max(26, 2 + max(len(one.parameter) for one in self.alone))
-        lines = [f"{whole.get(share, f'Stable in {percent(share)} of {count} rigs')} within the tolerances"]
+        lines = [f"{whole.get(share, f'Stable in {format_percent(share)} of {count} rigs')} within the tolerances"]
         if not np.all(self.exists):
-            lines.append(f"{'no steady sliding':<{wide}}in {percent(1 - float(np.mean(self.exists)))} of them")
+            lines.append(f"{'no steady sliding':<{wide}}in {format_percent(1 - float(np.mean(self.exists)))} of them")
         own = self.along == STIFFNESS and isinstance(self.rig, Slider)
         edge, over = (
             ("critical stiffness", "stiffness over critical") if own else (f"edge in {self.along}", "over its edge")
@@ -112,14 +112,14 @@ class Tolerated(ReadOnly):
             told.append(("growth rate", self.growth, "1/s"))
         for words, values, unit in told:
             if (known := _ends(values)) is not None:
-                lines.append(f"{words:<{wide}}{shown_range(*known, unit, self.area)}")
+                lines.append(f"{words:<{wide}}{format_range(*known, unit, self.area)}")
         for one in self.alone:
             if not np.isnan(one.safety[0]):
                 beside = f", {one.safety[0]:.4g} to {one.safety[1]:.4g} times {'critical' if own else 'its edge'}"
             else:
-                beside = f", growth rate {shown_range(*one.growth, '1/s')}" if not self.along else ""
+                beside = f", growth rate {format_range(*one.growth, '1/s')}" if not self.along else ""
             word = {True: "stable", False: "unstable", None: "stable in a part of it"}[one.stable]
-            ends = shown_range(one.low, one.high, one.unit, one.area)
+            ends = format_range(one.low, one.high, one.unit, one.area)
             lines.append(f"{one.parameter:<{wide}}{ends} alone: {word}{beside}")
         return "\n".join(lines)
 

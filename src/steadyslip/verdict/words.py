@@ -7,7 +7,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from steadyslip.core.errors import InternalError
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.machine.slider import Slider
 from steadyslip.verdict.checks import UNDECIDED, in_words
 from steadyslip.verdict.holding import gain_words, holding
@@ -101,7 +101,7 @@ HEADLINES = {
 def headline(analysis: Verdict, capitals: bool = True) -> str:
     """The first line: stable, unstable, on the edge, or no steady sliding."""
     drive = analysis.rig.parameters()["drive.velocity"]
-    speed = shown(float(drive.value or 0.0), drive.role.unit)
+    speed = format_quantity(float(drive.value or 0.0), drive.role.unit)
     if analysis.stable is None:
         kind = "undecided" if is_undecided(analysis) else "none"
     else:
@@ -117,7 +117,11 @@ def is_undecided(analysis: Verdict) -> bool:
 
 def _stress(analysis: Findings, value: float) -> str:
     area = analysis.rig.area
-    return shown(value, "Pa") if area is None else f"{shown(value * area, 'N')} ({shown(value, 'Pa')})"
+    return (
+        format_quantity(value, "Pa")
+        if area is None
+        else f"{format_quantity(value * area, 'N')} ({format_quantity(value, 'Pa')})"
+    )
 
 
 def facts(analysis: Findings) -> list[tuple[str, str]]:
@@ -137,7 +141,7 @@ def facts(analysis: Findings) -> list[tuple[str, str]]:
     ]
     beta = analysis.critical_angular_frequency
     if beta:
-        rows.append(("at the edge", f"oscillation with period {shown(2 * math.pi / beta, 's')}"))
+        rows.append(("at the edge", f"oscillation with period {format_quantity(2 * math.pi / beta, 's')}"))
     if analysis.critical_axial_stiffness is not None:
         rows.append(
             ("along the axis", f"critical stiffness {in_stiffness(analysis, analysis.critical_axial_stiffness)}")
@@ -193,10 +197,10 @@ def survived(kick: Threshold) -> str:
     edge = ", the edge of the sliding that it leads to" if kick.edge else ""
     where = f" at {kick.contact}" if kick.contact else ""
     after = f"{kick.outcome}{reason}" if kick.outcome == "undecided" else f"more leads to {kick.outcome}{where}"
-    amount = shown(kick.amount, kick.unit, area=kick.area)
+    amount = format_quantity(kick.amount, kick.unit, area=kick.area)
     if kick.decided:
         return f"survives {what} {amount}{edge}; {after}"
-    survived = shown(kick.survived, kick.unit, area=kick.area)
+    survived = format_quantity(kick.survived, kick.unit, area=kick.area)
     return f"survives {what} {survived}; {why} from there to {amount}{edge}{reason}; {after}"
 
 
@@ -209,14 +213,14 @@ def disturbance(analysis: Verdict) -> str:
     if analysis.on_edge:
         text = "neither grows nor dies, to within rounding"
     elif analysis.time_to_double is not None:
-        text = f"doubles in {shown(analysis.time_to_double, 's')}"
+        text = f"doubles in {format_quantity(analysis.time_to_double, 's')}"
     elif analysis.time_to_halve is not None:
-        text = f"halves in {shown(analysis.time_to_halve, 's')}"
+        text = f"halves in {format_quantity(analysis.time_to_halve, 's')}"
     else:  # a root that is lost beside the others, though its sign is not
         return f"{'dies away' if analysis.stable else 'grows'} too slowly for a rate to be told from rounding"
     leading = analysis.eigenvalues[0]
     if leading.imag != 0 and analysis.period is not None and analysis.damping_ratio is not None:
-        text += f", oscillating with period {shown(analysis.period, 's')}"
+        text += f", oscillating with period {format_quantity(analysis.period, 's')}"
         return text if analysis.on_edge else f"{text} (damping ratio {analysis.damping_ratio:.3g})"
     return text if analysis.on_edge else f"{text} without oscillating"
 
@@ -301,8 +305,8 @@ def _margin_row(analysis: Verdict, margin: Margin) -> tuple[str, str, str, str, 
         words = beyond(edge)
     return (
         margin.parameter,
-        shown(margin.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
-        shown(edge.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
+        format_quantity(margin.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
+        format_quantity(edge.value, margin.unit, area=analysis.rig.area_of(margin.parameter)),
         change,
         words,
     )

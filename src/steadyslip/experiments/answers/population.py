@@ -14,11 +14,11 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown, shown_range
 from steadyslip.experiments.answers.inference import inference_data
 from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit
@@ -122,7 +122,9 @@ class Population(ReadOnly):
         lines += ["", f"priors          of means flat; of spreads half-normal, {self.scale:g} e-folds or natural sizes"]
         if self.conditions:
             middles = {name: float(np.mean(x)) for name, x in self.conditions.items()}
-            means = ", ".join(f"{n} {shown(x, 'Pa') if n == STRESS else f'{x:.4g}'}" for n, x in middles.items())
+            means = ", ".join(
+                f"{n} {format_quantity(x, 'Pa') if n == STRESS else f'{x:.4g}'}" for n, x in middles.items()
+            )
             lines.append(f"means           at {means}")
         return "\n".join(lines)
 
@@ -188,19 +190,22 @@ def _spread_words(found: tuple[float, float, float], one: Unknown) -> str:
     middle, low, high = found
     if one.logarithmic:
         return f"{100 * middle:.2g} % ({100 * low:.2g} to {100 * high:.2g} %)"
-    return f"{shown(middle, one.unit)} ({shown_range(low, high, one.unit)})"
+    return f"{format_quantity(middle, one.unit)} ({format_range(low, high, one.unit)})"
 
 
 def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str, values: Array) -> str:
     """How much the mean changes from the least to the largest of the conditions."""
     ends = (float(np.min(values)), float(np.max(values)))
-    whole = " to ".join(shown(x, "Pa") if condition == STRESS else f"{x:.4g}" for x in ends)
+    whole = " to ".join(format_quantity(x, "Pa") if condition == STRESS else f"{x:.4g}" for x in ends)
     middle, low, high = (x * (ends[1] - ends[0]) for x in found)
     if one.logarithmic:  # of the mean itself, not its logarithm
         middle, low, high = (100 * np.expm1(x) for x in (middle, low, high))
         change = f"{middle:+.3g} % ({low:+.3g} to {high:+.3g} %)"
     else:
-        change = f"{shown(middle, one.unit)} ({shown(low, one.unit)} to {shown(high, one.unit)})"
+        change = (
+            f"{format_quantity(middle, one.unit)} ({format_quantity(low, one.unit)} to "
+            f"{format_quantity(high, one.unit)})"
+        )
     return f"from {condition} {whole} the mean changes by {change}"
 
 
@@ -282,7 +287,7 @@ def _references(fits: Mapping[str, Fit]) -> list[Problem]:
     for name in next(iter(rigs.values())).of_kind("reference rate"):
         rates = {label: rig.value(name) for label, rig in rigs.items() if name.startswith("friction.")}
         if len(set(rates.values())) > 1:
-            each = ", ".join(f"{label} {shown(rate or 0.0, 'm/s')}" for label, rate in rates.items())
+            each = ", ".join(f"{label} {format_quantity(rate or 0.0, 'm/s')}" for label, rate in rates.items())
             found.append(Problem(name, f"differs between the fits ({each}); give all rigs the same"))
     return found
 

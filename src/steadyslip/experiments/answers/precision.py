@@ -10,11 +10,11 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem, UnknownNameError
+from steadyslip.core.format import format_quantity
 from steadyslip.core.names import resolve
 from steadyslip.core.options import NAMES, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown
 from steadyslip.experiments.fitting.identify import Combination, combinations
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.measured.read import record_from_arrays
@@ -66,7 +66,7 @@ class Precision(ReadOnly):
         wide = max(map(len, self.errors))
         for name, error in self.errors.items():
             if np.isfinite(error):
-                size = shown(error, self.units[name], 2, self.area)
+                size = format_quantity(error, self.units[name], 2, self.area)
                 lines.append(f"  {name:<{wide}}  ± {size} ({100 * self.relative[name]:.2g} %)")
             else:
                 lines.append(f"  {name:<{wide}}  not determined")
@@ -168,7 +168,7 @@ class Ranking:
         lines = [f"{self.parameter}, the best experiment first"]
         for label, one in self.found.items():
             error = one.errors[self.parameter]
-            size = shown(error, one.units[self.parameter], 2, one.area)
+            size = format_quantity(error, one.units[self.parameter], 2, one.area)
             text = f"± {size}" if np.isfinite(error) else "not determined"
             lines.append(f"  {label:<{wide}}  {text}")
         return "\n".join(lines)

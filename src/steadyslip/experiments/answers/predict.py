@@ -11,10 +11,10 @@ import numpy as np
 from steadyslip.core.areas import outside
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.core.options import checked, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import percent, shown
 from steadyslip.experiments.answers.uncertainty import Draws, normal_draws
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.linear.stable_values import safety_factor
@@ -104,7 +104,7 @@ class Prediction(ReadOnly):
         for kick, sizes in self.thresholds.items():
             lines.append(f"{kick + ' kick':<24}" + _kick_range(kick, sizes))
             if doubt := self.undecided[kick]:
-                lines.append(f"{'':<24}undecided in {percent(doubt)} of the draws")
+                lines.append(f"{'':<24}undecided in {format_percent(doubt)} of the draws")
         if self.left_out:
             lines.append(f"stopped                 before the kicks were done: {', '.join(self.left_out)}")
         if self.shares:
@@ -294,11 +294,11 @@ def probability_text(share: float, count: int) -> str:
         return f"more than {100 * (1 - 3 / count):.4g} %"
     if share <= 0:
         return f"less than {300 / count:.2g} %"
-    return percent(share)
+    return format_percent(share)
 
 
 def _range(quantiles: tuple[float, ...], unit: str, area: float | None) -> str:
-    low, _, middle, _, high = (shown(q, unit, area=area) for q in quantiles)
+    low, _, middle, _, high = (format_quantity(q, unit, area=area) for q in quantiles)
     return f"{middle}   95 %: {low} to {high}"
 
 

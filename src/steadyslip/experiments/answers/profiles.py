@@ -9,10 +9,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from steadyslip.core.arrays import Array
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import NAME, THREADS, checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown
 from steadyslip.experiments.fitting.condensed import condensed
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
@@ -91,7 +91,7 @@ class Profile(ReadOnly):
     def _shown(self, rise: Array) -> str:
         ends = self._ends(rise, LEVEL)
         return " to ".join(
-            "beyond the profile" if not np.isfinite(x) else shown(x, self.unit, area=self.area) for x in ends
+            "beyond the profile" if not np.isfinite(x) else format_quantity(x, self.unit, area=self.area) for x in ends
         )
 
     def plot(self, ax: Any = None) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.experiments.fitting.inputs import LEAST_RATE
 from steadyslip.experiments.fitting.plan import Plan
 from steadyslip.experiments.loading.loading import Loading, resting_rate
@@ -45,7 +45,10 @@ def check_records(plan: Plan) -> None:
                                     "false, or drive = 'commanded' and a record of steps and ramps"))  # fmt: skip
         rate = record.initial_rate or 0.0
         if plan.protocol is not None and rate > 0 and abs(np.log(rate / given)) > LEAST_RATE:
-            message = f"got {shown(given, 'm/s')}, but {record.source} begins at {shown(rate, 'm/s')}; make them agree"
+            message = (
+                f"got {format_quantity(given, 'm/s')}, but {record.source} begins at "
+                f"{format_quantity(rate, 'm/s')}; make them agree"
+            )
             problems.append(Problem("drive.velocity", message))
         if plan.protocol is not None and not drives and record.displacement is not None:
             problems.append(Problem("protocol", "does not move the load point, but the record does; leave it "

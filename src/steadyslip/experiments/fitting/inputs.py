@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import InternalError
-from steadyslip.core.records import parameters, twin
+from steadyslip.core.records import parameters, with_values
 from steadyslip.experiments.fitting.commanded import STRAIGHT
 from steadyslip.experiments.fitting.forward import InputTable
 from steadyslip.experiments.loading.pressing import LEAST_STRESS
@@ -274,7 +274,7 @@ class ProtocolInputs:
 
     def _packed(self, times: Array) -> Segments:
         values = {name: times[:, i] for i, name in enumerate(self.free)}
-        return pack(twin(self.protocol, self.plain | values, "protocol."), self.velocity, float(self.time[-1]))
+        return pack(with_values(self.protocol, self.plain | values, "protocol."), self.velocity, float(self.time[-1]))
 
     def _table(
         self, segments: Segments, moved: Sequence[tuple[int, Segments, Segments]], directions: int, jobs: int

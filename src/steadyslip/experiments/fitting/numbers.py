@@ -11,11 +11,11 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem, UnknownNameError
+from steadyslip.core.format import format_quantity, format_range, format_with_error
 from steadyslip.core.names import resolve
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.results import ReadOnly, read_only
-from steadyslip.core.telling import shown, shown_error, shown_range
 from steadyslip.experiments.fitting.comparison import Comparison
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.plan import Plan
@@ -64,14 +64,14 @@ class Estimate(Displayed):
                 f"{self.value:.7g} ± {self.error:.2g} s" if self.determined else f"{self.value:.7g} s (not determined)"
             )
         if not self.determined:
-            return f"{shown(self.value, self.unit, area=self.area)} (not determined)"
-        return shown_error(self.value, self.error, self.unit, self.area)
+            return f"{format_quantity(self.value, self.unit, area=self.area)} (not determined)"
+        return format_with_error(self.value, self.error, self.unit, self.area)
 
     def range(self) -> str:
         """The 95 % interval for people."""
         if self.unit == "s":
             return f"{self.low:.7g} to {self.high:.7g} s"
-        return shown_range(self.low, self.high, self.unit, self.area)
+        return format_range(self.low, self.high, self.unit, self.area)
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,11 @@ class FitNumbers(ReadOnly):
             for bound, word in ((low[i], "smallest"), (high[i], "largest")):
                 if np.isfinite(bound) and abs(self.coordinates[i] - bound) < 1e-9 * (1 + abs(bound)):
                     value = float(one.value(bound))
-                    end = f"{value:.7g} s" if one.unit == "s" else shown(value, one.unit, area=self.plan.rig.area)
+                    end = (
+                        f"{value:.7g} s"
+                        if one.unit == "s"
+                        else format_quantity(value, one.unit, area=self.plan.rig.area)
+                    )
                     text = f"{one.name} ended at the {word} value that was searched, {end}"
                     found.append(text + self._beyond_window(one, "earlier" if bound == low[i] else "later"))
         return tuple(found)

@@ -16,7 +16,7 @@ from steadyslip.experiments.fitting.checks import check_changes, check_records
 from steadyslip.experiments.fitting.plan import Plan, with_loading
 from steadyslip.experiments.fitting.settings import faults
 from steadyslip.experiments.measured.record import Record
-from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.slider import Slider
 from steadyslip.motion.targets import targets
 from steadyslip.protocol import Protocol

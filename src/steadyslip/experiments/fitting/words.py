@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.areas import total
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.core.version import of_another
 from steadyslip.experiments.fitting.numbers import FitNumbers
 from steadyslip.experiments.fitting.refit import Ramped, may_be_ramp
@@ -208,7 +208,7 @@ def _untold_ramps(fit: FitNumbers) -> list[str]:
         untold = [change for channel, _, change in loading.changes if may_be_ramp(channel, change)]
         if untold:
             times = _listed([f"{change.time:.7g}" for change in untold])
-            longest = shown(max(change.longest for change in untold), "s")
+            longest = format_quantity(max(change.longest for change in untold), "s")
             what, taken, ramps = ("changes", "are taken as steps", "ramps") if len(untold) > 1 else (
                 "change", "is taken as a step", "a ramp")  # fmt: skip
             found.append(
@@ -236,7 +236,9 @@ def _of_ramps(fit: FitNumbers, tried: tuple[Ramped, ...]) -> str:
 
 
 def _lengths(fit: FitNumbers, ramped: Ramped) -> str:
-    own = [shown(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values]
+    own = [
+        format_quantity(x, "s") for name, x in ramped.values.items() if ".duration" in name and name not in fit.values
+    ]
     return _listed(own)
 
 
@@ -305,7 +307,7 @@ def _noisy_drive(fit: FitNumbers, part: Any) -> str | None:
     if moved < 0.3 * fit.rms:
         return None
     return (
-        f"{record.source}: the load point is measured to {shown(noise, 'm')} only, which moves the model by "
+        f"{record.source}: the load point is measured to {format_quantity(noise, 'm')} only, which moves the model by "
         f"{moved:.2g} "
         "in friction; that makes the stiffness come out too low; leave drive at 'commanded'"
     )

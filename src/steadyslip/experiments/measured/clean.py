@@ -6,7 +6,7 @@ import numpy as np
 
 from steadyslip.core.arrays import Array
 from steadyslip.core.errors import ParameterError, Problem
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.experiments.measured.record import FEWEST_ROWS, Record, frozen
 
 GAP = 10.0  # times the usual spacing
@@ -86,7 +86,8 @@ def cleaned(si: dict[str, Array], source: str, notes: list[str], lines: Array, a
         if np.any(back):
             most = float(-np.min(np.diff(si["displacement"])))
             notes.append(
-                f"the load point steps back {int(back.sum())} times, by up to {shown(most, 'm')}; kept as measured"
+                f"the load point steps back {int(back.sum())} times, by up to "
+                f"{format_quantity(most, 'm')}; kept as measured"
             )
         if "velocity" in si:
             notes.append("the load point's displacement drives the model; its velocity column is only shown")

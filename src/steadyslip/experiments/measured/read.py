@@ -12,9 +12,9 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked
 from steadyslip.core.roles import Parameter
-from steadyslip.core.telling import shown
 from steadyslip.experiments.measured.clean import cleaned, without_stand_ins
 from steadyslip.experiments.measured.columns import ROLES, Column, assigned, required
 from steadyslip.experiments.measured.formats import read_columns
@@ -102,7 +102,7 @@ def read_record(
     if normal_stress is not None:
         level = _checked("normal_stress", "Pa", normal_stress)
         si["normal"] = np.full(raw.values.shape[1], level)
-        notes.append(f"normal: constant, {shown(level, 'Pa')}")
+        notes.append(f"normal: constant, {format_quantity(level, 'Pa')}")
     if clock is not None:
         si["time"], how = clock(si, raw.values.shape[1])
         notes.append(how)
@@ -116,10 +116,10 @@ def _clock(sampling: Any, rate: Any, roles: set[str]) -> Callable[[dict[str, Arr
     """How to make the times of a file that has none, and what to say of it; None if that cannot be."""
     if sampling is not None:
         every = _checked("sampling", "s", sampling)
-        return lambda si, rows: (every * np.arange(rows), f"time: counted, a row every {shown(every, 's')}")
+        return lambda si, rows: (every * np.arange(rows), f"time: counted, a row every {format_quantity(every, 's')}")
     if rate is not None and "displacement" in roles:
         speed = _checked("rate", "m/s", rate)
-        said = f"time: displacement over the given rate, {shown(speed, 'm/s')}"
+        said = f"time: displacement over the given rate, {format_quantity(speed, 'm/s')}"
         return lambda si, rows: ((si["displacement"] - si["displacement"][0]) / speed, said)
     if {"displacement", "velocity"} <= roles:
         return lambda si, rows: (_elapsed(si["displacement"], si["velocity"]), "time: displacement over its own rate")

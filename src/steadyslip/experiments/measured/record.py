@@ -13,12 +13,12 @@ import numpy as np
 from steadyslip.core.arrays import Array
 from steadyslip.core.domains import real
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.questions import Keeper, question
 from steadyslip.core.results import read_only
 from steadyslip.core.roles import Parameter
-from steadyslip.core.telling import shown
 from steadyslip.experiments.loading.kinks import load_course
 from steadyslip.experiments.loading.loading import Loading
 from steadyslip.experiments.loading.pressing import oscillation, stress_course
@@ -199,16 +199,22 @@ class Record(Displayed, Keeper):
         spacing = np.diff(self.time)
         low, high = float(np.min(self.friction)), float(np.max(self.friction))
         lines = [
-            f"{self.source}: {len(self)} samples over {shown(float(span), 's')}, "
-            f"one every {shown(float(np.median(spacing)), 's')}",
+            f"{self.source}: {len(self)} samples over {format_quantity(float(span), 's')}, "
+            f"one every {format_quantity(float(np.median(spacing)), 's')}",
             f"friction        {low:.4g} to {high:.4g}",
         ]
         if self.normal is not None:
             stress = self.normal
-            lines.append(f"normal stress   {shown(float(stress.min()), 'Pa')} to {shown(float(stress.max()), 'Pa')}")
+            lines.append(
+                f"normal stress   {format_quantity(float(stress.min()), 'Pa')} to "
+                f"{format_quantity(float(stress.max()), 'Pa')}"
+            )
         if self.displacement is not None:
             moved = float(self.displacement[-1] - self.displacement[0])
-            lines.append(f"load point      {shown(moved, 'm')}, at first {shown(self.initial_rate or 0.0, 'm/s')}")
+            lines.append(
+                f"load point      {format_quantity(moved, 'm')}, at first "
+                f"{format_quantity(self.initial_rate or 0.0, 'm/s')}"
+            )
         lines += [f"step            {step}" for step in self.steps] or ["step            none found"]
         lines += [f"note            {note}" for note in self.notes]
         return "\n".join(lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.experiments.loading.loading import Change, Loading
 from steadyslip.experiments.loading.pressing import StressWave
 
@@ -38,11 +38,12 @@ class LoadStep:
     def __str__(self) -> str:
         if self.kind == "normal-stress oscillation":
             return (
-                f"{self.kind} from {self.time:.6g} s: {shown(self.before, 'Pa')} ± {shown(self.after, 'Pa')}, "
-                f"period {shown(self.duration, 's')}"
+                f"{self.kind} from {self.time:.6g} s: {format_quantity(self.before, 'Pa')} ± "
+                f"{format_quantity(self.after, 'Pa')}, "
+                f"period {format_quantity(self.duration, 's')}"
             )
-        lasting = f", in {shown(self.duration, 's')}" if self.duration else ""
-        values = f"{shown(self.before, self.unit)} to {shown(self.after, self.unit)}"
+        lasting = f", in {format_quantity(self.duration, 's')}" if self.duration else ""
+        values = f"{format_quantity(self.before, self.unit)} to {format_quantity(self.after, self.unit)}"
         return f"{self.kind} at {self.time:.6g} s: {values}{lasting}"
 
 

@@ -1,4 +1,4 @@
-// Text such as "9 GPa/m" to SI numbers and back: the counterpart of core/quantities.py and core/telling.py for a page.
+// Text such as "9 GPa/m" to SI numbers and back: the counterpart of core/quantities.py and core/format.py for a page.
 
 /** @type {Record<string, [number, number[]]>} factor, and exponents of kilogram, metre, second and radian */
 const TABLE = {

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from scipy.stats import chi2
 
 from steadyslip.core.errors import NotAvailable
-from steadyslip.core.telling import percent, shown
+from steadyslip.core.format import format_percent, format_quantity
 from steadyslip.experiments.answers.predict import probability_text
 from steadyslip.figures.experiments.panels import brief, grid
 from steadyslip.figures.style import (
@@ -101,7 +101,7 @@ def comparison(result: LawComparison, ax: Axes | None = None) -> Axes:
 
 def _weight(share: float) -> str:
     """A share that is never rounded to nothing or to certainty."""
-    return "< 0.1 %" if share < 0.001 else "> 99.9 %" if share > 0.999 else percent(round(share, 3))
+    return "< 0.1 %" if share < 0.001 else "> 99.9 %" if share > 0.999 else format_percent(round(share, 3))
 
 
 def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
@@ -130,7 +130,7 @@ def ranking(result: Ranking, ax: Axes | None = None) -> Axes:
     if np.max(errors[known]) > 20 * np.min(errors[known]):
         ax.set_xscale("log")
     for y, error in zip(place, errors, strict=True):
-        text = shown(float(error), si, 2, first.area) if np.isfinite(error) else "not determined"
+        text = format_quantity(float(error), si, 2, first.area) if np.isfinite(error) else "not determined"
         ax.annotate(text, (1.0, y), (4, 0), ("axes fraction", "data"), "offset points", va="center", fontsize="small")
     ax.set_yticks(place, labels)
     ax.set_ylim(-0.6, len(labels) - 0.4)
@@ -162,11 +162,16 @@ def prediction(result: Prediction, ax: Axes | None = None) -> Axes:
         ax.axvline(own / factor, color=VERMILION, linewidth=1.5, label="this rig")
     else:  # a scale that reaches it would leave nothing to see of the distribution
         side = "beyond" if own > high else "below"
-        ax.plot([], [], color=VERMILION, label=f"this rig: {shown(own, 'Pa/m', 3, result.rig.area)}, {side} this axis")
+        ax.plot(
+            [],
+            [],
+            color=VERMILION,
+            label=f"this rig: {format_quantity(own, 'Pa/m', 3, result.rig.area)}, {side} this axis",
+        )
     middle = result.quantiles(result.critical_stiffness)[2]
     ax.axvline(middle / factor, color=BLACK, linewidth=1, linestyle="--", label="median")
     if missing := np.mean(~np.isfinite(result.critical_stiffness)):
-        ax.plot([], [], " ", label=f"{percent(missing)} of the draws have none")
+        ax.plot([], [], " ", label=f"{format_percent(missing)} of the draws have none")
     ax.set_xlabel(labelled("stiffness", unit))
     ax.set_ylabel("draws (1)")
     probability = probability_text(result.probability_stable, len(result.stable))
@@ -215,7 +220,7 @@ def kicks(result: Prediction, ax: Any = None) -> np.ndarray:
             "unstable": np.mean(sizes == 0),
             "undecided, or no steady sliding": np.mean(np.isnan(sizes)),
         }
-        words = [f"{name} {percent(float(share))}" for name, share in shares.items() if share]
+        words = [f"{name} {format_percent(float(share))}" for name, share in shares.items() if share]
         if len(words) == 1:
             words = [f"{words[0].rpartition(' 100')[0]}: all {len(sizes)} draws"]
         panel.set_title("\n".join(textwrap.wrap(", ".join(words), 48)), fontsize="small")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, came
+from steadyslip.core.errors import ParameterError, Problem, UnknownNameError, repr_short
 from steadyslip.core.names import resolve
 from steadyslip.core.records import FrozenRecord, Named, Part, key_of
 from steadyslip.files.specifications.layout import (
@@ -30,7 +30,7 @@ def apply(text: str, tables: Table, lines: dict[str, int], section: Section | No
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
-        return [Problem(came(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
+        return [Problem(repr_short(text), "is not a change; write NAME=VALUE, such as contact.angle='10 deg'")]
     full, problems = full_name(name, tables)
     if problems:  # written into the tables it would be a fault of theirs, too
         return problems
@@ -102,7 +102,7 @@ def named_value(text: str) -> tuple[str, Any]:
     """
     name, equals, raw = split(text)
     if not equals or not name or not raw:
-        raise ParameterError([Problem(came(text), "is none; write NAME=VALUE, such as contact.angle='10 deg'")])
+        raise ParameterError([Problem(repr_short(text), "is none; write NAME=VALUE, such as contact.angle='10 deg'")])
     return name, value_of(raw, name)
 
 
@@ -119,7 +119,9 @@ def value_of(raw: str, name: str) -> Any:
     except NotToml:
         return raw
     if len(tables) > 1:
-        raise ParameterError([Problem(name, f"got {came(raw)}; allowed: one value; repeat the option for others")])
+        raise ParameterError(
+            [Problem(name, f"got {repr_short(raw)}; allowed: one value; repeat the option for others")]
+        )
     return tables["value"]
 
 

@@ -14,7 +14,7 @@ from steadyslip.core.errors import (
     ParameterError,
     Problem,
     RigFileError,
-    came,
+    repr_short,
     unknown_name,
 )
 from steadyslip.core.options import checked
@@ -327,7 +327,7 @@ class _SpecificationReader(TableReader):
         if not isinstance(table, dict):
             wanted = f"[{section.name}] {section.hint}" if section.hint else f"a table [{section.name}]"
             if table is not None:
-                self.problem(section.name, f"got {came(table)}; allowed: {wanted}")
+                self.problem(section.name, f"got {repr_short(table)}; allowed: {wanted}")
             elif section.required:
                 self.problem(section.name, f"missing table; write {wanted}")
             return None
@@ -340,7 +340,7 @@ class _SpecificationReader(TableReader):
         table = self.tables.get(name, {})
         if isinstance(table, dict):
             return table
-        self.problem(name, f"got {came(table)}; allowed: a table [{name}]")
+        self.problem(name, f"got {repr_short(table)}; allowed: a table [{name}]")
         return {}
 
     def _read_area(self, own: Table) -> None:

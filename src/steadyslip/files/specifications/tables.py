@@ -10,14 +10,14 @@ from typing import Any
 
 from steadyslip.core.areas import is_per_area, total_unit
 from steadyslip.core.domains import positive
-from steadyslip.core.errors import ParameterError, Problem, came, legible, unknown_name
+from steadyslip.core.errors import ParameterError, Problem, legible, repr_short, unknown_name
 from steadyslip.core.members import Members
 from steadyslip.core.names import unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector, ways
 from steadyslip.files.specifications.toml import Table
-from steadyslip.machine.doing import TURNING, turns_on
+from steadyslip.machine.input_units import TURNING, turns_on
 from steadyslip.machine.machine import Machine
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
 
@@ -101,7 +101,7 @@ class TableReader:
     def members(self, role: Part, raw: Any, name: str) -> Members | None:
         """Tables by names that the user gives."""
         if not isinstance(raw, dict):
-            self.problem(name, f"got {came(raw)}; allowed: a table for each, [{name}.NAME]")
+            self.problem(name, f"got {repr_short(raw)}; allowed: a table for each, [{name}.NAME]")
             return None
         before, found = len(self.problems), {}
         for key, member in raw.items():
@@ -109,7 +109,8 @@ class TableReader:
                 self.problem(f"{name}.{legible(key)}", wrong)
             elif not isinstance(member, dict):
                 message = (
-                    f"got {came(member)}; allowed: a table [{name}.{key}]; what stands in [{name}] is a table for each"
+                    f"got {repr_short(member)}; allowed: a table [{name}.{key}];"
+                    f" what stands in [{name}] is a table for each"
                 )
                 self.problem(f"{name}.{key}", message)
             elif (one := self.record(role.family, member, f"{name}.{key}.")) is not None:
@@ -223,19 +224,19 @@ class TableReader:
             return self.members(role, raw, name)
         if role.many:
             if not isinstance(raw, list) or not all(isinstance(member, dict) for member in raw):
-                self.problem(name, f"got {came(raw)}; allowed: a list of tables, [[{name}]]")
+                self.problem(name, f"got {repr_short(raw)}; allowed: a list of tables, [[{name}]]")
                 return None
             members = [self.record(role.family, member, f"{name}.{i}.") for i, member in enumerate(raw, start=1)]
             return None if None in members else tuple(members)
         table = _from_short(role.family, raw)
         if table is None:
-            self.problem(name, f"got {came(raw)}; allowed: {_wanted(role.family, name)}")
+            self.problem(name, f"got {repr_short(raw)}; allowed: {_wanted(role.family, name)}")
             return None
         return self.record(role.family, table, f"{name}.")
 
     def _named(self, role: Named, raw: Any, name: str) -> dict[str, Any] | None:
         if not isinstance(raw, dict):
-            self.problem(name, f"got {came(raw)}; allowed: parameters and their values")
+            self.problem(name, f"got {repr_short(raw)}; allowed: parameters and their values")
             return None
         keys = [key_of(item) for item, _ in own_fields(role.family)]
         found: dict[str, Any] = {}
@@ -252,7 +253,7 @@ class TableReader:
             else:
                 listed = "a list of values, or " if role.listed else ""
                 self.problem(
-                    f"{name}.{inner}", f"got {came(value)}; allowed: {listed}{{{' = ..., '.join(keys)} = ...}}"
+                    f"{name}.{inner}", f"got {repr_short(value)}; allowed: {listed}{{{' = ..., '.join(keys)} = ...}}"
                 )
         return found
 

@@ -21,7 +21,7 @@ from steadyslip.files.specifications.layout import (
     sections,
     selector,
 )
-from steadyslip.machine.doing import in_units_of
+from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.protocol import Protocol

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from steadyslip.core.areas import is_per_area, total_unit
 from steadyslip.core.dimensions import unit
 from steadyslip.core.errors import ParameterError, QuantityError
-from steadyslip.core.records import Address, twin
+from steadyslip.core.records import Address, with_values
 from steadyslip.files.specifications.read import rig_from_text
 from steadyslip.files.specifications.write import rig_to_text
 from steadyslip.machine.machine import Machine
@@ -239,7 +239,7 @@ def _left_out(rig: Slider | Machine, names: Sequence[str]) -> dict[str, tuple[st
         return found
     header = ""
     counts: dict[str, int] = {}
-    for line in rig_to_text(twin(rig, marks)).splitlines():
+    for line in rig_to_text(with_values(rig, marks)).splitlines():
         if heading := _HEADER.match(line):
             header, counts = _numbered(heading, counts)
             continue

@@ -11,10 +11,10 @@ import numpy as np
 
 from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem, unknown_name
+from steadyslip.core.format import format_percent, format_quantity, format_range
 from steadyslip.core.options import checked
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.telling import percent, shown, shown_range
 from steadyslip.core.version import of_another
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -205,11 +205,11 @@ class MapResult(Displayed):
         width = max([24, *(len(name) + 2 for name in statistics)])
         for name, found in statistics.items():
             if self.words(name):
-                text = ", ".join(f"{word} {percent(share)}" for word, share in found.items())
+                text = ", ".join(f"{word} {format_percent(share)}" for word, share in found.items())
             elif "low" in found:
                 low, high, unit, area = found["low"], found["high"], self.unit(name), self.area(name)
-                text = shown_range(low, high, unit, area) if low < high else shown(low, unit, area=area)
-                text += "" if found["share"] == 1 else f", for {percent(found['share'])} of the points"
+                text = format_range(low, high, unit, area) if low < high else format_quantity(low, unit, area=area)
+                text += "" if found["share"] == 1 else f", for {format_percent(found['share'])} of the points"
             else:
                 text = "nowhere"
             if name in LINEAR and "status" not in self.results and found.get("share", 1) < 1:

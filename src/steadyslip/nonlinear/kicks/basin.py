@@ -208,7 +208,7 @@ def _plane_of(rig: Slider | Machine, rest: Rest, at: str | None) -> _Plane:
     if isinstance(rig, Slider):
         drive = rig.drive.velocity
         heights = drive * np.geomspace(1e-4, 1e4, POINTS)
-        return _Plane(("x", "v"), ("m", "m/s"), float(rest.way[0]), heights, drive)
+        return _Plane(("x", "v"), ("m", "m/s"), float(rest.natural_slip[0]), heights, drive)
     model, scales = rest.reduction.model, natural_scales(rest.point, rest.reduction)[0]
     touch = list(rig.contacts)[rest.contact]
     body = at or rig.contacts[touch].held

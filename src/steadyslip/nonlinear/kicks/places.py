@@ -58,7 +58,8 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
     if not rest.is_machine:
         drive = np.abs(np.asarray(point.drive, dtype=float))
         found = {
-            "velocity": ("m/s", drive), "displacement": ("m", rest.way), "normal-stress": ("Pa", point.stresses),
+            "velocity": ("m/s", drive), "displacement": ("m", rest.natural_slip),
+            "normal-stress": ("Pa", point.stresses),
             "impulse": ("Pa s", np.asarray(point.named().get("slider.mass", 0.0)) * drive),
         }  # fmt: skip
         return *found[kick], drive
@@ -70,7 +71,7 @@ def size_units(jobs: Jobs, rest: Rest, kick: str, at: str) -> tuple[str, Array, 
         unit = model.roles["drive.velocity"].unit
         if kick == "velocity":
             return unit, np.abs(np.asarray(point.drive, dtype=float)), none
-        return unit.removesuffix("/s"), rest.way, none
+        return unit.removesuffix("/s"), rest.natural_slip, none
     body = next(one for one in model.coordinates if one.name == at)
     scales, _ = natural_scales(point, jobs.reduction)
     turns = body.unit == "rad"

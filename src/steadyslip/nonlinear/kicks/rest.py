@@ -85,7 +85,7 @@ class Rest:
         return np.asarray(faster[:, None] * in_columns([own[name] for name in names], len(self.velocity)))
 
     @property
-    def way(self) -> Array:
+    def natural_slip(self) -> Array:
         """Natural length of a step of the load point, (m,)."""
         shifts = np.abs(in_columns(self.point.evaluate(_shifts(self.reduction)), len(self.velocity)))
         with np.errstate(divide="ignore"):
@@ -94,7 +94,7 @@ class Rest:
     @property
     def time(self) -> Array:
         """Natural time, s, (m,)."""
-        return np.asarray(self.way / np.abs(self.velocity))
+        return np.asarray(self.natural_slip / np.abs(self.velocity))
 
     @property
     def contact(self) -> int:

@@ -10,9 +10,9 @@ import numpy as np
 
 from steadyslip.core.areas import total
 from steadyslip.core.errors import NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import BRANCH, NAME, SIGN, checked, finite
 from steadyslip.core.pages import Displayed
-from steadyslip.core.telling import shown
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.model.range import beyond_range
@@ -121,7 +121,7 @@ class Threshold(Displayed):
             return f"{what}: all that were tried are survived up to size {low:.4g}; {beyond}"
         edge = ", the edge of stability of the steady sliding that it leads to" if self.edge else ""
         after = self.outcome + where if self.outcome != "undecided" else f"undecided ({self.doubt})"
-        amount = shown(self.amount, self.unit, 7, self.area)
+        amount = format_quantity(self.amount, self.unit, 7, self.area)
         if self.decided:
             return (
                 f"{what}: survives up to {amount} (size {self.size:.7g}, bracket {low:.9g} to {high:.9g}){edge}; "
@@ -129,7 +129,7 @@ class Threshold(Displayed):
             )
         why = "stopped when it was between" if self.interrupted else f"undecided ({self.doubt}) between"
         return (
-            f"{what}: survives up to {shown(self.survived, self.unit, 7, self.area)} (size {low:.7g}); "
+            f"{what}: survives up to {format_quantity(self.survived, self.unit, 7, self.area)} (size {low:.7g}); "
             f"{why} that and size {high:.7g}{edge}; beyond: {after}"
         )
 

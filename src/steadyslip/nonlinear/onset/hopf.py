@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from steadyslip.core.errors import NotAvailable
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import BRANCH, NAME, checked
 from steadyslip.core.pages import Displayed
-from steadyslip.core.telling import shown
 from steadyslip.linear.boundary import boundary
 from steadyslip.linear.linear_sets import linear_sets
 from steadyslip.linear.polynomials import stable_set
@@ -143,11 +143,11 @@ class Onset(Displayed):
         return MEANINGS[self.kind]
 
     def __str__(self) -> str:
-        edge = shown(self.value, self.unit, 6, self.rig.area_of(self.along))
+        edge = format_quantity(self.value, self.unit, 6, self.rig.area_of(self.along))
         lines = [f"{self.title} at {self.along} = {edge}", f"  {self.meaning}"]
         where = f" at {self.contact}" if self.contact else ""
         size = f"{self.normalised:.4g}{self._within()} of the frequency per squared amplitude of ln v{where}"
-        lines.append(f"  cubic coefficient {size}, period {shown(2 * np.pi / self.angular_frequency, 's')}")
+        lines.append(f"  cubic coefficient {size}, period {format_quantity(2 * np.pi / self.angular_frequency, 's')}")
         return "\n".join(lines)
 
     def _within(self) -> str:

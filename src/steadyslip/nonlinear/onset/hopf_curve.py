@@ -14,11 +14,11 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import InternalError, NotAvailable, ParameterError, Problem
+from steadyslip.core.format import format_quantity, format_range
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
-from steadyslip.core.telling import shown, shown_range
 from steadyslip.linear.boundary import boundary, present_zeros
 from steadyslip.linear.roots import roots
 from steadyslip.linear.search import Search
@@ -101,11 +101,11 @@ class HopfCurve(ReadOnly):
         lines = [f"oscillatory edge in {a} and {b}: {len(self.first)} points"]
         for name, unit, column in zip(self.names, self.units, (self.first, self.second), strict=True):
             lines.append(
-                f"  {name}  {shown_range(float(column.min()), float(column.max()), unit, self.rig.area_of(name))}"
+                f"  {name}  {format_range(float(column.min()), float(column.max()), unit, self.rig.area_of(name))}"
             )
         for point in self.special:
             where = ", ".join(
-                f"{n} = {shown(point.values[n], u, 7, self.rig.area_of(n))}"
+                f"{n} = {format_quantity(point.values[n], u, 7, self.rig.area_of(n))}"
                 for n, u in zip(self.names, self.units, strict=True)
             )
             lines.append(f"  {point.kind} at {where}")

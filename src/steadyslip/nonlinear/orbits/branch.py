@@ -13,9 +13,9 @@ import numpy as np
 
 from steadyslip.core.areas import outside, stress_name, total, totals
 from steadyslip.core.errors import unknown_name
+from steadyslip.core.format import format_quantity
 from steadyslip.core.pages import Displayed
 from steadyslip.core.pictures import draw
-from steadyslip.core.telling import shown
 from steadyslip.files.output import write_columns
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -251,7 +251,7 @@ class CycleBranch(Displayed):
 
     def __str__(self) -> str:
         area = self._area("value")
-        edge = shown(self.onset.value, self.unit, 6, area)
+        edge = format_quantity(self.onset.value, self.unit, 6, area)
         drops, drop_unit = ("stress_drop", "Pa") if isinstance(self.rig, Slider) else ("force_drop", "N")
         lines = [f"cycles along {self.along} from the {self.onset.title} at {edge}: {len(self.cycles)} cycles"]
         if self.cycles:
@@ -259,18 +259,21 @@ class CycleBranch(Displayed):
             period, drop = self["period"], self[drops]
             where = f" at {self.cycles[0].contact}" if self.cycles[0].contact else ""
             lines += [
-                f"  velocity     {shown(float(v[1].min()), 'm/s')} to {shown(float(v[0].max()), 'm/s')}{where}",
-                f"  period       {shown(float(period.min()), 's')} to {shown(float(period.max()), 's')}",
-                f"  {self._drop:<13}up to {shown(float(drop.max()), drop_unit, area=self._area(drops))}",
+                f"  velocity     {format_quantity(float(v[1].min()), 'm/s')} to "
+                f"{format_quantity(float(v[0].max()), 'm/s')}{where}",
+                f"  period       {format_quantity(float(period.min()), 's')} to "
+                f"{format_quantity(float(period.max()), 's')}",
+                f"  {self._drop:<13}up to {format_quantity(float(drop.max()), drop_unit, area=self._area(drops))}",
                 f"  stable       {_stable(self)}",
             ]
         for point in self.special:
             lines.append(
-                f"  {point.kind} at {shown(point.cycle.value, self.unit, 7, area)} "
-                f"(period {shown(point.cycle.period, 's')}, peak {shown(point.cycle.peak_velocity, 'm/s')})"
+                f"  {point.kind} at {format_quantity(point.cycle.value, self.unit, 7, area)} "
+                f"(period {format_quantity(point.cycle.period, 's')}, peak "
+                f"{format_quantity(point.cycle.peak_velocity, 'm/s')})"
             )
         for (_, stop), (begin, _), why in zip(self.bounds, self.bounds[1:], self.broken, strict=False):
-            before, after = (shown(end.value, self.unit, area=area) for end in (stop, begin))
+            before, after = (format_quantity(end.value, self.unit, area=area) for end in (stop, begin))
             how = "from the period doubling at" if begin.kind == "period doubling" else "found by simulation, from"
             lines += [f"  gap: at {before} {why};", f"    another sheet, {how} {after} on"]
         lines.append(f"  ends: {self.end}")
@@ -292,7 +295,8 @@ def _stable(branch: CycleBranch) -> str:
         return "all"
     area = branch.rig.area_of(branch.along)
     return "; ".join(
-        f"{shown(one.range[0], branch.unit, area=area)} to {shown(one.range[1], branch.unit, area=area)}"
+        f"{format_quantity(one.range[0], branch.unit, area=area)} to "
+        f"{format_quantity(one.range[1], branch.unit, area=area)}"
         + (" (an end is not located)" if any(end.kind == "not located" for end in one.ends) else "")
         for one in branch.stretches if one.stable
     ) or "none"  # fmt: skip

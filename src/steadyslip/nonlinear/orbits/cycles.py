@@ -10,8 +10,8 @@ import numpy as np
 
 from steadyslip.core.arrays import checked_array
 from steadyslip.core.errors import ParameterError, Problem
+from steadyslip.core.format import format_quantity
 from steadyslip.core.options import BRANCH, LOW_AND_HIGH, NAME, checked, finite, whole
-from steadyslip.core.telling import shown
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
 from steadyslip.nonlinear.continuation import Failure
@@ -194,6 +194,6 @@ def _limits(rig: Slider | Machine, onset: Onset, between: Sequence[Any] | None) 
     if not low < high:
         raise ParameterError([Problem("between", f"got {between!r}; allowed: low < high")])
     if not low <= onset.value <= high:
-        edge = shown(onset.value, onset.unit, 6, rig.area_of(onset.along))
+        edge = format_quantity(onset.value, onset.unit, 6, rig.area_of(onset.along))
         raise ParameterError([Problem("between", f"got {between!r}; it must contain the edge, {edge}")])
     return low, high

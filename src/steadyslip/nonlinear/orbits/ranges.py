@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.nonlinear.orbits.cycle import OPEN, Cycle, End, SpecialCycle
 from steadyslip.nonlinear.orbits.special import NOISE, SMALL
 
@@ -80,7 +80,7 @@ class Neighbour:
         """What is there, of which cycles, and where."""
         name = WORDS.get(self.kind, self.kind)
         of = "" if self.multiple == 1 else f" of the cycles of {self.multiple} times the period"
-        return f"the {name}{of} at {shown(self.value, unit, 6, area)}"
+        return f"the {name}{of} at {format_quantity(self.value, unit, 6, area)}"
 
 
 WORDS = {

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from steadyslip.core.errors import InternalError, NotAvailable
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.linear.boundary import boundary
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
@@ -463,7 +463,7 @@ class Tracer:
         low, high = self.limits
         cycle = now.cycle
         if not low < cycle.value < high:
-            end = shown(
+            end = format_quantity(
                 low if cycle.value <= low else high, self.onset.unit, area=self.onset.rig.area_of(self.onset.along)
             )
             return f"end of the range, {end}", True

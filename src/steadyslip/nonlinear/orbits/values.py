@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.nonlinear.continuation import Failure
 from steadyslip.nonlinear.onset.hopf import Onset
 from steadyslip.nonlinear.orbits.cycle import Cycle
@@ -98,7 +98,8 @@ class CyclesAt(tuple[Cycle, ...]):
 
     def __str__(self) -> str:
         lines = [
-            f"{'stable' if one.stable else 'unstable'} cycle of period {shown(one.period, 's')}; {one.checked}"
+            f"{'stable' if one.stable else 'unstable'} cycle of period {format_quantity(one.period, 's')}; "
+            f"{one.checked}"
             for one in self
         ]
         return "\n".join([*lines, *map(str, self.simulated), *filter(None, [self._window])]) or "no cycle"
@@ -129,7 +130,7 @@ def _start(tracer: Tracer, value: float, cycle: Cycle | None) -> tuple[Array, st
     if cycle is None:
         return tracer.flow.ahead(value, AHEAD), "beside steady sliding"
     orbit, vector = orbit_of(cycle), tracer.deviation(cycle, cycle.multipliers[0])[0]
-    return orbit.states[0] + ASIDE * vector, f"beside the unstable cycle of period {shown(cycle.period, 's')}"
+    return orbit.states[0] + ASIDE * vector, f"beside the unstable cycle of period {format_quantity(cycle.period, 's')}"
 
 
 def _at_value(tracer: Tracer, low: Cycle, high: Cycle, value: float) -> Cycle | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.core.telling import shown
+from steadyslip.core.format import format_quantity
 from steadyslip.kernels.layout import Recorded
 from steadyslip.kernels.runner import LOG_KINDS
 from steadyslip.nonlinear.continuation import Failure
@@ -79,12 +79,12 @@ def motion_from(
             for back in _candidates(runs, seen):
                 found = _solved(runs, value, seen, int(back))
                 if found is not None and (found.stable or not attracts):
-                    return Simulated(found, f"comes to a cycle of period {shown(found.period, 's')}")
+                    return Simulated(found, f"comes to a cycle of period {format_quantity(found.period, 's')}")
     except FlowFailure as failure:
         return Simulated(None, f"ends: {failure}")
     if not returns:
         return Simulated(None, "does not come back to the velocity at which cycles begin")
-    between = f"velocity between {shown(low, 'm/s')} and {shown(high, 'm/s')}"
+    between = f"velocity between {format_quantity(low, 'm/s')} and {format_quantity(high, 'm/s')}"
     return Simulated(None, f"does not repeat itself in {returns} returns, compared over up to {RETURNS - 1}: {between}")
 
 

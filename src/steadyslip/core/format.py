@@ -17,14 +17,16 @@ _own: ContextVar[Mapping[Dimension, tuple[str, ...]]] = ContextVar("own units", 
 
 
 @contextmanager
-def told_in(names: Iterable[str]) -> Iterator[None]:
+def display_units(names: Iterable[str]) -> Iterator[None]:
     """Tell people quantities in units of their own, such as rpm, bar, mm^2 or N/um; of several the one that reads best.
 
     Units with a prefix in front alone, such as kN or um/s, are no reason: they are told as reads best in any case.
 
-    >>> with told_in(["rpm", "kN", "MPa", "bar", "N/um"]):
-    ...     shown(10.0, "rad/s"), shown(2e4, "N"), shown(2e5, "Pa"), shown(2e7, "Pa"), shown(12e6, "N/m")
-    ('95.49 rpm', '20 kN', '2 bar', '20 MPa', '12 N/um')
+    >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
+    ...     format_quantity(10.0, "rad/s"), format_quantity(2e4, "N"), format_quantity(2e5, "Pa")
+    ...     format_quantity(2e7, "Pa"), format_quantity(12e6, "N/m")
+    ('95.49 rpm', '20 kN', '2 bar')
+    ('20 MPa', '12 N/um')
     """
     found: dict[Dimension, set[str]] = {}
     for name in names:
@@ -60,14 +62,14 @@ def _few(value: float, digits: int) -> str:
     return f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < 1e5 else text
 
 
-def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
+def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
     """A value for people: prefixed unit, a few digits, angles in degrees, leads in turns, totals if there is an `area`.
 
-    >>> shown(8.72093e9, "Pa/m"), shown(-0.7853981633974483, "rad"), shown(0.0145, "1")
+    >>> format_quantity(8.72093e9, "Pa/m"), format_quantity(-0.7853981633974483, "rad"), format_quantity(0.0145, "1")
     ('8.721 GPa/m', '-45 deg', '0.0145')
-    >>> shown(0.01 / 6.283185307179586, "m/rad")
+    >>> format_quantity(0.01 / 6.283185307179586, "m/rad")
     '10 mm/rev'
-    >>> shown(8.72093e9, "Pa/m", area=0.01)
+    >>> format_quantity(8.72093e9, "Pa/m", area=0.01)
     '87.21 MN/m'
     """
     factor, si_unit = outside(si_unit, area)
@@ -99,47 +101,47 @@ def shown(value: float, si_unit: str, digits: int = 4, area: float | None = None
     return f"{_few(value / factor, digits)} {prefix}{si_unit}"
 
 
-def shown_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
+def format_with_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
     """A value and its error for people, both in the unit in which the value reads best.
 
-    >>> shown_error(1.009e-5, 8.7e-7, "m"), shown_error(0.00696, 0.00043, "1")
+    >>> format_with_error(1.009e-5, 8.7e-7, "m"), format_with_error(0.00696, 0.00043, "1")
     ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
     """
     scale, si_unit = outside(si_unit, area)
     value, error = value * scale, error * scale
-    number, _, name = shown(value, si_unit).partition(" ")
+    number, _, name = format_quantity(value, si_unit).partition(" ")
     factor = value / float(number) if float(number) else 1.0
     return f"{number} ± {error / factor:.2g} {name}".rstrip()
 
 
-def shown_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:
+def format_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:
     """Two values for people, in the unit in which the second reads best.
 
-    >>> shown_range(8.52e-6, 1.195e-5, "m")
+    >>> format_range(8.52e-6, 1.195e-5, "m")
     '8.52 to 11.95 um'
     """
     factor, si_unit = outside(si_unit, area)
     low, high = low * factor, high * factor
-    number, _, name = shown(high, si_unit).partition(" ")
+    number, _, name = format_quantity(high, si_unit).partition(" ")
     if not (math.isfinite(low) and math.isfinite(high)) or not float(number):
-        return f"{shown(low, si_unit)} to {shown(high, si_unit)}"
+        return f"{format_quantity(low, si_unit)} to {format_quantity(high, si_unit)}"
     return f"{_few(low * float(number) / high, 4)} to {number} {name}".rstrip()
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     """A share in percent with three digits, or as many as it takes to tell it from 0 and 100.
 
-    >>> percent(0.123456), percent(0.99981), percent(1.0)
+    >>> format_percent(0.123456), format_percent(0.99981), format_percent(1.0)
     ('12.3 %', '99.981 %', '100 %')
     """
     text = f"{100 * share:.3g}"
     return f"{100 * share:.8g} %" if 0 < share < 1 and float(text) in (0, 100) else f"{text} %"
 
 
-def printed(text: str) -> str:
+def typeset(text: str) -> str:
     """Words with units as they are set in print: µm, m², kg/m³.
 
-    >>> printed("9.2 us, 3 um/s, 2 uN m at 5 m^2: ours")
+    >>> typeset("9.2 us, 3 um/s, 2 uN m at 5 m^2: ours")
     '9.2 µs, 3 µm/s, 2 µN m at 5 m²: ours'
     """
     text = text.replace("^2", "²").replace("^3", "³")

@@ -362,8 +362,8 @@ def open_map(path, sound, forged):
 
 
 def open_cache(path, sound, forged):
-    found = build._Kept(path).read()
-    if found is not None and found != build._Kept(sound).read():
+    found = build._CachedFile(path).read()
+    if found is not None and found != build._CachedFile(sound).read():
         raise Wrong("opened with other content")
 
 

@@ -130,7 +130,7 @@ def test_parameters_are_lifted_out():
 
     a, b, x = sp.symbols("a b x", real=True)
     constants = Constants([x])
-    formulas = Formulas([constants.lifted(sp.tan(a) * b * x + sp.log(a) + x**3)], {x: "y0"})
+    formulas = Formulas([constants.with_constants(sp.tan(a) * b * x + sp.log(a) + x**3)], {x: "y0"})
     assert len(constants.symbols) == 2
     values = constants.function([a, b])(0.3, 2.0)
     known = {s.name: v for s, v in zip(constants.symbols.values(), values, strict=True)} | {"y0": 1.7}
@@ -192,7 +192,7 @@ def test_an_event_that_is_a_condition_is_refused(monkeypatch):
     monkeypatch.setattr(record, "EVENTS", (Watched("fast", lambda at: at > 1.0, rises="fast"),))
     for at in (as_node(2.0), 2.0):
         with pytest.raises(TypeError, match=r"'fast'.* condition.* number that changes sign"):
-            record.Evaluator.marks(None, [at])
+            record.Evaluator.event_values(None, [at])
 
 
 def test_a_plain_program_is_readable():

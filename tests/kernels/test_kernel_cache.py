@@ -31,8 +31,8 @@ def test_cache_is_written_and_read(folder, monkeypatch):
     assert len(files) == 1
     before = [file.stat().st_mtime_ns for file in files]
     calls = []
-    real = build._Kept.write
-    monkeypatch.setattr(build._Kept, "write", lambda *a: calls.append(a) or real(*a))
+    real = build._CachedFile.write
+    monkeypatch.setattr(build._CachedFile, "write", lambda *a: calls.append(a) or real(*a))
     assert ask(3) == 3
     assert not calls, "compiled again although it was cached"
     assert [file.stat().st_mtime_ns for file in files] == before
@@ -91,17 +91,17 @@ def test_a_file_of_another_function_is_not_opened(folder, monkeypatch):
     assert ask(22) == 22
     (second,) = set(folder.iterdir()) - {first}
     second.write_bytes(first.read_bytes())
-    assert build._Kept(second).read() is None
+    assert build._CachedFile(second).read() is None
     assert ask(22) == 22
     assert ask(21) == 21
-    write_sealed(second, build._Kept(first).read(), build.KERNEL, second.name, private=True)
+    write_sealed(second, build._CachedFile(first).read(), build.KERNEL, second.name, private=True)
     assert ask(22) == 22, "its seal is right, its functions are others"
 
 
 def test_stale_cache_is_not_used(folder, monkeypatch):
     """Other versions or another processor mean another file."""
     assert ask(7) == 7
-    monkeypatch.setattr(build, "_surroundings", lambda: "LLVM 99")
+    monkeypatch.setattr(build, "_versions", lambda: "LLVM 99")
     assert ask(7) == 7
     assert len(list(folder.iterdir())) == 2
 
@@ -128,7 +128,7 @@ def test_foreign_cache_is_not_opened(folder, monkeypatch, reason):
     with warned(f"chmod go-w {folder}" if reason == "folder" else "name another" if reason == "owner" else ""):
         assert ask(8) == 8
         assert not opened
-        build._Kept(folder / "another").read()
+        build._CachedFile(folder / "another").read()
 
 
 @contextlib.contextmanager
@@ -144,7 +144,7 @@ def warned(words):
 
 def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
     def key():
-        build._surroundings.cache_clear()
+        build._versions.cache_clear()
         build.driver_key.cache_clear()
         return build.driver_key()
 
@@ -170,7 +170,7 @@ def test_everything_that_machine_code_depends_on_is_in_its_name(monkeypatch):
                 keys.append(key())
         assert len(set(keys)) == len(keys) - 1
     finally:
-        build._surroundings.cache_clear()
+        build._versions.cache_clear()
         build.driver_key.cache_clear()
     script = "from steadyslip.kernels import build; print(build.driver_key())"
     seeds = [

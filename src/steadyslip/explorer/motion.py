@@ -12,7 +12,7 @@ from steadyslip.core.errors import NotAvailable
 from steadyslip.core.records import with_values
 from steadyslip.explorer.moving import Shares, scales_program, start_program
 from steadyslip.explorer.programs import program
-from steadyslip.kernels.driver.places import searched
+from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
 from steadyslip.kernels.layout import LOG_COLUMNS, SETTINGS, Cursor, Final, Kind, Out, Recorded, Setting
@@ -125,7 +125,7 @@ def _segments(name: str, piece: Callable[[float, float, float], Any] | None) -> 
 
 def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str, Any]:
     model, layout = reduction.model, kernel.layout
-    further, begin = searched(layout) - 1, Setting.ATOL + layout.size
+    further, begin = guess_count(layout) - 1, Setting.ATOL + layout.size
     guesses = [int(Setting.GUESS), *range(begin, begin + further)]
     return {
         "parameters": list(model.parameters),
@@ -137,7 +137,7 @@ def _facts(reduction: Reduction, kernel: Kernel, missing: set[str]) -> dict[str,
         "kept": len(reduction.continuous),
         "further": len(reduction.further),
         "rows": layout.rows,
-        "point": layout.size + searched(layout),
+        "point": layout.size + guess_count(layout),
         "least": LEAST_WEIGHT,
         "inertial": model.inertial,
         "missing": sorted(missing),

@@ -1,6 +1,7 @@
-"""Model -> reduced equations -> straight-line programs -> machine code: the fast part of the package.
+"""Compiled integration of one Model: reduced equations -> straight-line programs -> machine code.
 
-reduction (which variables) -> source (expressions as operations) -> kernel (the programs of one model and method, on
-`layout`) -> `printers` -> build (compile, keep) -> runner (arrays in, arrays out). `driver` does what happens between
-steps, the same code for every model. Knows nothing of protocols, rigs or results.
+Order of the work: reduction (choice of variables), `source` (expressions as operations), `kernel` (programs of one
+model and method, on arrays laid out by `layout`), `printers` (code as text), `build` (compilation and cache), `runner`
+(arrays in, arrays out). `driver` handles events between steps with one code for all models. Nothing here depends on
+protocols, rigs or results.
 """

@@ -1,15 +1,13 @@
-"""Programs and the driver to machine code, kept between processes in the user's cache folder.
+"""Compilation of programs and driver to machine code, cached in the user's cache folder.
 
-The driver is translated and compiled once for all models; it reaches a model's routines by their addresses. The
-routines of a model are straight-line programs. Both go to LLVM as text. Machine code is stored under the hash of that
-text, or of what it is made of, of all versions that matter and of the processor, in one sealed file, written under a
-temporary name and moved into place. It is opened only if it and its folder are this user's and nobody else can write to
-them, and if its seal (`steadyslip.files.sealed`) says that it is of this very function. Anything odd about it (damaged,
-of another function, foreign owner, other version, unreadable) means that it is ignored and compiled again. It is code
-all the same: what somebody with the user's rights has changed and sealed anew is run as it is, or ends the process.
-A folder that cannot be written to means that nothing is kept; a warning tells of it, once.
-``STEADYSLIP_CACHE`` names another folder; empty, none. With
-``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs it all.
+The driver is compiled once for all models and calls a model's routines by address; routines are straight-line programs.
+Both go to LLVM as text. Machine code is stored under the hash of that text (or of its source), of all versions that
+matter and of the processor, in one sealed file that is written under a temporary name and moved into place. A file is
+used only if it and its folder belong to this user, nobody else can write to them, and its seal
+(`steadyslip.files.sealed`) is right; otherwise the code is compiled again. The cache is as trustworthy as the user's
+account: code that somebody with the user's rights has changed and sealed anew is run.
+If the folder cannot be written to, nothing is cached, with one warning. ``STEADYSLIP_CACHE`` names another folder;
+empty means no cache. With ``STEADYSLIP_INTERPRET=1`` nothing is compiled, and Python runs everything.
 """
 
 from __future__ import annotations
@@ -58,28 +56,28 @@ ENTRIES: dict[str, tuple[ModuleType, tuple[str, ...]]] = {
         (_WHOLE, _TABLE, _TABLE, _TABLE, _CUBE, _REALS, _CUBE, "real[:,:,:,:]", _CUBE, _TABLE),
     ),
 }  # fmt: skip
-"""What is called from outside: where it is, and the types of its arguments behind layout and routines."""
+"""Functions of the driver called from Python: module, and types of the arguments after layout and routines."""
 KERNEL = FileKind("kernel", 4, 2**26, "it is compiled again")
-_OFF = ("", "0", "no", "off", "false")  # what a variable of the environment says no with
-_MARK = "THIS"  # stands for the key in the routines' text
+_FALSE_WORDS = ("", "0", "no", "off", "false")  # values of an environment variable that mean no
+_KEY_PLACEHOLDER = "THIS"  # placeholder for the key in the routines' text
 _lock = threading.RLock()
 _drivers: dict[str, Callable[..., int]] = {}
 _loaded: dict[str, dict[str, int]] = {}
 _NATIVE = [f"printers.native.{part}" for part in ("functions", "expressions", "lines", "arrays")]
-_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)  # besides the driver's modules
+_TRANSLATION = ("layout", "driver_text", "linking", *_NATIVE)  # modules that driver code depends on, besides its own
 
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """A model's routines and the driver that calls them, ready to run.
+    """Routines of a model with the driver that calls them.
 
     Attributes
     ----------
     layout : Layout
     routines : Routines
-        Addresses, or functions if `plain`.
+        Addresses, or Python functions if `plain`.
     plain : bool
-        Whether everything is run by Python, slowly.
+        True if Python runs everything, slowly.
     """
 
     layout: Layout
@@ -93,42 +91,42 @@ class Code:
 
     @cached_property
     def advance(self) -> Callable[..., int]:
-        """`steadyslip.kernels.driver.lanes.advance` of this model."""
+        """`steadyslip.kernels.driver.lanes.advance` bound to this model."""
         return self._bound("advance")
 
     @cached_property
     def observe(self) -> Callable[..., object]:
-        """`steadyslip.kernels.driver.states.observe` of this model."""
+        """`steadyslip.kernels.driver.states.observe` bound to this model."""
         return self._bound("observe")
 
     @cached_property
     def field(self) -> Callable[..., object]:
-        """`steadyslip.kernels.driver.states.field` of this model."""
+        """`steadyslip.kernels.driver.states.field` bound to this model."""
         return self._bound("field")
 
     @cached_property
     def through_table(self) -> Callable[..., object]:
-        """`steadyslip.kernels.driver.table.through_table` of this model."""
+        """`steadyslip.kernels.driver.table.through_table` bound to this model."""
         return self._bound("through_table")
 
 
 def interpreting() -> bool:
-    """Whether everything is to be run by Python, to be stepped through."""
-    return os.environ.get("STEADYSLIP_INTERPRET", "").strip().lower() not in _OFF
+    """True if STEADYSLIP_INTERPRET asks for Python instead of machine code."""
+    return os.environ.get("STEADYSLIP_INTERPRET", "").strip().lower() not in _FALSE_WORDS
 
 
 def interpreted(programs: Sequence[Program], layout: Layout) -> Code:
-    """Everything as plain Python, slow: for tests, and to be stepped through."""
+    """Programs as Python functions: slow, for tests and for stepping through."""
     functions = {program.name: python.function(program, interpreting()) for program in programs}
-    return Code(layout, Routines(**{name: functions.get(name, _absent) for name in Routines._fields}), True)
+    return Code(layout, Routines(**{name: functions.get(name, _missing_routine) for name in Routines._fields}), True)
 
 
-def _absent(record: Any, number: float, array: Any) -> None:
+def _missing_routine(record: Any, number: float, array: Any) -> None:
     raise NotImplementedError("this kernel has no such routine")
 
 
 def compiled(programs: Sequence[Program], layout: Layout) -> Code:
-    """The same as machine code: compiled now, or found in the cache."""
+    """Programs as machine code, compiled now or read from the cache."""
     addresses = machine_code(programs, layout.lanes)
     found = {name: addresses.get(name, 0) for name in Routines._fields}
     return Code(layout, Routines(**cast(Any, found)), False)
@@ -138,7 +136,7 @@ def compiled(programs: Sequence[Program], layout: Layout) -> Code:
 
 
 def cache_folder() -> Path | None:
-    """Where machine code is kept; None if it is not."""
+    """Folder of the cache; None if there is none."""
     chosen = os.environ.get("STEADYSLIP_CACHE")
     if chosen is not None:
         return Path(chosen).expanduser() if chosen else None
@@ -148,23 +146,23 @@ def cache_folder() -> Path | None:
 
 
 @lru_cache(maxsize=1)
-def _surroundings() -> str:
-    """Everything but the assembly that machine code depends on."""
+def _versions() -> str:
+    """Versions and processor that machine code depends on."""
     return "\n".join([RELEASE, sys.version, np.__version__, *linking.surroundings()])
 
 
 def _key(source: str) -> str:
-    return hashlib.sha256(f"{_surroundings()}\n{source}".encode()).hexdigest()
+    return hashlib.sha256(f"{_versions()}\n{source}".encode()).hexdigest()
 
 
 @dataclass(frozen=True)
-class _Kept:
-    """Bytes in one sealed file, or nothing."""
+class _CachedFile:
+    """Bytes cached in one sealed file; always absent without a path."""
 
     path: Path | None
 
     def read(self) -> bytes | None:
-        """The content, if the file is sound and nobody else could have written it."""
+        """Content, if the file is intact and nobody else could have written it; else None."""
         if self.path is None:
             return None
         try:
@@ -176,7 +174,7 @@ class _Kept:
             return None
 
     def write(self, content: bytes) -> None:
-        """Write the file, or do without."""
+        """Write the file; if that fails, warn once."""
         if self.path is None:
             return
         try:
@@ -197,7 +195,7 @@ def _reason(error: OSError) -> str:
 
 @cache
 def _warn_of(folder: Path, why: str, owner: int = -1) -> None:
-    """Say once why nothing is kept in a folder, and what to do; of several processes the first one says it."""
+    """Warn once why nothing is cached in a folder and what to do; only in the first of several processes."""
     if multiprocessing.parent_process() is not None:
         return
     mend = ""
@@ -210,30 +208,30 @@ def _warn_of(folder: Path, why: str, owner: int = -1) -> None:
     )  # fmt: skip
 
 
-def _file(key: str, name: str) -> _Kept:
+def _file(key: str, name: str) -> _CachedFile:
     folder = cache_folder()
-    return _Kept(None if folder is None else folder / f"{key}-{name}")
+    return _CachedFile(None if folder is None else folder / f"{key}-{name}")
 
 
 # -- the routines of a model
 
 
 def machine_code(programs: Sequence[Program], lanes: int) -> dict[str, int]:
-    """Addresses of programs, by name."""
+    """Addresses of programs, by name, compiled or from the cache."""
     names = [program.name for program in programs]
-    text = assembly(programs, lanes, {name: f"{name}.{_MARK}" for name in names}, linking.pointer())
+    text = assembly(programs, lanes, {name: f"{name}.{_KEY_PLACEHOLDER}" for name in names}, linking.pointer())
     key = _key(text)
     with _lock:
         if key not in _loaded:
-            named = text.replace(f".{_MARK}(", f".{key}(")
-            _loaded[key] = kept_or_made(lambda: named, key, "routines", names, linking.STRAIGHT)
+            named = text.replace(f".{_KEY_PLACEHOLDER}(", f".{key}(")
+            _loaded[key] = cached_or_compiled(lambda: named, key, "routines", names, linking.STRAIGHT)
         return _loaded[key]
 
 
-def kept_or_made(
+def cached_or_compiled(
     text: Callable[[], str], key: str, what: str, names: Sequence[str], effort: int = linking.SPEED
 ) -> dict[str, int]:
-    """Addresses of functions of some assembly, there ``name.key``: from a file of the cache, or compiled and kept."""
+    """Addresses of functions ``name.key`` of assembly: from a file of the cache, or compiled and cached."""
     file = _file(key, what)
     symbols = {name: f"{name}.{key}" for name in names}
     content = file.read()
@@ -247,18 +245,18 @@ def kept_or_made(
 
 
 def driver(name: str) -> Callable[..., int]:
-    """One of `ENTRIES` as machine code; its first two arguments are a layout and routines' addresses, as arrays."""
+    """One of `ENTRIES` as machine code; takes layout and addresses of routines as arrays, then its other arguments."""
     with _lock:
         if not _drivers:
             key = driver_key()
-            addresses = kept_or_made(lambda: driver_text(key), key, "driver", tuple(ENTRIES))
+            addresses = cached_or_compiled(lambda: driver_text(key), key, "driver", tuple(ENTRIES))
             for entry, (_, types) in ENTRIES.items():
                 _drivers[entry] = callable_at(addresses[entry], entry, (_WHOLE, _WHOLE, *types))
         return _drivers[name]
 
 
 def driver_text(key: str) -> str:
-    """The driver as assembly."""
+    """Assembly of the driver."""
     entries = {name: (_WHOLE, _WHOLE, *types) for name, (_, types) in ENTRIES.items()}
     return translated(_driver_modules(), entries, {name: f"{name}.{key}" for name in ENTRIES}, 2, linking.opaque())
 
@@ -272,14 +270,14 @@ def _driver_modules() -> dict[str, str]:
 
 @lru_cache(maxsize=1)
 def driver_key() -> str:
-    """The hash of everything that the machine code of the driver depends on."""
+    """Hash of everything that the machine code of the driver depends on."""
     declared = [f"{name} {types}" for name, (_, types) in ENTRIES.items()]
     others = [text_of(f"steadyslip.kernels.{part}") for part in _TRANSLATION]
     return _key("\n".join([*declared, *_driver_modules().values(), *others]))
 
 
 def callable_at(address: int, name: str, types: Sequence[str]) -> Callable[..., int]:
-    """A translated function as one of Python, which lets other threads run meanwhile."""
+    """Python function that calls a translated function without holding the interpreter's lock."""
     kinds = [ctypes.py_object if "[" in one else ctypes.c_int64 for one in types]
     function = ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(address)
 

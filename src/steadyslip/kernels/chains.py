@@ -1,8 +1,8 @@
-"""Rates written so that a step waits as little as possible for their slowest parts.
+"""Rewriting of rates as A e + B, so that each stage waits little for the exponential e of a velocity variable.
 
-One trajectory keeps a processor waiting: each stage of a step begins with what the last one found. An expression in
-which a velocity, an exponential of the state, comes late is therefore written as A e + B wherever it is linear in the
-exponential e: A and B are computed while e is, and one multiplication and addition are left to wait for.
+A single trajectory is limited by latency: each stage of a step begins with the result of the last one. Where an
+expression is linear in an exponential e (or other slow function) of the state, A and B are computed while e is, and
+one multiplication and addition are left to wait for.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ __all__ = ["with_short_chains"]
 
 
 def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Symbol]) -> list[sp.Expr]:
-    """The same expressions, linear in functions of `variables` wherever they can be.
+    """Rewrite expressions as linear in functions of `variables` wherever they are linear in them.
 
     Parameters
     ----------
     expressions : iterable of sympy.Expr
     variables : iterable of sympy.Symbol
-        What the slow functions depend on: the velocity variables.
+        Symbols that the slow functions depend on: the velocity variables.
     """
     written, late = list(expressions), frozenset(variables)
     names: list[tuple[sp.Symbol, sp.Expr]] = []
@@ -39,7 +39,7 @@ def with_short_chains(expressions: Iterable[sp.Expr], variables: Iterable[sp.Sym
 
 
 def _innermost(expressions: Iterable[sp.Expr], late: frozenset[sp.Symbol]) -> sp.Expr | None:
-    """A function of what is late without such a function in its argument."""
+    """First function found that depends on `late` symbols and has no such function in its argument; None if none."""
     for expression in expressions:
         for node in sp.postorder_traversal(expression):
             is_slow = isinstance(node, sp.Function) and not isinstance(node, (AppliedUndef, sp.Piecewise))
@@ -49,14 +49,14 @@ def _innermost(expressions: Iterable[sp.Expr], late: frozenset[sp.Symbol]) -> sp
 
 
 class _Collector:
-    """Collects one symbol."""
+    """Rewriting of expressions as A s + B for one symbol s."""
 
     def __init__(self, symbol: sp.Symbol) -> None:
         self.symbol = symbol
         self._known: dict[sp.Basic, tuple[sp.Expr, sp.Expr] | None] = {}
 
     def collected(self, e: sp.Basic) -> sp.Basic:
-        """An expression with every largest linear part as A s + B."""
+        """Expression with each maximal part that is linear in s written as A s + B."""
         if not e.has(self.symbol) or e is self.symbol:
             return e
         linear = self.linear(e)
@@ -71,7 +71,7 @@ class _Collector:
         return e.func(*map(self.collected, e.args))
 
     def linear(self, e: sp.Basic) -> tuple[sp.Expr, sp.Expr] | None:
-        """A and B; None where it is not linear."""
+        """(A, B) with e = A s + B; None if e is not linear in s (cached)."""
         if e not in self._known:
             self._known[e] = self._linear(e)
         return self._known[e]

@@ -84,7 +84,7 @@ STEP = (
         0.04471061572777259,
     ),
 )
-"""Weights of earlier stages in the argument of each; the last row gives the result."""
+"""Weights of the earlier stages in the argument of each; the last row gives the result."""
 EXTRA = (
     (
         0.056167502283047954,
@@ -135,7 +135,7 @@ EXTRA = (
         -9.15095847217987,
     ),
 )
-"""The same of the stages for dense output."""
+"""Weights of the earlier stages in the arguments of the stages for dense output."""
 ERROR = (
     0.01312004499419488,
     0.0,
@@ -166,7 +166,7 @@ LOWER_ERROR = (
     0.02265179219836082,
     0.0,
 )
-"""Weights of all stages in the two error estimates."""
+"""Weights of the stages in the two error estimates."""
 DENSE = (
     (
         -8.428938276109013,

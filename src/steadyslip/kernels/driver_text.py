@@ -1,4 +1,4 @@
-"""The driver's modules as text, for compilers: those that belong together, with numbers in place of names of places."""
+"""Source text of the driver's modules for the compilers, with names of enum members replaced by numbers."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _TUPLES: dict[str, Any] = {"layout": Layout, "routines": Routines}
 
 
 def text_of(module: str) -> str:
-    """The text of a module of the package."""
+    """Source text of a module of the package."""
     package, _, name = module.rpartition(".")
     return files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
 
 
 def texts(module: str) -> dict[str, str]:
-    """The text of a driver's module, and of those that it needs before it, by name."""
+    """Source text of a driver module and, before it, of those that it imports, by module name."""
     found: dict[str, str] = {}
     _gather(module, found)
     return found
@@ -50,19 +50,19 @@ def _gather(module: str, found: dict[str, str]) -> None:
 
 
 def is_driver(module: str | None) -> bool:
-    """Whether a module is one of the driver's."""
+    """True for a module of the driver."""
     return (module or "").startswith(f"{DRIVER}.")
 
 
 def numbered(text: str) -> ast.Module:
-    """The tree of a module with numbers for the names of places, to be put into one with the others."""
+    """Syntax tree of a module with numbers in place of enum members and layout fields, without driver imports."""
     return cast(ast.Module, ast.fix_missing_locations(_Numbered().visit(ast.parse(text))))
 
 
 class _Numbered(ast.NodeTransformer):
-    """Names of places become their numbers, and `Layout` and `Routines` arrays.
+    """Replace enum members by numbers and fields of `Layout` and `Routines` by array subscripts.
 
-    Imports from the driver's own modules go: these are put into one.
+    Imports between driver modules are removed, because all functions are put into one namespace.
     """
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.ImportFrom | None:

@@ -1,8 +1,8 @@
-"""What is watched in a motion. An event is declared here, once: for lanes and single runs, for log and tally.
+"""Events of a motion, declared once for single runs and ensembles, log and statistics.
 
-An event is a change of sign of a function of what can be observed. The step of every kernel compares the function at
-both ends; the driver finds the moment on the dense output, and logs it. Extremes of velocity and the begin of slip,
-which are frequent, are found in all lanes at once where there is no log (`steadyslip.kernels.watch`).
+An event is a sign change of a function of the observables. The step of each kernel compares its values at both ends;
+the driver finds the moment on the dense output and logs it. Where there is no log, extremes of velocity and begin of
+slip, which are frequent, are found in all lanes at once (`steadyslip.kernels.watch`).
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any, Protocol
 from steadyslip.kernels.layout import Row
 from steadyslip.kernels.nodes import larger
 
-FASTER = 1.000001  # than the load point, beyond rounding: slipping
+FASTER = 1.000001  # slip is faster than the load point by this factor, so that rounding at equal speeds is no event
 ROUNDED = 64 * 2.0**-52
-"""Rounding of a sum of stresses as a share of aσ, by which friction answers velocity; stresses are dozens of it."""
+"""Rounding error of a sum of stresses over aσ, the change of friction per unit of ln v; stresses are dozens of aσ."""
 
 
 class Observed(Protocol):
-    """What events are functions of, at some moment: numbers of a program, in SI units."""
+    """Arguments of event functions at one moment: nodes of a program, SI units."""
 
     @property
     def v(self) -> Any:
@@ -69,20 +69,20 @@ class Observed(Protocol):
 
 @dataclass(frozen=True)
 class Watched:
-    """A function whose changes of sign are events.
+    """Function whose sign changes are events.
 
     Attributes
     ----------
     name : str
     function : callable
-        Of what is `Observed`.
+        Of an `Observed`.
     falls, rises : str
-        What it is called when the function becomes negative, or positive; empty if nobody wants to know.
+        Name of the event when the function becomes negative, or positive; empty if it is not logged.
     falls_counted, rises_counted : str
-        Column of an ensemble's tally that counts it; empty for none.
+        Column of an ensemble's statistics that counts it; empty for none.
     uncertain : callable, optional
-        Size up to which its sign says nothing: what the integration does not tell from zero, or rounding. A sign counts
-        from the first step on at whose end the function is larger, and until it is as clearly another.
+        Size up to which the sign is unknown, because of the integration error or rounding. A sign counts from the first
+        step on at whose end the function is larger, until it is as clearly the other one.
     """
 
     name: str
@@ -95,7 +95,7 @@ class Watched:
 
 
 def faster(at: Observed) -> Any:
-    """The velocity above which the block slips."""
+    """Velocity above which the block slips, m/s."""
     return larger(FASTER * at.v_lp, at.v_low)
 
 
@@ -108,10 +108,10 @@ EVENTS = (
     Watched("motion", lambda at: abs(at.v) - at.v_low, falls="arrest", rises="restart", falls_counted="arrests",
             uncertain=lambda at: at.error),
 )  # fmt: skip
-"""All events; the driver knows the first three by their place (`steadyslip.kernels.layout.Kind`)."""
+"""All events; the driver uses the first three by index (`steadyslip.kernels.layout.Kind`)."""
 LOG_KINDS = ("", *(word for event in EVENTS for word in (event.falls, event.rises)), "blow-up")
-"""What the kinds of a log are called: 2 e + 1 where event number e falls, 2 e + 2 where it rises."""
+"""Names of the kinds in a log: 2 e + 1 where event function e falls, 2 e + 2 where it rises."""
 COUNTED = tuple(word for event in EVENTS for word in (event.falls_counted, event.rises_counted))
-"""Columns of the tally behind those of `Row`, by kind; an empty name is not shown."""
+"""Columns of event counts after those of `Row`, by kind; columns without a name are not reported."""
 TALLY = (*(row.name.lower() for row in Row if Row.EVENTS <= row <= Row.PEAK_GROWTH), *COUNTED)
-"""Columns of the tally of events, a result."""
+"""Columns of the event statistics in results."""

@@ -1,4 +1,4 @@
-"""The kernel that an experiment is compared with: friction, and its derivatives in several directions."""
+"""Kernel for comparison with an experiment: friction and its derivatives in several directions."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from steadyslip.model.reducing import reduce_model
 from steadyslip.model.reduction import Reduction, W
 from steadyslip.model.variational import with_directions
 
-LANES = 8  # one vector of doubles: sensitivities fill the registers
+LANES = 8  # one vector of doubles; more would exceed the registers, which sensitivities fill
 
 
 @dataclass(frozen=True, eq=False)
 class ExperimentProgram:
-    """One such kernel of one model.
+    """One lockstep kernel of one model.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class ExperimentProgram:
     directions : int
     method : str
     settled : bool
-        Whether motions begin with steady sliding.
+        True if motions begin with steady sliding.
     """
 
     reduction: Reduction
@@ -53,21 +53,21 @@ class ExperimentProgram:
 
     @cached_property
     def code(self) -> Code:
-        """Machine code, or plain Python if `plain`."""
+        """Machine code, or Python functions if `plain`."""
         return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
 
     @cached_property
     def through_table(self) -> Callable[..., object]:
-        """`steadyslip.kernels.driver.table.through_table` of this model."""
+        """`steadyslip.kernels.driver.table.through_table` bound to this model."""
         return partial(self.code.through_table, np.array(self.kernel.input_rates() or (-1,)))
 
     @cached_property
     def unsettled(self) -> dict[str, sp.Symbol]:
-        """How far a motion begins from steady sliding, by name: friction (the spring's pull), then the memory."""
+        """Free deviations of the start from steady sliding, by name: friction (spring force), then memory variables."""
         if self.settled:
             return {}
         model = self.reduction.model
-        own = [item for item in model.memory if item.unit == "1"]  # a memory of the stress has settled
+        own = [item for item in model.memory if item.unit == "1"]  # a memory of normal stress starts settled
         return {"friction": inner_symbol("initial_friction", real=True)} | {
             item.name: inner_symbol(f"initial_{item.symbol.name}", real=True) for item in own
         }
@@ -85,9 +85,9 @@ class ExperimentProgram:
 
     @cached_property
     def _values(self) -> tuple[Any, ArrayFunction]:
-        """Constants and starting values; their derivatives in every parameter, σss following, and in what is unsettled.
+        """Constants and starting values with derivatives in every parameter (σss following) and every deviation.
 
-        Places among these of those that are not zero, and the function that computes values and these derivatives.
+        Indices of the derivatives that are not zero, and the function that computes values and these derivatives.
         """
         model = self.reduction.model
         expressions = [*self.kernel.constants.symbols, *self._start]
@@ -104,16 +104,16 @@ class ExperimentProgram:
         return np.array(places, dtype=int), model.function(wanted, *self.unsettled.values())
 
     def arrays(self, point: OperatingPoint, chain: np.ndarray, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Constants with their rates of change, and starting states with theirs.
+        """Constants with their rates of change, and starting states with theirs, one row per job.
 
         Parameters
         ----------
         point : OperatingPoint
-            Of every job.
+            Operating point of each job.
         chain : ndarray (jobs, directions, parameters + unsettled)
-            How fast the parameters, and then how far it begins from steady sliding, change in each direction.
+            Rates of change of the parameters and deviations in each direction.
         away : ndarray (jobs, unsettled)
-            How far that is.
+            Deviations of the start from steady sliding.
         """
         jobs, _, count = chain.shape
         table, size = self.kernel.constants, len(self.kernel.constants.symbols)
@@ -130,5 +130,5 @@ class ExperimentProgram:
 
 @question
 def experiment_program(model: Model, directions: int, method: str, settled: bool = True) -> ExperimentProgram:
-    """The kernel for a model; made once per process."""
+    """Kernel for a model (cached)."""
     return ExperimentProgram(reduce_model(model, None), directions, method, settled, plain=interpreting())

@@ -1,4 +1,4 @@
-"""One reduced Model for one method, as formulas: what the programs of a kernel evaluate, and where it all lies."""
+"""Formulas of one reduced Model for one method, and the layout of its record."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ OUTPUTS = ("v", "acceleration", "sigma", "tau", "T")
 
 @dataclass(frozen=True)
 class Choice:
-    """What a kernel is compiled for, beside the equations.
+    """Options that a kernel is compiled for.
 
     Attributes
     ----------
     method : str
         Name of the method.
     level : str
-        The most that the inputs do within a segment: ``constant``, ``linear`` or ``harmonic``.
+        Highest complexity of inputs within a segment: ``constant``, ``linear`` or ``harmonic``.
     harmonics : int
         Harmonic terms per input (level ``harmonic``).
     lanes : int
         Trajectories side by side.
     dense : bool
-        Whether stages are kept for dense output (events, samples).
+        True to keep stages for dense output (events, samples).
     """
 
     method: str
@@ -60,13 +60,13 @@ class Formulation:
         Length of the state.
     """
 
-    varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # the steady drive is a constant too
+    varied_inputs: tuple[sp.Symbol, ...] = (V_LP,)  # inputs with rates of change; the steady drive is a constant too
 
     def __init__(self, reduction: Reduction, choice: Choice) -> None:
         self.reduction, self.choice = reduction, choice
         self.method: Method = METHODS[choice.method]()
         self.size = len(reduction.state)
-        self.counted = self.size - len(reduction.model.held)  # how many errors are averaged
+        self.counted = self.size - len(reduction.model.held)  # number of variables that the error norm averages over
         self.names = {s: f"y{i}" for i, s in enumerate(reduction.state)} | self._inputs
         own = (one.variable.w for one in reduction.slidings if one.variable is not None)
         variables = {*reduction.state, *reduction.continuous, *self._inputs, *own}
@@ -74,26 +74,26 @@ class Formulation:
         self.names |= {symbol: f"z{k}" for k, symbol in enumerate(reduction.unknowns)}
         variables.update(reduction.unknowns)
         self.constants = Constants(variables)
-        self._rates = [self._fixed(rate) for rate in reduction.rates]
-        self.driven = self._answers_to_constants()
+        self._rates = [self._with_constants(rate) for rate in reduction.rates]
+        self.driven = self._rates_with_constants()
         self.timed = choice.level != "constant" or any(rate.has(TIME) for rate in self._rates)
         self._write()
         self.layout = self._made_layout()
 
     @property
     def _inputs(self) -> dict[sp.Symbol, str]:
-        """Channels, their slopes and time by what programs call them."""
+        """Names in programs of the input channels, their slopes and time."""
         channels = {s: f"in{i}" for i, s in enumerate(self.reduction.channels)}
         return channels | {s: f"slope{i}" for i, s in enumerate(self.reduction.slopes)} | {TIME: "time"}
 
-    def _fixed(self, expression: sp.Expr) -> sp.Expr:
-        """Lifted; slopes vanish where inputs are constant."""
+    def _with_constants(self, expression: sp.Expr) -> sp.Expr:
+        """Expression with parameter-only parts as constants, and slopes zero where inputs are constant."""
         if self.choice.level == "constant":
             expression = expression.xreplace(dict.fromkeys(self.reduction.slopes, sp.Integer(0)))
-        return self.constants.lifted(expression)
+        return self.constants.with_constants(expression)
 
-    def _answers_to_constants(self) -> dict[int, sp.Expr]:
-        """By position in the state: what a change of the constants adds to the rates of `Reduction.direction`."""
+    def _rates_with_constants(self) -> dict[int, sp.Expr]:
+        """Terms that a change of the constants adds to the rates of `Reduction.direction`, by index in the state."""
         reduction = self.reduction
         found = {
             reduction.state.index(symbol): self._change(self._rates[i], direction)
@@ -104,7 +104,7 @@ class Formulation:
         return found
 
     def _change(self, expression: sp.Expr, direction: int) -> sp.Expr:
-        """How fast an expression in constants and state changes with the constants, at a given state."""
+        """Rate of change of an expression in constants and state with the constants, at a given state."""
 
         def explicit(e: sp.Expr) -> sp.Expr:
             known = [*self.constants.symbols.values(), *self.varied_inputs]
@@ -113,8 +113,8 @@ class Formulation:
         return explicit(expression) + self._solved.followed(expression, list(map(explicit, self._solved.residuals)))
 
     def _entry(self, matrix: list[list[sp.Expr]], i: int, k: int) -> sp.Expr:
-        """An entry of the Jacobian, with what changing constants add."""
-        entry = self._fixed(matrix[i][k])
+        """Entry of the Jacobian, with the terms of changing constants."""
+        entry = self._with_constants(matrix[i][k])
         if i not in self.driven:
             return entry
         return entry + self._solved.along(self.driven[i], self.reduction.state[k])
@@ -124,35 +124,35 @@ class Formulation:
     @cached_property
     def _solved(self) -> Unknowns:
         """Unknowns and residuals in terms of constants."""
-        return Unknowns(self.reduction.unknowns, tuple(map(self._fixed, self.reduction.residuals)))
+        return Unknowns(self.reduction.unknowns, tuple(map(self._with_constants, self.reduction.residuals)))
 
     @staticmethod
     def named(z: Sequence[Value]) -> dict[str, Value]:
-        """Values of the unknowns by what formulas call them."""
+        """Values of the unknowns by their names in formulas."""
         return {f"z{k}": value for k, value in enumerate(z)}
 
     def _formulas(self, expressions: Sequence[sp.Expr]) -> Formulas:
         return Formulas(expressions, self.names)
 
     def _write(self) -> None:
-        """All formulas; in this order their constants are numbered."""
+        """Write all formulas; their order numbers the constants."""
         reduction, n = self.reduction, self.size
-        seen = [[self._fixed(one.outputs[name]) for name in OUTPUTS] for one in reduction.slidings]
+        seen = [[self._with_constants(one.outputs[name]) for name in OUTPUTS] for one in reduction.slidings]
         outputs = [e for one in seen for e in one]
         self.residuals: Formulas | None = None
         matrix = reduction.solved.matrix
         self.slopes = [(i, k) for i, row in enumerate(matrix) for k, slope in enumerate(row) if slope != 0]
         if reduction.unknowns:
             slopes = [matrix[i][k] for i, k in self.slopes]
-            self.residuals = self._formulas([self._fixed(e) for e in (*reduction.residuals, *slopes)])
+            self.residuals = self._formulas([self._with_constants(e) for e in (*reduction.residuals, *slopes)])
         if self.choice.lanes == 1 and not self.method.implicit:
             own = [one.variable.w for one in reduction.slidings if one.variable is not None]
             self._rates = with_short_chains(self._rates, own)
         self.rates = self._formulas(self._rates)
         self.full = self._formulas(self._rates + [e for one in seen for e in one[:3]])
         also = [*reduction.further.values(), *(one.slip for one in reduction.slidings)]
-        self.outputs = self._formulas(outputs + [self._fixed(e) for e in also])
-        self.restored = self._formulas([self._fixed(e) for e in reduction.restored])
+        self.outputs = self._formulas(outputs + [self._with_constants(e) for e in also])
+        self.restored = self._formulas([self._with_constants(e) for e in reduction.restored])
         self.pattern: Pattern = set()
         if self.method.implicit:
             matrix = reduction.jacobian()
@@ -160,31 +160,33 @@ class Formulation:
             self.pattern = {place for place, entry in found.items() if entry != 0}
             entries = [found[place] for place in sorted(self.pattern)]
             if self.timed:
-                entries += [self._fixed(e) for e in reduction.time_derivative()]
+                entries += [self._with_constants(e) for e in reduction.time_derivative()]
             self.jacobian = self._formulas(entries)
         self._write_velocity()
         known = {s: f"k{i}" for i, s in enumerate(reduction.continuous)} | self._inputs
         known |= {w: f"w{k}" for k, (w, _) in enumerate(reduction.restarts)}
         balances = [balance for _, balance in reduction.restarts]
         balances += [derivative(balance, w) for balance in balances for w, _ in reduction.restarts]
-        self.restart = Formulas([self._fixed(e) for e in balances], known) if balances else None
-        self.letting_go = self._formulas([self._fixed(e) for e in reduction.letting_go])
-        self.shift = self._formulas([self._fixed(e) for e in reduction.shifts])
-        self.shares = self._formulas([self._fixed(e) for i in range(self.contacts) for e in self._shares(i)])
+        self.restart = Formulas([self._with_constants(e) for e in balances], known) if balances else None
+        self.letting_go = self._formulas([self._with_constants(e) for e in reduction.letting_go])
+        self.shift = self._formulas([self._with_constants(e) for e in reduction.shifts])
+        self.shares = self._formulas([self._with_constants(e) for i in range(self.contacts) for e in self._shares(i)])
 
     @property
     def contacts(self) -> int:
-        """How many there are."""
+        """Number of contacts."""
         return len(self.reduction.slidings)
 
     def _shares(self, index: int) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-        """Of a contact in steady sliding: slip rate over the drive's and the first contact's, and σ over that one's."""
+        """Shares of a contact in steady sliding: slip rate over the drive's and over the first contact's, σ
+        over its σ.
+        """
         one, first = self.reduction.slidings[index], self.reduction.slidings[0]
         stresses = [contact.sigma_ss for contact in self.reduction.model.contacts]
         return one.ratio, one.ratio / first.ratio, stresses[index] / stresses[0]
 
     def _write_velocity(self) -> None:
-        """Velocity as a function of w alone, and w of velocity, where w is integrated and memory is not needed."""
+        """Write velocity as a function of w alone and w of velocity, for one contact whose w is integrated."""
         reduction = self.reduction
         self.speed: Formulas | None = None
         self.limit: Formulas | None = None
@@ -200,12 +202,12 @@ class Formulation:
         if own.w not in reduction.state:
             return
         if self.choice.dense and alone:
-            self.speed = self._formulas([self._fixed(speed)])
-            self.limit = Formulas([self._fixed(inverse.xreplace({v: own.w}))], {own.w: "v"})
+            self.speed = self._formulas([self._with_constants(speed)])
+            self.limit = Formulas([self._with_constants(inverse.xreplace({v: own.w}))], {own.w: "v"})
 
     @property
     def terms(self) -> int:
-        """Coefficients of the dense output of a variable."""
+        """Number of coefficients of a variable's dense output."""
         return len(self.method.dense) + 2 if self.method.implicit else len(self.method.dense[0]) + 1
 
     def _made_layout(self) -> Layout:

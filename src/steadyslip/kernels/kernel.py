@@ -1,15 +1,15 @@
-"""The programs of one reduced Model and one method: a step, and what the driver asks for between steps.
+"""Programs of one reduced Model and one method: a step, and those that the driver calls state_at_fraction steps.
 
-One pass of `step` advances every lane by one step of its own size; there is no branch in it, so that it becomes vector
-code. Everything rare (breakpoints, events, samples, the end) is done by the driver, lane by lane, with the other
-programs. A single run is the same with one lane.
+One call of `step` advances every lane by one step of its own size, without branches, so that it becomes vector code.
+Rare work (breakpoints, events, samples, the end) is done by the driver, lane by lane, with the other programs. A single
+run is one lane.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
 
-from steadyslip.kernels.driver.places import further_at, guess_at, marks_at, outputs_at, unknown_at
+from steadyslip.kernels.driver.places import event_functions_at, further_at, guess_at, outputs_at, unknown_at
 from steadyslip.kernels.events import faster
 from steadyslip.kernels.formulation import OUTPUTS, Formulation
 from steadyslip.kernels.layout import Out, Row
@@ -22,7 +22,7 @@ from steadyslip.protocol.creep import FREE, SWITCH
 
 
 class Kernel(Formulation):
-    """Writes the programs of one kernel."""
+    """Writer of the programs of one kernel."""
 
     @cached_property
     def programs(self) -> tuple[Program, ...]:
@@ -40,7 +40,7 @@ class Kernel(Formulation):
     # -- the step
 
     def _step(self) -> Program:
-        """One step of every lane, from loading to the flag that asks for the driver's attention."""
+        """One step of every lane, from loading to the flag that calls the driver."""
         step = Step(self)
         step.advance()
         step.keep()
@@ -56,15 +56,15 @@ class Kernel(Formulation):
             record.program.store(self.layout.rate + i, found[i])
         for i, row in enumerate((Row.V, Row.ACCELERATION, Row.SIGMA)):
             record.program.store(row, found[self.size + i])
-        for place, value in record.elsewhere(found[self.size :]):
+        for place, value in record.further_contact_rows(found[self.size :]):
             record.program.store(place, value)
         moments = record.moments(point, found[self.size :])
-        for e, value in enumerate(record.marks(moments) if self.choice.dense else ()):
+        for e, value in enumerate(record.event_values(moments) if self.choice.dense else ()):
             record.program.store(self.layout.mark + e, value)
         if self.choice.dense and self.limit is not None:
             for row, v in ((Row.W_LIMIT, faster(moments[0])), (Row.W_LP, moments[0].v_lp)):
                 record.program.store(row, self.limit(record.constants | {"v": v})[0])
-        record.keep_unknowns()
+        record.store_unknowns()
         return record.program
 
     def _outputs_program(self) -> Program:
@@ -89,10 +89,10 @@ class Kernel(Formulation):
             program.store(first + Out.PLACE, place, "y")
             program.store(first + Out.SHARE, share, "y")
         if self.choice.dense:
-            if self.speed is not None:  # an extreme of velocity is one of the dense output in w
+            if self.speed is not None:  # velocity peaks where the dense output of w does
                 seen[1] = program.load(n + Out.W_SLOPE, "y")
-            for e, value in enumerate(record.marks(record.moments(point, seen))):
-                program.store(marks_at(self.layout) + e, value, "y")
+            for e, value in enumerate(record.event_values(record.moments(point, seen))):
+                program.store(event_functions_at(self.layout) + e, value, "y")
         for i in range(len(self.reduction.further)):
             program.store(further_at(self.layout) + i, found[len(seen) + i], "y")
         return program
@@ -110,9 +110,9 @@ class Kernel(Formulation):
         return record.program
 
     def _balance_program(self) -> Program:
-        """Balances as functions of their w, after a jump or now; without one, velocity simply continues.
+        """Balances after a jump as functions of their w: values, slopes in their own w, Newton's changes of all w.
 
-        Their values, the slope of each in its own w, and what Newton's method for all takes off each w.
+        Without a balance to solve the velocity is continuous, and a dummy balance is zero.
         """
         record = Evaluator(self, Program("balance"))
         program = record.program
@@ -132,7 +132,7 @@ class Kernel(Formulation):
         return program
 
     def _place_program(self) -> Program:
-        """The state from the continuous variables and the velocity variables that balances fix."""
+        """State from the continuous variables and the velocity variables that balances fix."""
         program, reduction = Program("place"), self.reduction
         fixed = [w for w, _ in reduction.restarts]
         for i, symbol in enumerate(reduction.state):
@@ -144,7 +144,7 @@ class Kernel(Formulation):
         return program
 
     def _shift_program(self) -> Program:
-        """A jump of the load point: all fall behind by their own shares. Before it a drive is let go or taken up."""
+        """Jump of the load point: variables fall behind by their shares; before it, a drive is let go or taken up."""
         record = Evaluator(self, Program("shift"))
         program = record.program
         if self.reduction.letting_go:
@@ -155,13 +155,13 @@ class Kernel(Formulation):
         return program
 
     def _let_go(self, record: Evaluator) -> None:
-        """What is held of the drive's force so that this goes on, or is what it is told; the state is that before."""
+        """New held force of a drive that is let go or moved: continuous, or as prescribed, from the state before it."""
         program, (held,) = record.program, self.reduction.model.held
         names = {symbol: f"in{i}" for i, symbol in enumerate(self.reduction.channels)}
         free, switch = (names[self.reduction.channels[place]] for place in (FREE, SWITCH))
         point = record.point(program.load(Row.TAU))
         _, _, dashpot, steady = record.evaluated(self.letting_go, point, found=True)
-        driven = program.load(Row.STRETCH) + dashpot * point["in0"]  # as bodies stood and moved before
+        driven = program.load(Row.STRETCH) + dashpot * point["in0"]  # with positions and velocities before the jump
         place = self.layout.continuous + self.reduction.continuous.index(held)
         goes_on = program.load(Row.PULL) - select(as_node(point[free]) > 0.5, 0.0, driven)
         change = as_node(point[switch])
@@ -169,9 +169,9 @@ class Kernel(Formulation):
         program.store(place, new)
 
     def _extend_program(self) -> Program:
-        """The dense output of the last step as polynomials."""
+        """Polynomials of the dense output of the last step."""
         record = Evaluator(self, Program("extend"))
-        record.keep_polynomials()
+        record.store_polynomials()
         return record.program
 
     def _dense_program(self) -> Program:
@@ -179,11 +179,13 @@ class Kernel(Formulation):
         program = record.program
         theta = program.number
         if self.choice.dense:
-            for i, y in enumerate(record.between(theta)):
+            for i, y in enumerate(record.state_at_fraction(theta)):
                 program.store(i, y, "y")
             if self.speed is not None:
-                program.store(self.size + Out.W_SLOPE, horner(slope_of(record.course(self.layout.w)), theta), "y")
-            for k, z in enumerate(record.guesses_between(theta)):
+                program.store(
+                    self.size + Out.W_SLOPE, horner(slope_of(record.smooth_polynomial(self.layout.w)), theta), "y"
+                )
+            for k, z in enumerate(record.guesses_at_fraction(theta)):
                 program.store(unknown_at(self.layout, k), z, "y")
             if not self.unknowns:
                 program.store(unknown_at(self.layout, 0), program.load(Row.Z), "y")

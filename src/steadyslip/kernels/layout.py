@@ -1,8 +1,8 @@
-"""Where everything lies in the arrays that kernels and their driver share: declared once, for both and for NumPy.
+"""Indices of all quantities in the arrays that kernels and driver share.
 
-A *record* holds one trajectory: first the numbers of `Row`, at the same place whatever the model, then groups whose
-sizes depend on the model and the method, where `Layout` says. Kernels of several lanes keep their records side by
-side: quantity ``row`` of lane ``l`` is ``S[row * lanes + l]``.
+A *record* holds one trajectory: first the numbers of `Row`, at the same index for every model, then groups whose sizes
+depend on model and method, from the indices in `Layout`. Kernels of several lanes interleave their records: row
+``row`` of lane ``l`` is ``S[row * lanes + l]``.
 """
 
 from __future__ import annotations
@@ -14,80 +14,80 @@ from typing import NamedTuple
 import numpy as np
 
 GROUP = 8
-"""Lanes that are computed as one vector; kernels of several lanes have some of these."""
+"""Number of lanes computed as one vector; the lanes of a kernel are a multiple of it, or one."""
 
 
 class Row(IntEnum):
-    """Numbers of a record that every kernel has."""
+    """Rows of a record that every kernel has."""
 
     V, ACCELERATION, SIGMA = 0, 1, 2
     """Outputs at the end of the step."""
     Z, Z_SCALE = 3, 4
-    """The first unknown of the balances, or a guess of it, and its scale."""
+    """First unknown of the balances (or guess of it), and its scale."""
     TAU, H, END = 5, 6, 7
-    """Time since the start of the segment, next step, length of the segment."""
+    """Time since the start of the segment, size of the next step, length of the segment (s)."""
     START, STOP, SEGMENT = 8, 9, 10
-    """Start and end of the segment since the start of the run, and its number."""
+    """Start and end of the segment since the start of the run (s), and its number."""
     RTOL = 11
     ACTIVE, FLAG, GOOD = 12, 13, 14
-    """Whether there is a job, whether it needs the driver, whether the last step was accepted."""
+    """Flags: lane has a job, lane needs the driver, last step was accepted."""
     ACCEPTED, REJECTED, FAILURES, ERROR = 15, 16, 17, 18
     MOST, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 19, 20, 21, 22, 23, 24
     NEXT, TAKEN = 25, 26
-    """How far into the segment the next sample is, and its number."""
+    """Local time of the next requested sample (s), and its number."""
     V_DRIVE, LOG = 27, 28
-    """Velocity of the drive, and whether there is a log."""
+    """Velocity of the drive (m/s); flag: a log is kept."""
     DONE, TAU_OLD, W_RATE_OLD = 29, 30, 31
-    """Length of the last step, where it began, and the rate of the velocity variable there."""
+    """Size of the last step, its local starting time, and the rate of the velocity variable there."""
     EXTENDED = 32
-    """Whether the dense output of the last step is there."""
+    """Flag: the polynomials of the dense output of the last step are stored."""
     HAPPENED = 33
-    """How many events the last step has."""
+    """Number of events in the last step."""
     W_LIMIT, W_LP = 34, 35
-    """Velocity variable above which the block slips and that of the load point, while inputs are constant."""
-    # what is known about a trajectory's slip events; from here to PEAK_GROWTH it is a result
+    """Velocity variable at the slip limit and at the load-point velocity, valid while inputs are constant."""
+    # statistics of slip events; those up to PEAK_GROWTH are results
     EVENTS, PEAK_VELOCITY, LOWEST_VELOCITY = 36, 37, 38
     EVENT_BEGIN, EVENT_DURATION, EVENT_SLIP, EVENT_STRESS_DROP, EVENT_PEAK_VELOCITY, RECURRENCE = 39, 40, 41, 42, 43, 44
     LAST_PEAK_TIME, PEAK_PERIOD, PEAK_GROWTH = 45, 46, 47
     PEAK_SIZE, LOAD_MOVED, ANY_BEGIN = 48, 49, 50
-    # slip that may become a slip event: since when, and what was there
+    # slip in progress that may become a slip event: state at its lowest velocity
     NOW_FROM, NOW_EVENT, NOW_PEAK, NOW_BEGIN = 51, 52, 53, 54
     NOW_V, NOW_SIGMA, NOW_TAU, NOW_STRESS, NOW_X, NOW_SEGMENT = 55, 56, 57, 58, 59, 60
     Z_OLD = 61
-    """The first unknown of the balances at the start of the last step."""
+    """First unknown of the balances at the start of the last step."""
     H_OLD = 62
-    """Length of the last step that was accepted."""
+    """Size of the last accepted step."""
     PULL, STRETCH = 63, 64
-    """Of a drive that is let go and moves on, at the end of the last segment: its force less that of steady sliding,
-    and what its motion alone would make of it with the load point at rest."""
+    """Force (less that of steady sliding) of a drive that is let go and moves on, at the end of the last segment, and
+    the part of it that the drive's own motion would cause with the load point at rest."""
 
 
 TALLIED = Row.NOW_SEGMENT - Row.EVENTS + 1
-"""Numbers from `Row.EVENTS` to `Row.NOW_SEGMENT`, of the first contact; those of others have a group of their own."""
+"""Number of rows of event statistics (EVENTS to NOW_SEGMENT); those of further contacts are a group of their own."""
 
 
 MOST_FAILURES = 400.0
-"""Steps in a row that may be in vain. A block with mass that is stopped falls by hundreds of decades in a moment: so
-much shorter may the step have to be than the one before."""
-SLIP_EVENT = 2.0  # peak velocity of a slip event over that of the load point, at least: a block that sticks between
-# slips, on a spring and constant friction, exceeds twice (see docs/explanation/motion.md)
+"""Rejected steps in a row after which a job stops. A stopping block with mass slows down by hundreds of decades in a
+moment, and steps have to shrink as much."""
+SLIP_EVENT = 2.0  # least ratio of peak velocity to load-point velocity of a slip event: stick-slip of a block on a
+# spring with constant friction exceeds 2 (see docs/explanation/motion.md)
 
 
 class Out(IntEnum):
-    """Places of the outputs, counted from the end of the state."""
+    """Indices of a contact's outputs, counted from the end of the state."""
 
     V, ACCELERATION, SIGMA, TAU, T, V_LP, ADVANCE, W_SLOPE, UNKNOWN, PLACE, SHARE, COUNT = range(12)
-    """V_LP is the velocity of the load point as the contact feels it, ADVANCE the way of the load point since the start
-    of the segment. W_SLOPE is the slope of the dense output of the velocity variable and UNKNOWN a guess of the first
-    unknown of the balances: outputs need both. PLACE is the distance slipped since the start of the run, SHARE the
-    slip rate in steady sliding over that of the first contact. Further contacts follow, COUNT numbers each, then
-    events, what else is observed, and guesses of further unknowns. What `observe` gives of a contact ends with
-    ADVANCE."""
+    """V_LP is the load-point velocity times the contact's share of it, ADVANCE the load point's displacement since the
+    start of the segment. W_SLOPE is the derivative of the dense output of the velocity variable and UNKNOWN a guess of
+    the first unknown of the balances; both are inputs of the routine `outputs`. PLACE is the distance slipped since the
+    start of the run, SHARE the slip rate in steady sliding over that of the first contact. Each further contact has
+    COUNT numbers; then follow event functions, further observables and guesses of further unknowns. `observe` returns
+    those up to ADVANCE."""
 
 
 class Setting(IntEnum):
-    """Columns of the settings of a trajectory; absolute tolerances of the state follow, then guesses and scales of
-    further unknowns."""
+    """Columns of the settings of a trajectory; absolute tolerances of the state, then guesses and scales of further
+    unknowns follow."""
 
     RTOL, MOST_STEPS, V_HIGH, V_LOW, SIGMA_LOW, WATCH, RECORD = 0, 1, 2, 3, 4, 5, 6
     GUESS, Z_SCALE, FIRST_STEP, V_DRIVE, ATOL = 7, 8, 9, 10, 11
@@ -97,25 +97,25 @@ SETTINGS = tuple(setting.name.lower() for setting in Setting if setting < Settin
 
 
 class Cursor(IntEnum):
-    """Where a chain of calls stands."""
+    """Elements of the array that carries the progress of a series of calls of `advance`."""
 
     NEXT_JOB, LAST_JOB, BUSY, PAUSED, LOGGED, RECORDED, FIRST_JOB, SIZE = 0, 1, 2, 3, 4, 5, 6, 7
 
 
 class Status(IntEnum):
-    """How a trajectory ended."""
+    """End of a trajectory."""
 
     RUNNING, DONE, CONTACT_LOST, BLOW_UP, TOO_MANY_STEPS, STUCK, NO_VELOCITY = 0, 1, 2, 3, 4, 5, 6
 
 
 class EventPlace(IntEnum):
-    """Places of the events that the driver knows in `steadyslip.kernels.events.EVENTS`."""
+    """Indices in `steadyslip.kernels.events.EVENTS` of the events that the driver treats specially."""
 
     SLIP, TURN, CONTACT = 0, 1, 2
 
 
 class Kind(IntEnum):
-    """What a row of the log says: 2 e + 1 where event number e falls, 2 e + 2 where it rises.
+    """Kind of a row of the log: 2 e + 1 where event function e falls through zero, 2 e + 2 where it rises.
 
     Events of further contacts have higher numbers, in the same order.
     """
@@ -124,11 +124,11 @@ class Kind(IntEnum):
 
 
 LOG_COLUMNS = 8
-"""Kind, time, v, sigma, tau, T, slip, segment."""
+"""Columns of the log: kind, time, v, sigma, tau, T, slip, segment."""
 
 
-# A *point* is what is written down of a trajectory at a moment: the first unknown of the balances, the state, then
-# further unknowns. Where forces balance at several velocities, the state alone does not say which of them is meant.
+# A *point* is the full state at a moment: first unknown of the balances, state, further unknowns. Unknowns are stored
+# because the state alone does not determine them where forces balance at several velocities.
 
 
 class Sampled(IntEnum):
@@ -138,62 +138,64 @@ class Sampled(IntEnum):
 
 
 class Recorded(IntEnum):
-    """Columns of the solver's own steps."""
+    """Columns of the recorded solver steps."""
 
     TIME, SEGMENT, POINT, STATE = 0, 1, 2, 3
 
 
 class Final(IntEnum):
-    """Columns of where a trajectory ended."""
+    """Columns of the final state of a trajectory."""
 
     TIME, SEGMENT, ACCEPTED, REJECTED, POINT, STATE = 0, 1, 2, 3, 4, 5
 
 
 class Layout(NamedTuple):
-    """Sizes of one kernel, and where the groups of its record begin."""
+    """Sizes of one kernel and indices of the groups of its record (first row of each)."""
 
     lanes: int
     size: int
     """Length of the state."""
     kept: int
-    """Number of variables that jumps leave alone."""
+    """Number of variables that jumps leave unchanged."""
     constants: int
     inputs: int
-    """Channels of what is done to the rig: velocity of the load point, pushes, normal stresses."""
+    """Number of input channels: load-point velocity, pushes, normal stresses."""
     harmonics: int
-    """Sine waves of each."""
+    """Number of sine waves of each input."""
     stages: int
-    """That are kept for dense output; none without."""
+    """Number of stages kept for dense output; 0 without it."""
     extra: int
-    """Whether dense output has stages of its own: then steps are long."""
+    """1 if dense output needs stages of its own: methods of high order, whose steps are long."""
     contacts: int
     events: int
-    """That are watched, of all contacts; none without dense output."""
+    """Number of event functions of all contacts; 0 without dense output."""
     further: int
-    """How many other quantities are observed."""
+    """Number of further observables."""
     watched: int
-    """Whether frequent events are found in all lanes at once."""
+    """1 if frequent events are found in all lanes at once."""
     massless: int
-    """How many balances are solved after a jump, for the unknowns and for velocity variables."""
+    """Number of balances solved after a jump, for unknowns and velocity variables."""
     unknowns: int
-    """How many unknowns balances fix at every moment."""
+    """Number of unknowns that balances fix at every moment."""
     solved: int
-    """Whether the balances have to be solved to restore the variables that jumps leave alone."""
+    """1 if the balances have to be solved to restore the variables that jumps leave unchanged."""
     w: int
-    """Place in the state of the velocity variable, or the first of those that balances fix; -1 if none is there."""
+    """Index in the state of the (first) velocity variable that balances fix after a jump; -1 if none is in the
+    state.
+    """
     own: int
     """Length of the state without sensitivities."""
     directions: int
     x: int
-    """Place of the slip in the state."""
+    """Index of the slip in the state."""
     state: int
     rate: int
     continuous: int
     atol: int
     level: int
-    """Inputs at the start of the segment,"""
+    """Inputs at the start of the segment."""
     slope: int
-    """their slopes, and their waves."""
+    """Slopes of the inputs; then amplitudes, angular frequencies and phases of their waves."""
     amplitude: int
     omega: int
     phase: int
@@ -201,27 +203,27 @@ class Layout(NamedTuple):
     old: int
     stage: int
     curve: int
-    """Dense output of the last step: coefficients of powers of the fraction of it, variable by variable."""
+    """Dense output of the last step: per variable, coefficients of powers of the fraction of the step."""
     mark: int
-    """Values of the functions of events."""
+    """Values of the event functions at the end of the step."""
     happened: int
-    """Which of them changed sign in the last step: 1 rose, -1 fell."""
+    """Sign changes of event functions in the last step: 1 rose, -1 fell."""
     counted: int
-    """How often each kind of event happened."""
+    """Number of events so far, by kind."""
     seen: int
     before: int
     guess: int
-    """Guesses of further unknowns and velocity variables that balances fix,"""
+    """Guesses of further unknowns and of velocity variables that balances fix."""
     scale: int
-    """and their scales."""
+    """Scales of further unknowns."""
     earlier: int
     """Further unknowns at the start of the last step."""
     elsewhere: int
-    """Velocity, normal stress and velocity again at further contacts, the latter two as shares of the first's."""
+    """Per further contact: velocity, then normal stress and velocity as shares of the first contact's."""
     tallies: int
-    """What is known about slip events of further contacts."""
+    """Event statistics of further contacts."""
     jumped: int
-    """Of each contact: velocity before a jump, and whether it slipped."""
+    """Per contact: velocity before a jump, and whether it slipped."""
     rows: int
 
 
@@ -231,7 +233,7 @@ def make_layout(
     directions: int = 0, x: int = 0, seen: int = 0, events: int = 0, watched: bool = False, extra: bool = False,
     contacts: int = 1, further: int = 0,
 ) -> Layout:  # fmt: skip
-    """Put the groups one behind the other."""
+    """Layout with the groups of the record one after the other."""
     waves, further_ones = inputs * harmonics, max(massless, unknowns, 1) - 1
     sizes = {
         "state": size, "rate": size, "continuous": kept, "atol": size, "level": inputs, "slope": inputs,
@@ -261,27 +263,25 @@ Routine = Callable[[Array, float, Array], None]
 
 
 class Routines(NamedTuple):
-    """The straight-line functions of one model, each ``(record, number, array) -> None``.
+    """Straight-line functions of one model, each ``(record, number, array) -> None``.
 
-    The driver runs with plain Python functions as it stands; compiled, it is given their addresses instead.
-
+    The driver takes Python functions, or their addresses when it is compiled.
     Attributes
     ----------
     step : one step of every lane
-    rates : rates, outputs and gap of the record's state
-    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then functions of events;
-        the unknowns of the balances are looked for near ``array[size + Out.UNKNOWN]`` and what stands at the end, and
-        stand there afterwards
-    restore : the variables that a jump leaves alone, from the record's state; what the load point moved is added up
-    shift : these, when the load point has jumped ahead by `number`
-    place : the record's state from them and from the velocity variables that balances fix
-    balance : ``array`` = residuals of the balances that are solved after a jump at the record's guesses, then their
-        derivatives, row by row
-    dense : ``array[:size]`` = state at the fraction `number` of the last step, and `Out.W_SLOPE`, unknowns
-    extend : the dense output of the last step, made ready for `dense`
-    watch_group : of `GROUP` lanes from lane `number` on: frequent events within the last step, found and tallied
-    rates_lanes, see_lanes : of every lane: the rates; what is observed
-    extend_lanes, look_lanes : of every lane: `extend`; what was observed at `Row.NEXT`, within the last step
+    rates : rates, outputs and event functions at the record's state
+    outputs : ``array[size:]`` = `Out` of the state ``array[:size]`` at local time `number`, then event functions; reads
+        guesses of the unknowns from ``array[size + Out.UNKNOWN]`` and its last elements, and writes the unknowns there
+    restore : variables that a jump leaves unchanged, from the record's state; adds the load point's displacement
+    shift : these variables after a jump of the load point by `number`
+    place : the record's state from these variables and the velocity variables that balances fix
+    balance : ``array`` = residuals of the balances that are solved after a jump at the guesses, their slopes in
+        their own unknowns, and Newton's changes
+    dense : ``array[:size]`` = state at the fraction `number` of the last step, with `Out.W_SLOPE` and unknowns
+    extend : polynomials of the dense output of the last step, which `dense` reads
+    watch_group : frequent events within the last step, for `GROUP` lanes from lane `number` on
+    rates_lanes, see_lanes : rates; observables (all lanes)
+    extend_lanes, look_lanes : `extend`; observables at `Row.NEXT`, within the last step (all lanes)
     """
 
     step: Routine

@@ -1,4 +1,4 @@
-"""LLVM assembly to machine code, and machine code into this process."""
+"""Compilation of LLVM assembly to machine code, and its loading into this process."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from typing import Any
 from steadyslip.kernels.printers.native.lines import MEMORY, Lines
 
 SPEED = 3
-"""How hard LLVM tries."""
+"""Optimisation level of LLVM for the driver."""
 STRAIGHT = 1
-"""The same for routines of a model: it leads to the same machine code, byte for byte, in less time."""
-_MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe")  # for code in memory, LLVM writes ELF, on Windows too, and on macOS Mach-O
+"""Optimisation level for routines of a model: same machine code, byte for byte, in less time."""
+_MAGIC = (b"\x7fELF", b"\xcf\xfa\xed\xfe")  # first bytes of ELF (also on Windows, for code in memory) and Mach-O
 FEATURES: list[str] = []
-"""Features of the processor to be used, or not (``-``), besides those that LLVM finds: for benchmarks."""
+"""Processor features to use, or not (``-``), besides those that LLVM detects: for benchmarks."""
 
 
 def opaque() -> bool:
-    """Whether pointers of this LLVM say nothing of what they point to."""
+    """True if pointers of this LLVM have no element type (from version 17 on)."""
     import llvmlite.binding as llvm
 
     return bool(llvm.llvm_version_info[0] >= 17)
 
 
 def pointer() -> str:
-    """How this LLVM writes a pointer to a real number."""
+    """Type of a pointer to a real number in the assembly of this LLVM."""
     return Lines(opaque()).pointer("real")
 
 
@@ -44,7 +44,7 @@ def _processor() -> tuple[str, str]:
 
     try:
         features = llvm.get_host_cpu_features().flatten()
-    except RuntimeError:  # LLVM does not know on every system
+    except RuntimeError:  # detection is not available on every system
         features = ""
     return llvm.get_host_cpu_name(), ",".join(filter(None, [features, *FEATURES]))
 
@@ -55,14 +55,14 @@ def _target() -> Any:
 
 
 def _new_target() -> Any:
-    """What machine code is made for: this very processor."""
+    """Target machine of LLVM: this processor."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     target = llvm.Target.from_triple(llvm.get_process_triple())
     name, features = _processor()
-    where = "static" if target.name.startswith("x86") else "default"  # as LLVM wants it for code in memory
+    where = "static" if target.name.startswith("x86") else "default"  # LLVM's requirement for code in memory
     return target.create_target_machine(
         cpu=name, features=features, opt=SPEED, reloc=where, codemodel="jitdefault", jit=True
     )
@@ -70,12 +70,12 @@ def _new_target() -> Any:
 
 @lru_cache(maxsize=1)
 def _engine() -> Any:
-    """What takes machine code into memory."""
+    """Execution engine of LLVM, which loads machine code into memory."""
     import llvmlite.binding as llvm
 
     for name in MEMORY:
         llvm.add_symbol(name, ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value)
-    machine = _new_target()  # which will be the engine's own
+    machine = _new_target()  # owned by the engine from here on
     return llvm.create_mcjit_compiler(llvm.parse_assembly(_head(machine)), machine)
 
 
@@ -86,14 +86,14 @@ def _head(machine: Any) -> str:
 
 
 def machine_code(text: str, effort: int = SPEED) -> bytes:
-    """A module of assembly as an object file."""
+    """Object file of a module of assembly."""
     import llvmlite.binding as llvm
 
     machine = _target()
     module = llvm.parse_assembly(_head(machine) + text)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=effort)
-    # what has to be fast has no loops, or is written in vectors; the driver's loops would take half of all compilation
+    # fast code has no loops or is written as vectors; optimising the driver's loops would take half of the compile time
     options.loop_unrolling = options.loop_vectorization = options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
@@ -101,12 +101,12 @@ def machine_code(text: str, effort: int = SPEED) -> bytes:
 
 
 def is_machine_code(content: bytes, symbols: Iterable[str]) -> bool:
-    """Whether something looks like an object file with these functions: LLVM ends the process if it is none."""
+    """True if bytes look like an object file with these functions (LLVM would end the process if they were not)."""
     return content.startswith(_MAGIC) and all(symbol.encode() in content for symbol in symbols)
 
 
 def linked(code: bytes, symbols: Mapping[str, str]) -> dict[str, int]:
-    """Addresses of functions of an object file, which stays in memory from now on."""
+    """Addresses of functions of an object file, which stays in memory until the process ends."""
     import llvmlite.binding as llvm
 
     engine = _engine()

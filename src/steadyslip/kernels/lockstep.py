@@ -1,9 +1,9 @@
-"""The kernel that takes all lanes through one table of inputs together, with sensitivities.
+"""Kernel of fits: all lanes follow one table of inputs together, with sensitivities.
 
-Measured histories have a breakpoint at every sample. Lanes that each looked after their own breakpoints would spend
-most of their time there; lanes that share the samples of one record need not: they enter every row of the table
-together, each takes as many steps of its own size as it needs, and all wait for the last. What is observed and its
-derivatives in several directions are looked up at every sample, from the dense output of steps that pass many.
+Measured histories have a breakpoint at every sample. Lanes with breakpoints of their own would spend most time there;
+lanes that share the samples of one record enter each row of the table together, take steps of their own size and wait
+for the last one. The observable and its derivatives in several directions are interpolated at every sample by dense
+output.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from steadyslip.model.reduction import V_LP, P, Q, Reduction
 
 
 class LockstepKernel(Formulation):
-    """Writes the programs of one such kernel.
+    """Writer of the programs of one lockstep kernel.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class LockstepKernel(Formulation):
     choice : Choice
         Of level ``linear``, not dense.
     observed : sympy.Expr
-        What is written down, in terms of state, unknown and inputs.
+        Observable in terms of state, unknowns and inputs.
     """
 
     varied_inputs = (V_LP, Q, P)
@@ -41,15 +41,15 @@ class LockstepKernel(Formulation):
         super().__init__(reduction, choice)
 
     def _write(self) -> None:
-        self.counted = self.own  # sensitivities have tolerances of their own, and are not diluted by each other
+        self.counted = self.own  # the error norm averages without sensitivities, which have tolerances of their own
         super()._write()
         self.full = self.rates
-        expression = self._fixed(self.observed)
+        expression = self._with_constants(self.observed)
         wanted = [expression]
         for direction, column in enumerate(self.reduction.directions):
             change = self._change(expression, direction)
             for variable, slope in zip(self.reduction.state[: self.own], column, strict=True):
-                change += self._fixed(self.reduction.derivative(self.observed, variable)) * slope
+                change += self._with_constants(self.reduction.derivative(self.observed, variable)) * slope
             wanted.append(change)
         self.seen = self._formulas(wanted)
 
@@ -73,15 +73,15 @@ class LockstepKernel(Formulation):
 
     @cached_property
     def programs(self) -> tuple[Program, ...]:
-        """What `steadyslip.kernels.driver.table` calls."""
+        """Programs that `steadyslip.kernels.driver.table` calls."""
         return self._step(), self._rates_program(), self._see_program(), self._extend_program(), self._look_program()
 
     def _step(self) -> Program:
-        """One step; a lane that has arrived stays as it is."""
+        """One step; a lane at the end of the row stays as it is."""
         step = Step(self)
         step.advance()
-        step.keep_stages()
-        step.keep_state()
+        step.store_stages()
+        step.store_state()
         load, store, good = step.program.load, step.program.store, step.good
         moves = select(step.rest > 0.0, 1.0, 0.0)
         store(Row.ERROR, select(as_node(good, "bool") & (step.rest > 0.0), step.size, step.earlier))
@@ -97,28 +97,30 @@ class LockstepKernel(Formulation):
         point = record.point(record.program.load(Row.TAU))
         for i, value in enumerate(record.evaluated(self.rates, point)):
             record.program.store(self.layout.rate + i, value)
-        record.keep_unknowns()
+        record.store_unknowns()
         return record.program
 
     def _see_program(self) -> Program:
-        """What is observed now."""
+        """Observable and derivatives at the current state."""
         record = Evaluator(self, Program("see_lanes"))
         return self._seen(record, record.point(record.program.load(Row.TAU)))
 
     def _extend_program(self) -> Program:
-        """The dense output of the last step, as polynomials."""
+        """Polynomials of the dense output of the last step."""
         record = Evaluator(self, Program("extend_lanes"))
-        record.keep_polynomials()
+        record.store_polynomials()
         return record.program
 
     def _look_program(self) -> Program:
-        """What was observed within the last step, so far into the row as is asked for."""
+        """Observable and derivatives at `Row.NEXT`, within the last step."""
         record = Evaluator(self, Program("look_lanes"), extended=True)
         load = record.program.load
         moment = load(Row.NEXT)
         theta = (moment - load(Row.TAU_OLD)) / load(Row.DONE)
-        record.z = record.guesses_between(theta)
-        return self._seen(record, record.inputs(moment) | {f"y{i}": y for i, y in enumerate(record.between(theta))})
+        record.z = record.guesses_at_fraction(theta)
+        return self._seen(
+            record, record.inputs(moment) | {f"y{i}": y for i, y in enumerate(record.state_at_fraction(theta))}
+        )
 
     def _seen(self, record: Evaluator, point: Values) -> Program:
         for i, value in enumerate(record.evaluated(self.seen, point)):
@@ -126,7 +128,7 @@ class LockstepKernel(Formulation):
         return record.program
 
     def input_rates(self) -> tuple[int, ...]:
-        """Where the rates of change of the inputs lie among the constants, direction by direction; -1 if nowhere."""
+        """Indices of the rates of change of inputs among the constants, by direction and input; -1 if absent."""
         order = {pair: len(self.constants.symbols) + i for i, pair in enumerate(self.constants.rates)}
         directions = range(len(self.reduction.directions))
         return tuple(order.get((c, d), -1) for d in directions for c in self.varied_inputs)

@@ -1,4 +1,4 @@
-"""The integration methods: explicit and Rosenbrock pairs, checked against their order conditions.
+"""Integration methods: explicit and Rosenbrock pairs, checked against their order conditions.
 
 An explicit Runge-Kutta step is y1 = y0 + h Σ b_i k_i with k_i = f(y0 + h Σ a_ij k_j); a Rosenbrock step in
 the form of Hairer & Wanner (Solving ODEs II, IV.7) solves (1/(hγ) − J) u_i = f(y0 + Σ A_ij u_j) +
@@ -17,7 +17,7 @@ import numpy as np
 from steadyslip.kernels import dop853 as table
 
 Tree = tuple["Tree", ...]
-_ROUNDING = 2e-9  # published coefficients carry about ten digits beyond the point where they cancel
+_ROUNDING = 2e-9  # largest defect of an order condition: coefficients are published with ten digits or more
 
 
 @cache
@@ -52,7 +52,9 @@ Known = dict[Tree, np.ndarray]
 
 
 def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray, known: Known) -> np.ndarray:
-    """Elementary weights of every stage; a node with one branch sees the linear part too (beta)."""
+    """Elementary weight of a tree for each stage; a node with one branch uses β, which has the linear part,
+    others α.
+    """
     if tree not in known:
         through = beta if len(tree) == 1 else alpha
         product = np.ones(len(alpha))
@@ -65,7 +67,7 @@ def _weights(tree: Tree, alpha: np.ndarray, beta: np.ndarray, known: Known) -> n
 def order_defect(
     b: np.ndarray, alpha: np.ndarray, beta: np.ndarray, order: int, theta: float = 1.0, known: Known | None = None
 ) -> float:
-    """The largest violation of an order condition up to `order`, for the result at t0 + theta h."""
+    """Largest violation of an order condition up to `order`, for the result at t0 + theta h."""
     worst, known = 0.0, {} if known is None else known
     for nodes in range(1, order + 1):
         for tree in rooted_trees(nodes):
@@ -76,7 +78,7 @@ def order_defect(
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """A tableau.
+    """Coefficients (tableau) of an integration method.
 
     Attributes
     ----------
@@ -135,17 +137,17 @@ class Method:
 
     @property
     def stages(self) -> int:
-        """Of a step."""
+        """Number of stages of a step."""
         return len(self.error)
 
     @property
     def all_stages(self) -> int:
-        """Those of dense output included."""
+        """Number of stages including those of dense output alone."""
         return self.stages if self.implicit else len(self.a)
 
     @cached_property
     def dense_stages(self) -> tuple[int, ...]:
-        """Stages of a step on which its dense output depends."""
+        """Indices of the stages that dense output depends on."""
         if self.implicit:
             return tuple(range(self.stages))
         rows = self._full(list(self.a))[self.stages :]
@@ -153,7 +155,7 @@ class Method:
         return tuple(i for i in range(self.stages) if weights[:, i].any())
 
     def arguments(self) -> list[tuple[float, ...]]:
-        """For every stage and then the result: weights of the earlier stages in its argument."""
+        """Weights of the earlier stages in the argument of each stage, and in the result (last row)."""
         rows = [tuple(row) for row in self.a]
         while self.implicit and len(rows) <= self.stages:
             rows.append((*rows[-1], *(0.0,) * (len(rows) - 1 - len(rows[-1])), 1.0))
@@ -161,7 +163,7 @@ class Method:
 
     @cached_property
     def _lower(self) -> np.ndarray:
-        """Γ of a Rosenbrock method in terms of k_i: u = Γ k (with h left out)."""
+        """Matrix Γ of a Rosenbrock method, with stages u = Γ k (without h)."""
         matrix = np.eye(self.stages) / self.gamma
         for i, row in enumerate(self.c):
             matrix[i, : len(row)] -= row
@@ -200,13 +202,13 @@ class Method:
 
     @cached_property
     def nodes(self) -> tuple[float, ...]:
-        """Fraction of the step at which each stage sees the inputs."""
+        """Fraction of the step at which each stage evaluates the inputs."""
         alpha = self._canonical()[2]
         return tuple(float(x) for x in np.round(alpha.sum(axis=1), 14))
 
     @cached_property
     def time_weights(self) -> tuple[float, ...]:
-        """Rosenbrock: weight of h ∂f/∂t in each stage."""
+        """Weight of h ∂f/∂t in each stage of a Rosenbrock method."""
         return tuple(float(x) for x in np.round(self._lower.sum(axis=1), 14))
 
 

@@ -1,4 +1,4 @@
-"""Newton's method for the unknowns of a Model within a program: rounds without branches."""
+"""Newton's method for the unknowns of a Model within a straight-line program: a fixed number of iterations."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from steadyslip.core.errors import InternalError
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.nodes import Loop, Node, Value, as_node, larger, select, smaller
 
-NEWTON_STEPS = 6
-LARGEST = 2.0  # change of a velocity variable that is a logarithm, or like one, in a round
+NEWTON_STEPS = 6  # iterations from the guess of the last stage; chosen by trial: each costs as much as the residuals
+MAX_LOG_STEP = 2.0  # largest change of ln v (or asinh v) in one iteration; chosen by trial, against overshoot
 
 
 def solved(
     kernel: Formulation, given: Mapping[str, Value], near: Sequence[Value], scales: Sequence[Value]
 ) -> list[Value]:
-    """The unknowns at the values that are given, by a fixed number of rounds; the failure is NaN, in all of them."""
+    """Unknowns at given values by a fixed number of Newton iterations; all NaN where these do not converge."""
     residuals, n = kernel.residuals, kernel.unknowns
     if residuals is None:
         raise InternalError("residuals where there are unknowns")
@@ -25,7 +25,7 @@ def solved(
         found = residuals({**given, **kernel.named(z)})
         changes = eliminated(dict(zip(kernel.slopes, found[n:], strict=True)), found[:n])
         for k in clamped:
-            changes[k] = smaller(larger(changes[k], -LARGEST), LARGEST)
+            changes[k] = smaller(larger(changes[k], -MAX_LOG_STEP), MAX_LOG_STEP)
         after = [own - change for own, change in zip(z, changes, strict=True)]
         return after, [*after, *changes]
 
@@ -41,7 +41,7 @@ def solved(
 
 
 def _clamped(kernel: Formulation) -> list[int]:
-    """Unknowns that are velocity variables, but for velocities themselves."""
+    """Indices of unknowns that are a logarithm (or asinh) of a velocity, whose steps are limited."""
     reduction = kernel.reduction
     variables = [one.variable for one in reduction.slidings if one.variable is not None]
     own = {variable.w for variable in variables if variable.kind != "linear"}
@@ -49,8 +49,8 @@ def _clamped(kernel: Formulation) -> list[int]:
 
 
 def eliminated(matrix: Mapping[tuple[int, int], Value], right: Sequence[Value]) -> list[Value]:
-    """The solution of linear equations, whose largest entry of each column is brought to the diagonal; entries that are
-    not there are zero whatever the numbers.
+    """Solution of linear equations by elimination with partial pivoting; entries absent from `matrix` are exact
+    zeros.
     """
     n, right = len(right), list(right)
     rows = [{k: value for (i, k), value in matrix.items() if i == row} for row in range(n)]

@@ -1,9 +1,8 @@
-"""Straight-line programs: typed operations in the order in which they were written, and where results are stored.
+"""Straight-line programs: typed operations in order of definition, and the array elements that they store.
 
-A `Node` is one operation. Arithmetic on nodes makes nodes, so that a method's step or a friction law written as
-ordinary Python becomes a program when it is run once; a printer (`printers/`) turns that into code.
-Branches are selections and there are no calls but to the listed primitives, so that every target, vector code
-included, takes the same program.
+A `Node` is one operation. Arithmetic on nodes makes nodes, so that a method's step written as ordinary Python becomes a
+program when it is run once; a printer (`printers/`) turns that into code. There are selections instead of branches and
+no calls except to the listed primitives, so that every target, vector code included, takes the same program.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ PRIMITIVES = (
     "exp", "log", "log1p", "expm1", "sinh", "cosh", "tanh", "asinh", "asinh_exp", "sin", "cos", "sqrt", "power", "sign",
     "rough_log",
 )  # fmt: skip
-"""Elementary functions that programs may use; `steadyslip.kernels.primitives` says what they are."""
+"""Elementary functions that programs may use, defined in `steadyslip.kernels.primitives`."""
 _order = itertools.count()
 
 
@@ -29,15 +28,15 @@ class Node:
     ----------
     op : str
     args : tuple
-        Nodes, or for the leaves (``number``, ``load``, ``argument``, ``carried``) what they mean.
+        Nodes; for the leaves (``number``, ``load``, ``argument``, ``carried``) a value or an address.
     kind : str
         ``real``, ``int`` or ``bool``.
     loop : Loop or None
-        The loop in which it has to be computed.
+        The loop in which it is computed.
     operands : tuple of Node
-        Those of `args` that have to be computed before.
+        Nodes in `args`, to be computed before.
     order : int
-        Rises in the order in which nodes were made.
+        Position in the order in which nodes were made.
     """
 
     __slots__ = ("args", "kind", "loop", "op", "operands", "order")
@@ -118,7 +117,7 @@ Value = Node | float
 
 
 def as_node(value: Any, kind: str = "real") -> Node:
-    """A number as a node; a node as it is."""
+    """Convert a number to a node; nodes are unchanged."""
     if isinstance(value, Node):
         return value
     return Node("number", (int(value) if kind == "int" else bool(value) if kind == "bool" else float(value),), kind)
@@ -135,17 +134,17 @@ def select(condition: Any, value: Any, other: Any) -> Any:
 
 
 def larger(a: Any, b: Any) -> Any:
-    """The larger of two; `a` where `b` is NaN, as Python's max."""
+    """Maximum of two values; `a` where `b` is NaN, as Python's max."""
     return select(b > a, b, a)
 
 
 def smaller(a: Any, b: Any) -> Any:
-    """The smaller of two; `a` where `b` is NaN, as Python's min."""
+    """Minimum of two values; `a` where `b` is NaN, as Python's min."""
     return select(b < a, b, a)
 
 
 def primitive(name: str, *arguments: Any) -> Node:
-    """One of `PRIMITIVES` of nodes."""
+    """Node that applies one of `PRIMITIVES`."""
     return Node(name, tuple(map(as_node, arguments)))
 
 
@@ -160,7 +159,7 @@ def log(x: Node) -> Node:
 
 
 def weighted(weights: Iterable[float], terms: Iterable[Value]) -> Value:
-    """A weighted sum, zero weights left out."""
+    """Weighted sum; terms of weight zero are left out."""
     parts = [term if weight == 1.0 else weight * term for weight, term in zip(weights, terms, strict=False) if weight]
     if not parts:
         return 0.0
@@ -171,7 +170,7 @@ def weighted(weights: Iterable[float], terms: Iterable[Value]) -> Value:
 
 
 class Loop:
-    """A fixed number of rounds that carry some values from one to the next.
+    """Loop with a fixed number of rounds, which carry values from one round to the next.
 
     Attributes
     ----------
@@ -190,23 +189,23 @@ class Loop:
         self.following, self.results = tuple(following), tuple(results)
 
     def outcome(self) -> list[Node]:
-        """The results, for what comes after the loop."""
+        """Nodes of the results, for use after the loop."""
         return [Node("result", (self, i)) for i in range(len(self.results))]
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """What every round computes, in order."""
+        """Nodes that each round computes, in order."""
         return [node for node in reachable([*self.following, *self.results]) if node.loop is self]
 
     @cached_property
     def given(self) -> list[Node]:
-        """What has to be there before the first round."""
+        """Nodes needed before the first round."""
         wanted = [*self.following, *self.results, *(a for node in self.nodes for a in node.operands)]
         return [*self.start, *(node for node in wanted if node.loop is None)]
 
 
 def reachable(ends: Iterable[Node]) -> list[Node]:
-    """All nodes that some depend on, and these, in the order in which they were made; not into loops before them."""
+    """Nodes that `ends` depend on, and `ends`, in order of definition; loops before them count as one node."""
     found: dict[int, Node] = {}
     waiting = list(ends)
     while waiting:
@@ -220,7 +219,7 @@ def reachable(ends: Iterable[Node]) -> list[Node]:
 
 @dataclass(eq=False)
 class Program:
-    """One function ``(record, number, array) -> None``.
+    """Function ``(record, number, array) -> None`` as a straight-line program.
 
     Loads see the record as it was when the function was called.
     """
@@ -231,16 +230,16 @@ class Program:
     _loads: dict[tuple[str, int], Node] = field(default_factory=dict)
 
     def load(self, place: int, array: str = "R") -> Node:
-        """Number `place` of the record R or of the array y."""
+        """Node that loads element `place` of the record R or of the array y."""
         key = (array, int(place))
         if key not in self._loads:
             self._loads[key] = Node("load", key)
         return self._loads[key]
 
     def store(self, place: int, value: Value, array: str = "R") -> None:
-        """Write a number."""
+        """Store a value in an element."""
         self.stores.append((array, int(place), as_node(value)))
 
     def nodes(self) -> list[Node]:
-        """Everything that is computed, in order."""
+        """Nodes to be computed, in order."""
         return reachable([node for _, _, node in self.stores])

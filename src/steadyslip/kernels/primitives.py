@@ -1,14 +1,14 @@
-"""Elementary functions for kernels: free of branches and calls, so that lanes vectorise.
+"""Elementary functions for kernels, free of branches and calls so that lanes vectorise.
 
-Written for nodes of a program and for plain numbers alike. Each is within 5 units in the last place, 2^-52 of its
-value, of the exact one for every float, as tests/kernels/test_primitives.py measures, but for what its docstring says.
-For all of them:
+They take nodes of a program or plain numbers. Except where a docstring gives another bound, each is within 5 units in
+the last place (2^-52 of its value) of the exact function, for every float (measured by
+tests/kernels/test_primitives.py). For all of them:
 
-- NaN gives NaN, and the sign of zero is not kept.
-- e^x is taken as e^±700 beyond ±700, so that no step meets an infinity: e^x itself, and what grows or falls as it does.
-- A logarithm takes numbers below 2.2e-308, zero among them, as 2.2e-308: it is finite at zero, and v ln v is 0 at rest.
+- NaN gives NaN; the sign of zero is lost.
+- The argument of an exponential is clipped to ±700, so that no step meets an infinity.
+- A logarithm treats arguments from 0 to 2.2e-308 as 2.2e-308: it is finite at zero, and v ln v is 0 at rest.
 
-`printers/runtime.js` keeps the same promises.
+`printers/runtime.js` follows the same rules.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from steadyslip.kernels.nodes import Node, larger, select, smaller
 ROUND = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer that sits in the low bits
 _DOUBLE, _LONG = struct.Struct("<d"), struct.Struct("<q")
 ONE = 0x3FF0000000000000  # the bits of 1.0
-LN2_HIGH, LN2_LOW = 0.6931471805598903, 5.497923018708371e-14  # the first with 42 bits: times 2^11 it is exact
+LN2_HIGH, LN2_LOW = 0.6931471805598903, 5.497923018708371e-14  # 42 bits of ln 2: n LN2_HIGH is exact for |n| < 2^11
 LN2 = math.log(2.0)
-TINY, HUGE = 2.0**-1022, (2.0 - 2.0**-52) * 2.0**1023  # the ends of numbers with 53 bits
-LARGE = 2.0**500  # its square is no infinity; asinh of what is beyond is ln 2z to the last bit
-QUARTER = (1.570796325802803, 9.920935774287987e-10, 2.2517417706346578e-18, 3.5215598651832e-27)  # pi/2 in parts
-FARTHEST = 2.0**45  # floats there are 1/128 apart, and turns can no longer be counted much further
+TINY, HUGE = 2.0**-1022, (2.0 - 2.0**-52) * 2.0**1023  # smallest and largest float with 53 significant bits
+LARGE = 2.0**500  # its square does not overflow; for larger z, asinh z = ln 2z to the last bit
+QUARTER = (1.570796325802803, 9.920935774287987e-10, 2.2517417706346578e-18, 3.5215598651832e-27)  # pi/2 as a sum
+FARTHEST = 2.0**45  # spacing of floats there is 1/128: beyond, the angle within a turn is hardly known
 
 
 def bits(x: Any) -> Any:
@@ -40,20 +40,20 @@ def bits(x: Any) -> Any:
 
 
 def real(i: Any) -> Any:
-    """The float with the 64 bits of an integer."""
+    """Float with the 64 bits of an integer."""
     if isinstance(i, Node):
         return Node("real", (i,))
     number = _DOUBLE.unpack(_LONG.pack((i + 2**63) % 2**64 - 2**63))[0]
-    return np.float64(number)  # division by zero gives infinity, as in machine code
+    return np.float64(number)  # NumPy's float, so that division by zero gives infinity as in machine code
 
 
 def _quick(x: Any) -> Any:
-    """Numbers as Python's own, with which it computes several times as fast as with NumPy's."""
+    """Convert a NumPy number to a Python float, several times as fast to compute with; nodes are unchanged."""
     return x if isinstance(x, Node) else float(x)
 
 
 def as_float(i: Any) -> Any:
-    """An integer as a float."""
+    """Convert an integer to a float."""
     return Node("float", (i,)) if isinstance(i, Node) else float(i)
 
 
@@ -67,13 +67,12 @@ def sqrt(x: Any) -> Any:
 def exp(x: Any) -> Any:
     """e^x to 2.5 units; e^±700 beyond ±700. Degree-13 polynomial on [-ln2/2, ln2/2], Estrin's scheme.
 
-    What each step of a trajectory waits for: all that can be known beforehand stays off the chain of operations from
-    x through r and its powers to the result.
+    Each step of a trajectory waits for it: the chain of dependent operations from x to the result is kept short.
     """
     x = _quick(x)
     shifted = x * 1.4426950408889634 + ROUND
     n = shifted - ROUND
-    r = x - n * LN2_HIGH  # exact; the rest of n ln 2 goes into the scale, 2^n e^-rest
+    r = x - n * LN2_HIGH  # exact; the remainder n LN2_LOW goes into the scale, 2^n e^-(n LN2_LOW)
     scale = real((bits(shifted) << 52) + ONE) * (1.0 - n * LN2_LOW)
     r2 = r * r
     r4 = r2 * r2
@@ -116,24 +115,24 @@ def log(x: Any) -> Any:
 
 
 def rough_log(x: Any) -> Any:
-    """ln x to within .03, for positive numbers: their bits, read as an integer, are all but a logarithm.
+    """ln x to within .03, for positive numbers: a float's bits, read as an integer, grow almost like its logarithm.
 
-    For step sizes, which wait for it and take it by a small power.
+    Enough for step sizes, which are a small power of it.
     """
-    return as_float(bits(_quick(x)) - ONE) * 1.539095918623324e-16 + 0.02983  # ln 2 / 2^52, and the mean error
+    return as_float(bits(_quick(x)) - ONE) * 1.539095918623324e-16 + 0.02983  # ln 2 / 2^52; mean error
 
 
 def log1p(x: Any) -> Any:
-    """ln(1 + x); NaN below -1, and at -1 and infinity what `log` gives at zero and infinity."""
+    """ln(1 + x); NaN below -1; at -1 and infinity the values of `log` at zero and infinity."""
     finite = smaller(x, HUGE)
     u = 1.0 + finite
     return log(u) - ((u - 1.0) - finite) / larger(u, TINY)
 
 
 def power(x: Any, y: Any) -> Any:
-    """x^y to 5 + 2 |y ln|x|| units, of x < 0 for whole y below 2^50 and else NaN; y is finite.
+    """x^y to 5 + 2 |y ln|x|| units, y finite; for x < 0 defined if y is an integer below 2^50, else NaN.
 
-    Zero to a positive power is 0, to a negative one what 2.2e-308 gives. Beyond e^±700 it is these.
+    Zero to a positive power is 0; to a negative power, that of 2.2e-308. Results are clipped to e^±700.
     """
     size, shifted = abs(x), y + ROUND
     turned = select(abs((shifted - ROUND) - y) <= 0.0, select((bits(shifted) & 1) > 0, -1.0, 1.0), math.nan)
@@ -142,14 +141,14 @@ def power(x: Any, y: Any) -> Any:
 
 
 def sinh(x: Any) -> Any:
-    """Hyperbolic sine; that of ±700 beyond."""
+    """Hyperbolic sine; beyond ±700 its value at ±700."""
     e = expm1(abs(x))
     y = 0.5 * (e + e / (e + 1.0))
     return select(x >= 0.0, y, -y)
 
 
 def cosh(x: Any) -> Any:
-    """Hyperbolic cosine; that of ±700 beyond."""
+    """Hyperbolic cosine; beyond ±700 its value at ±700."""
     e = exp(abs(x))
     return 0.5 * (e + 1.0 / e)
 
@@ -162,7 +161,7 @@ def tanh(x: Any) -> Any:
 
 
 def asinh(x: Any) -> Any:
-    """Inverse hyperbolic sine; at infinity 710.5, as of 2^1024."""
+    """Inverse hyperbolic sine; at infinity 710.5, that of 2^1024."""
     z = abs(x)
     is_large = z > LARGE
     y = log1p(select(is_large, z, z + z * z / (1.0 + sqrt(1.0 + z * z)))) + select(is_large, LN2, 0.0)
@@ -170,19 +169,19 @@ def asinh(x: Any) -> Any:
 
 
 def asinh_exp(x: Any, y: Any) -> Any:
-    """asinh(x e^y) to 15 units, without overflow; below -1400 y counts as -1400."""
+    """asinh(x e^y) to 15 units, without overflow; y is clipped to -1400 from below."""
     z = abs(x)
     half = exp(0.5 * y)
-    product = (z * half) * half  # neither overflows nor vanishes unless x e^y does
+    product = (z * half) * half  # overflows or underflows only where x e^y does
     near = log1p(product + product * product / (1.0 + sqrt(1.0 + product * product)))
     value = select(product > LARGE, log(z) + y + LN2, near)
     return select(x >= 0.0, value, -value)
 
 
 def _circular(x: Any, quarters: int) -> Any:
-    """Sine of an angle and some quarters of a turn, reduced by multiples of pi/2.
+    """Sine of x plus a number of quarter turns, with x reduced by multiples of pi/2.
 
-    That is written in four parts, three of them with 29 bits: up to 2^24 times each they are exact.
+    pi/2 is a sum of four parts, three of them with 29 bits, so that up to 2^24 multiples of each are exact.
     """
     shifted = x * 0.6366197723675814 + ROUND
     n = shifted - ROUND
@@ -203,15 +202,15 @@ def _circular(x: Any, quarters: int) -> Any:
 
 
 def sin(x: Any) -> Any:
-    """Sine for |x| up to 2.6e7; beyond of an angle within 4 units of x, and NaN beyond 2^45 (3.5e13)."""
+    """Sine for |x| up to 2.6e7; beyond, of an angle within 4 units of x; NaN beyond 2^45 (3.5e13)."""
     return _circular(x, 0)
 
 
 def cos(x: Any) -> Any:
-    """Cosine, as far and as near as `sin`."""
+    """Cosine, with the bounds of `sin`."""
     return _circular(x, 1)
 
 
 def sign(x: Any) -> Any:
-    """-1, 0 or 1."""
+    """Sign: -1, 0 or 1."""
     return select(x > 0.0, 1.0, select(x < 0.0, -1.0, x))

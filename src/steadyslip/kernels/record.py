@@ -1,4 +1,4 @@
-"""What programs of a kernel have in common: the numbers of a record, and equations evaluated with them."""
+"""Evaluation of equations within a program, with the numbers of a record."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ Values = dict[str, Value]
 
 
 def sine(x: Value) -> Node:
-    """Of a node."""
+    """sin x of a node."""
     return primitive("sin", x)
 
 
 def cosine(x: Value) -> Node:
-    """Of a node."""
+    """cos x of a node."""
     return primitive("cos", x)
 
 
 def times(value: Value, share: Value) -> Value:
-    """A product, left out where the share is one."""
+    """Product, left out where the share is one."""
     return value if not isinstance(share, Node) and share == 1 else share * value
 
 
 def horner(coefficients: Sequence[Value], x: Node) -> Value:
-    """A polynomial, lowest coefficient first."""
+    """Polynomial at x, lowest coefficient first, by Horner's rule."""
     value: Value = 0.0
     for coefficient in reversed(coefficients):
         value = coefficient + x * value
@@ -44,7 +44,7 @@ def horner(coefficients: Sequence[Value], x: Node) -> Value:
 
 
 def total(terms: Sequence[Value]) -> Value:
-    """Their sum, from the left."""
+    """Sum, from the left."""
     value = terms[0]
     for term in terms[1:]:
         value = value + term
@@ -57,8 +57,10 @@ def slope_of(coefficients: Sequence[Value]) -> list[Value]:
 
 
 @dataclass(frozen=True)
-class Moment:
-    """What is `steadyslip.kernels.events.Observed` at one moment; what is not asked for is not computed."""
+class EventArguments:
+    """Arguments of event functions at one moment (`steadyslip.kernels.events.Observed`); stresses computed on
+    demand.
+    """
 
     record: Evaluator
     point: Values
@@ -88,11 +90,11 @@ class Moment:
 
 
 class Evaluator:
-    """What every evaluation within one program reads: constants, inputs, the unknowns."""
+    """Evaluations within one program: constants, inputs, unknowns, dense output."""
 
     def __init__(self, kernel: Formulation, program: Program, extended: bool = False) -> None:
         self.kernel, self.program = kernel, program
-        self.extended = extended  # whether the dense output of the last step is there as polynomials
+        self.extended = extended  # dense output of the last step is stored as polynomials
         self._polynomials: dict[int, list[Value]] = {}
         layout, load = kernel.layout, program.load
         self.constants: Values = {s.name: load(layout.constant + i) for i, s in enumerate(kernel.constants.all)}
@@ -120,28 +122,28 @@ class Evaluator:
         return [(load(groups[0] + i), load(groups[1] + i), load(groups[2] + i)) for i in places]
 
     def load_advance(self, moment: Value) -> Value:
-        """How far the load point has moved since the start of the segment."""
+        """Displacement of the load point since the start of the segment."""
         load, layout = self.program.load, self.kernel.layout
         moved: Value = integral_to(moment, load(layout.level), load(layout.slope), self._waves(0), cosine)
         return moved
 
     def state(self) -> list[Node]:
-        """The record's own state."""
+        """State of the record."""
         return [self.program.load(self.kernel.layout.state + i) for i in range(self.kernel.size)]
 
     def point(self, moment: Value) -> Values:
-        """The record's state and the inputs at a local time."""
+        """State of the record and inputs at a local time."""
         return self.inputs(moment) | {f"y{i}": y for i, y in enumerate(self.state())}
 
     def evaluated(self, formulas: Formulas, point: Values, found: bool = False) -> list[Value]:
-        """Formulas at a point, the unknowns solved for there unless they are `found`."""
+        """Values of formulas at a point, after solving for the unknowns there unless they are `found`."""
         given = self.constants | point
         if self.z and not found:
             self.z = solved(self.kernel, given, self.z, self.scales)
         return formulas(given | self.kernel.named(self.z))
 
-    def keep_unknowns(self) -> None:
-        """Store them, as guesses for the next time."""
+    def store_unknowns(self) -> None:
+        """Store the unknowns as guesses for the next evaluation."""
         for k, z in enumerate(self.z):
             self.program.store(guess_at(self.kernel.layout, k), z)
 
@@ -149,7 +151,7 @@ class Evaluator:
 
     @cached_property
     def stages(self) -> list[list[Value]]:
-        """Stages of the last step: as they were kept, and computed if only dense output needs them."""
+        """Stages of the last step: loaded, or computed if only dense output needs them."""
         kernel, method, load, n = self.kernel, self.kernel.method, self.program.load, self.kernel.size
         place = [[kernel.layout.stage + s * n + i for i in range(n)] for s in range(method.stages)]
         found: list[list[Value]] = [[load(row) for row in rows] for rows in place]
@@ -162,7 +164,7 @@ class Evaluator:
         return found
 
     def polynomial(self, i: int) -> list[Value]:
-        """Dense output of state variable i: coefficients of powers of the fraction of the last step."""
+        """Dense output of state variable i: coefficients of powers of the fraction of the last step (cached)."""
         if i not in self._polynomials:
             self._polynomials[i] = self._polynomial(i)
         return self._polynomials[i]
@@ -176,11 +178,11 @@ class Evaluator:
             h, columns = load(Row.DONE), zip(*method.dense, strict=True)
             return [old, *(h * weighted(column, stages) for column in columns)]
         change = weighted(method.arguments()[method.stages], stages)
-        inner = [weighted(row, stages) for row in method.dense]  # of θ (1 − θ) inner(θ)
+        inner = [weighted(row, stages) for row in method.dense]  # coefficients of the polynomial in θ (1 − θ) inner(θ)
         return [old, change + inner[0], *(after - now for now, after in pairwise(inner)), -inner[-1]]
 
-    def course(self, i: int) -> list[Value]:
-        """The same with the rates at both ends, which the dense output of a Rosenbrock method does not have."""
+    def smooth_polynomial(self, i: int) -> list[Value]:
+        """Dense output of variable i corrected to have the exact rates at both ends (needed for Rosenbrock methods)."""
         found = list(self.polynomial(i))
         if not self.kernel.method.implicit:
             return found
@@ -192,19 +194,19 @@ class Evaluator:
         found[3] = found[3] + (first + last)
         return found
 
-    def between(self, theta: Node) -> list[Value]:
-        """The state at a fraction of the last step."""
+    def state_at_fraction(self, theta: Node) -> list[Value]:
+        """State at a fraction of the last step."""
         return [horner(self.polynomial(i), theta) for i in range(self.kernel.size)]
 
-    def keep_polynomials(self) -> None:
-        """Store the dense output of the last step."""
+    def store_polynomials(self) -> None:
+        """Store the polynomials of the dense output of the last step."""
         for i in range(self.kernel.size):
             for j, coefficient in enumerate(self.polynomial(i)):
                 self.program.store(self.kernel.layout.curve + i * self.kernel.terms + j, coefficient)
         self.program.store(Row.EXTENDED, 1.0)
 
-    def guesses_between(self, theta: Node) -> list[Value]:
-        """Near which the unknowns are at a fraction of the last step."""
+    def guesses_at_fraction(self, theta: Node) -> list[Value]:
+        """Guesses of the unknowns at a fraction of the last step, by linear interpolation."""
         found: list[Value] = []
         for k in range(self.kernel.unknowns):
             old = self.program.load(earlier_at(self.kernel.layout, k))
@@ -214,11 +216,13 @@ class Evaluator:
     # -- events
 
     def shares(self, contact: int) -> list[Value]:
-        """See `Formulation`."""
+        """Shares of a contact (see `Formulation`): slip rate over the drive's and first contact's, σ over that
+        one's.
+        """
         return self.kernel.shares(self.constants)[3 * contact : 3 * contact + 3]
 
-    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> Moment:
-        """What events are functions of, from the outputs v, acceleration and sigma of a contact at a point."""
+    def moment(self, point: Values, found: Sequence[Value], h: Value = 1.0, contact: int = 0) -> EventArguments:
+        """Arguments of the event functions of a contact, from its outputs v, acceleration and sigma at a point."""
         v, acceleration, sigma = found[:3]
         ratio, share, pressed = self.shares(contact)
         limits = {
@@ -226,15 +230,15 @@ class Evaluator:
             "v_low": times(self.program.load(Row.V_LOW), share),
             "sigma_low": times(self.program.load(Row.SIGMA_LOW), pressed),
         }
-        return Moment(self, point, contact, v, acceleration, sigma, h=h, **limits)
+        return EventArguments(self, point, contact, v, acceleration, sigma, h=h, **limits)
 
-    def moments(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> list[Moment]:
-        """Of all contacts, from as many outputs of each as there are."""
+    def moments(self, point: Values, found: Sequence[Value], h: Value = 1.0) -> list[EventArguments]:
+        """Arguments of the event functions of all contacts."""
         each = len(found) // self.kernel.contacts
         return [self.moment(point, found[c * each :], h, c) for c in range(self.kernel.contacts)]
 
-    def elsewhere(self, found: Sequence[Value]) -> list[tuple[int, Value]]:
-        """What the record holds of further contacts, and where, from v, acceleration and sigma of all."""
+    def further_contact_rows(self, found: Sequence[Value]) -> list[tuple[int, Value]]:
+        """(row, value) of what the record stores about further contacts, from v, acceleration and sigma of all."""
         stored: list[tuple[int, Value]] = []
         for c in range(1, self.kernel.contacts):
             v, _, sigma = found[3 * c : 3 * c + 3]
@@ -243,13 +247,13 @@ class Evaluator:
             stored += [(first, v), (first + 1, sigma / as_node(pressed)), (first + 2, v / as_node(share))]
         return stored
 
-    def marks(self, moments: Sequence[Moment]) -> list[Value]:
-        """Functions of all events.
+    def event_values(self, moments: Sequence[EventArguments]) -> list[Value]:
+        """Values of all event functions.
 
         Raises
         ------
         TypeError
-            If one is a condition.
+            If one is a condition instead of a number.
         """
         found = [event.function(moment) for moment in moments for event in EVENTS]
         for event, value in zip(cycle(EVENTS), found, strict=False):

@@ -1,4 +1,4 @@
-"""The linear equations of a Rosenbrock method, solved without what is zero whatever the numbers."""
+"""Sparse LU solution of the linear equations of a Rosenbrock method, without structural zeros."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Matrix = dict[tuple[int, int], Value]
 
 
 def factorised(n: int, jacobian: Matrix, diagonal: Value) -> tuple[Matrix, list[Value]]:
-    """LU factors of `diagonal` − J and inverse pivots; no pivoting: the diagonal dominates once h is accepted."""
+    """LU factors of `diagonal` I − J and inverse pivots; no pivoting: the diagonal dominates for accepted steps."""
     filled: Matrix = {place: -value for place, value in jacobian.items() if place[0] != place[1]}
     filled |= {(i, i): diagonal - jacobian[i, i] if (i, i) in jacobian else diagonal for i in range(n)}
     pivots: list[Value] = []
@@ -29,7 +29,7 @@ def factorised(n: int, jacobian: Matrix, diagonal: Value) -> tuple[Matrix, list[
 
 
 def substituted(matrix: tuple[Matrix, list[Value]], right: Sequence[Value]) -> list[Value]:
-    """The solution for one right side."""
+    """Solution for one right side by substitution."""
     filled, pivots = matrix
     n = len(right)
     r = list(right)

@@ -1,4 +1,4 @@
-"""A model's compiled kernels and the arrays that they take."""
+"""Compiled kernels of one model and the arrays that they take."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from steadyslip.core.questions import question
 from steadyslip.kernels.build import Code, compiled, interpreted, interpreting
-from steadyslip.kernels.driver.places import searched
+from steadyslip.kernels.driver.places import guess_count
 from steadyslip.kernels.events import LOG_KINDS, TALLY
 from steadyslip.kernels.formulation import Choice
 from steadyslip.kernels.kernel import Kernel
@@ -44,7 +44,7 @@ class Runner:
 
     @cached_property
     def code(self) -> Code:
-        """Machine code, or plain Python if `plain`."""
+        """Machine code, or Python functions if `plain`."""
         return (interpreted if self.plain else compiled)(self.kernel.programs, self.kernel.layout)
 
     @cached_property
@@ -52,7 +52,7 @@ class Runner:
         return self.kernel.constants.function([*self.reduction.model.arguments])
 
     def constants(self, point: OperatingPoint) -> np.ndarray:
-        """Constants of every rig, (rigs, number)."""
+        """Constants of every rig, shape (rigs, constants)."""
         return _constants(point, self).copy() if point.size == 1 else self._table(point)
 
     def _table(self, point: OperatingPoint) -> np.ndarray:
@@ -64,9 +64,11 @@ class Runner:
         return table
 
     def settings(self, values: Mapping[str, Any], atol: np.ndarray) -> np.ndarray:
-        """Rows of settings by name, then `atol` (rigs or 1, state), then guesses and scales of further unknowns."""
+        """Table of settings: those by name, then `atol` (rigs or 1, state), then guesses and scales of further
+        unknowns.
+        """
         size = max([len(atol), *(np.size(value) for value in values.values())])
-        further = searched(self.kernel.layout) - 1
+        further = guess_count(self.kernel.layout) - 1
         table = np.zeros((size, len(SETTINGS) + self.kernel.size + 2 * further))
         for column, name in enumerate(SETTINGS):
             table[:, column] = values[name]
@@ -87,6 +89,6 @@ def runner(
     pushes: tuple[str, ...] = (),
     presses: tuple[str, ...] = (),
 ) -> Runner:
-    """The kernel of a model; made once per process."""
+    """Kernel of a model (cached)."""
     reduction = reduce_model(model, eliminate, pushes, presses)
     return Runner(reduction, replace(choice, lanes=1), plain=True) if interpreting() else Runner(reduction, choice)

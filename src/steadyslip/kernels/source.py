@@ -1,8 +1,7 @@
-"""SymPy expressions to straight-line programs.
+"""Translation of SymPy expressions to straight-line programs.
 
-What depends on parameters only is lifted out first: it becomes a *constant* of the trajectory, computed once
-by NumPy for any number of rigs, so that kernels see few operations and never a parameter's unit. Common
-subexpressions of the rest are computed once.
+Parts that depend on parameters only become *constants* of the trajectory, which NumPy computes once for any number of
+rigs; kernels see few operations and no parameters. Common subexpressions of the rest are computed once.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from steadyslip.core.symbols import inner_symbol
 from steadyslip.kernels.nodes import Node, Value, as_node, primitive, select
 
 SQUARED = 2**10
-"""Exponents up to which squares are multiplied; beyond these roundings add up to more than those of `power`."""
+"""Largest exponent computed by repeated squaring; beyond it rounding adds up to more than that of `power`."""
 
 
 class Constants:
-    """The constants of a kernel: parameter-only expressions, numbered in order of first use."""
+    """Parameter-only subexpressions of a kernel, numbered in order of first use."""
 
     def __init__(self, variables: Iterable[sp.Symbol]) -> None:
         self.variables = frozenset(variables)
@@ -37,16 +36,16 @@ class Constants:
         self._moves: dict[sp.Basic, bool] = {}
         self._rated: tuple[int, int, np.ndarray] = (-1, -1, np.empty((3, 0), dtype=int))
 
-    def moves(self, expression: sp.Basic) -> bool:
-        """Whether an expression has a variable in it."""
+    def has_variable(self, expression: sp.Basic) -> bool:
+        """True if an expression contains a variable (cached)."""
         known = self._moves.get(expression)
         if known is None:
-            known = expression in self.variables or any(map(self.moves, expression.args))
+            known = expression in self.variables or any(map(self.has_variable, expression.args))
             self._moves[expression] = known
         return known
 
-    def lifted(self, expression: sp.Expr) -> sp.Expr:
-        """The expression with every largest parameter-only part replaced by a constant."""
+    def with_constants(self, expression: sp.Expr) -> sp.Expr:
+        """Expression with each maximal parameter-only part replaced by a constant (cached)."""
         known = self._seen.get(expression)
         if known is None:
             known = self._seen[expression] = self._lift(expression)
@@ -56,17 +55,19 @@ class Constants:
         if expression in self.variables or isinstance(expression, (sp.Number, sp.NumberSymbol)):
             return expression
         if not isinstance(expression, sp.Expr):  # conditions of a Piecewise
-            return expression.func(*(self.lifted(a) for a in expression.args)) if expression.args else expression
-        if not self.moves(expression):
+            return (
+                expression.func(*(self.with_constants(a) for a in expression.args)) if expression.args else expression
+            )
+        if not self.has_variable(expression):
             return self._constant(expression)
         if expression.is_Mul or expression.is_Add:
-            fixed = [a for a in expression.args if not self.moves(a)]
-            moving = [self.lifted(a) for a in expression.args if self.moves(a)]
+            fixed = [a for a in expression.args if not self.has_variable(a)]
+            moving = [self.with_constants(a) for a in expression.args if self.has_variable(a)]
             if fixed:
                 part = expression.func(*fixed)
                 moving.append(part if part.is_Number else self._constant(part))
             return expression.func(*moving)
-        return expression.func(*(self.lifted(a) for a in expression.args))
+        return expression.func(*(self.with_constants(a) for a in expression.args))
 
     def _constant(self, expression: sp.Expr) -> sp.Expr:
         if expression.could_extract_minus_sign():
@@ -77,24 +78,24 @@ class Constants:
 
     @property
     def all(self) -> list[sp.Symbol]:
-        """Every constant, then the rates of change of some."""
+        """All constants, then the rates of change that were asked for."""
         return [*self.symbols.values(), *self.rates.values()]
 
     def rate_of(self, constant: sp.Symbol, direction: int) -> sp.Symbol:
-        """A further constant: how fast `constant` changes with one of the things that the caller varies."""
+        """Symbol for the rate of change of `constant` in a direction of parameter space, added to the constants."""
         return self.rates.setdefault(
             (constant, direction), inner_symbol(f"{constant.name}_rate_{direction}", real=True)
         )
 
     def with_rates(self, found: np.ndarray, rates: np.ndarray, inputs: Mapping[sp.Symbol, np.ndarray]) -> np.ndarray:
-        """Rows of all constants, from those of the constants and of their rates of change.
+        """Values of all constants and their rates of change, shape (rigs, all).
 
         Parameters
         ----------
         found : ndarray (rigs, constants)
         rates : ndarray (rigs, directions, constants)
         inputs : mapping of symbol to ndarray (rigs, directions)
-            Rates of change of inputs, zero unless given.
+            Rates of change of inputs; zero where absent.
         """
         size, (columns, directions, places) = len(self.symbols), self._rates_of_constants()
         table = np.zeros((len(found), len(self.all)))
@@ -107,7 +108,7 @@ class Constants:
         return table
 
     def _rates_of_constants(self) -> np.ndarray:
-        """Of each rate of change of a constant: its place, the direction, and the place of the constant."""
+        """Column of each rate of change of a constant, its direction, and the column of that constant (cached)."""
         size, count, found = self._rated
         if (size, count) != (len(self.symbols), len(self.rates)):
             order = {symbol: i for i, symbol in enumerate(self.symbols.values())}
@@ -119,18 +120,18 @@ class Constants:
         return found
 
     def function(self, arguments: Sequence[sp.Symbol]) -> Callable[..., list[Any]]:
-        """A NumPy function from parameter values to the constants, not to their rates of change."""
+        """NumPy function from parameter values to the constants (without rates of change)."""
         return ArrayFunction(arguments, list(self.symbols))
 
 
 class Formulas:
-    """Expressions that are computed together.
+    """Expressions evaluated together, common subexpressions once.
 
     Parameters
     ----------
     expressions : sequence of sympy.Expr
     names : mapping of sympy.Symbol to str
-        What their symbols are called where values are given; a symbol's own name unless given.
+        Key of each symbol in the mapping of values; its own name by default.
     """
 
     def __init__(self, expressions: Sequence[sp.Expr], names: Mapping[sp.Symbol, str]) -> None:
@@ -140,24 +141,24 @@ class Formulas:
 
     @property
     def symbols(self) -> set[str]:
-        """What its symbols are called where values are given."""
+        """Keys of the values that are needed."""
         return {self.names.get(e, e.name) for e in self._count if e.is_Symbol}
 
     def __call__(self, values: Mapping[str, Value]) -> list[Value]:
-        """The value of each expression; values are numbers or nodes of a program."""
+        """Values of the expressions; inputs are numbers or nodes of a program."""
         evaluation = _Evaluation(values, self.names, self._count)
         return [evaluation.value(expression) for expression in self.expressions]
 
 
 class _Evaluation:
-    """Values of expressions; what occurs several times is computed once."""
+    """Evaluation of expressions; common subexpressions are cached."""
 
     def __init__(self, values: Mapping[str, Value], names: Mapping[sp.Symbol, str], count: dict[sp.Basic, int]) -> None:
         self.given, self.names, self.count = values, names, count
         self.known: dict[sp.Basic, Any] = {}
 
     def value(self, e: Any) -> Any:
-        """An expression from the values of its symbols: products for small powers, selections for branches."""
+        """Value of an expression from the values of its symbols: products for small powers, selections for branches."""
         if e.is_Symbol:
             return self.given[self.names.get(e, e.name)]
         if e not in self.known:
@@ -189,7 +190,7 @@ class _Evaluation:
         return total
 
     def _term(self, e: Any) -> tuple[bool, Any]:
-        """Whether a term is subtracted, and what is."""
+        """(True if the term is subtracted, its absolute value)."""
         if e.is_Number and e.is_negative:
             return True, float(-e)
         return self._product(e) if e.is_Mul and self.count[e] == 1 else (False, self.value(e))
@@ -209,7 +210,7 @@ class _Evaluation:
         return negative, value / _multiplied(below) if below else value
 
     def _power(self, base: Any, exponent: Any) -> Any:
-        """Squares for whole exponents, a root besides for halves of odd ones: right for negative numbers too."""
+        """Power by squaring for integer exponents and half-integers (with a root), valid for negative bases too."""
         value = self.value(base)
         twice = 2.0 * float(exponent) if exponent.is_Number else 0.5
         if not (twice.is_integer() and abs(twice) <= 2 * SQUARED):
@@ -252,7 +253,7 @@ class _Evaluation:
         if isinstance(e, sp.tan):
             return primitive("sin", *arguments) / primitive("cos", *arguments)
         if isinstance(e, sp.DiracDelta):
-            return 0.0  # the derivative of sign, but for one point
+            return 0.0  # derivative of sign(x), except at x = 0
         if type(e) not in _FUNCTIONS:
             raise NotAvailable(
                 f"the equations contain {type(e).__name__}(...), which cannot be compiled; a law that is to move may "
@@ -262,7 +263,7 @@ class _Evaluation:
 
 
 def _differ(first: Node, *others: Node) -> Node:
-    """Whether an odd number of conditions holds."""
+    """True where an odd number of conditions holds (exclusive or)."""
     for other in others:
         first = (first | other) & ~(first & other)
     return first
@@ -295,4 +296,4 @@ _JOINED: dict[type, Callable[..., Node]] = {
     sp.Eq: lambda left, right: ~_differ(left, right),
     sp.ITE: lambda condition, yes, no: (condition & yes) | (~condition & no),
 }
-"""Conditions of conditions; `Eq` and `Ne` of two of them, not of numbers."""
+"""Operations on conditions; `Eq` and `Ne` here compare two conditions, not two numbers."""

@@ -1,4 +1,4 @@
-"""The program of one step: explicit or Rosenbrock, its error, the size of the next, and what asks for the driver."""
+"""Program of one step, explicit or Rosenbrock: error estimate, next step size, and the flag that calls the driver."""
 
 from __future__ import annotations
 
@@ -11,26 +11,25 @@ from steadyslip.kernels.events import COUNTED, EVENTS, ROUNDED
 from steadyslip.kernels.formulation import Formulation
 from steadyslip.kernels.layout import MOST_FAILURES, EventPlace, Row
 from steadyslip.kernels.nodes import Node, Program, Value, as_node, exp, larger, primitive, select, smaller, weighted
-from steadyslip.kernels.record import Evaluator, Moment, Values, times, total
+from steadyslip.kernels.record import Evaluator, EventArguments, Values, times, total
 from steadyslip.kernels.rosenbrock import factorised, substituted
 from steadyslip.kernels.source import Formulas
 
-INSTANT = 1e-13  # share of the time so far below which a step is none, if no state changes
-NOTHING = 1e-9  # by more than this share of the error allowed
-AIM = math.log(0.5)  # share of the step that the error would allow: hardly any is refused, and the error at the end is
-# near rtol after tens of cycles
-PROPORTIONAL, EARLIER = (
-    0.7,
-    0.3,
-)  # weights of the errors of the last two steps: without the second, steps that stability
-# limits swing about the limit, and every sixth is refused
-LITTLE = -3.0  # errors below that aimed at by this in ln e² say nothing about where errors are going
-BEGUN = 1e-3  # of the error allowed: what a run or segment begins with counts from here on
-AGAIN = math.log(0.8)  # the share after a step that was refused
+INSTANT = 1e-13  # share of the time so far below which a step counts as none (500 roundings), if no state changes
+UNCHANGED = 1e-9  # change of a state over its absolute tolerance that counts as none; far below any allowed error
+LOG_SAFETY = math.log(0.5)
+"""ln of the next step over the longest allowed: hardly any is rejected, and after tens of cycles the error is near
+rtol."""
+LAST_ERROR_WEIGHT, EARLIER_ERROR_WEIGHT = 0.7, 0.3
+"""Weights of the last two errors in step control: without the second, steps that stability limits oscillate about that
+limit and every sixth is rejected."""
+LOWEST_TREND = -3.0  # an error smaller than the aim by this in ln e² does not count as a trend; chosen by trial
+INITIAL_SHARE = 1e-3  # share of the allowed error from which an event function has a sign at a segment's start
+LOG_SAFETY_REJECTED = math.log(0.8)  # ln of the step over the longest allowed after a rejection; chosen by trial
 
 
 class Step(Evaluator):
-    """Writes one step."""
+    """Writer of the program of one step."""
 
     def __init__(self, kernel: Formulation, name: str = "step") -> None:
         super().__init__(kernel, Program(name))
@@ -44,45 +43,46 @@ class Step(Evaluator):
         self.last = self.proposed >= rest * 0.99999999
         self.h: Value = select(self.last, rest, self.proposed)
         self.new: Sequence[Value] = ()
-        self.fastest: Value = 0.0  # rate at which a variable answers to itself, 1/s; explicit steps are no longer
+        self.fastest: Value = 0.0  # largest diagonal entry of the Jacobian, 1/s; not needed by explicit methods
         self.steady = None if kernel.timed else self.inputs(self.tau)
 
     def advance(self) -> None:
-        """The step itself, its error and the size of the next."""
+        """Write the step itself, its error and the size of the next one."""
         method = self.kernel.method
         errors = self._rosenbrock() if method.implicit else self._runge_kutta()
         error = self._squared(errors)
         error = error * (1 / self.kernel.counted)
         if method.lower_error:
             lower = self._squared(self._estimate(method.lower_error)) * (1 / self.kernel.counted)
+            # combination of two error estimates as in DOP853 (Hairer, Nørsett & Wanner II.10)
             error = error * error / larger(error + 0.01 * lower, 1e-300)
-        after = abs(as_node(total(self.rates))) < math.inf  # the next step begins with them
+        after = abs(as_node(total(self.rates))) < math.inf  # rates must be finite for the next step
         self.good = as_node(error <= 1.0, "bool") & after
         self.size = primitive("rough_log", smaller(larger(error, 1e-10), 1e30))
         self.earlier = self.program.load(Row.ERROR)
-        factor = exp(select(self.good, self._wanted(), AGAIN - 0.5 / method.order * self.size))
+        factor = exp(select(self.good, self._log_growth(), LOG_SAFETY_REJECTED - 0.5 / method.order * self.size))
         factor = select(error < 1e60, smaller(larger(factor, 0.2), 6.0), 0.2)
         self.after = select(self.last, self.end, self.tau + self.h)
         next_h = self.h * factor
         self.next_h = select(self.last & self.good, larger(self.proposed, next_h), next_h)
 
-    def _wanted(self) -> Node:
-        """Logarithm of the next step as a share of this one, after a good one.
+    def _log_growth(self) -> Node:
+        """Logarithm of the next step over this one, after an accepted step.
 
-        The smaller of what the errors ask for and of what they ask for if steps and errors go on changing as between
-        the last two (both after Gustafsson 1991, 1994): before a slip event every step has to be shorter than the one
-        before, by the same factor. After one they grow in the same way, and there errors alone are the better guide.
+        Smaller of two proposals (after Gustafsson 1991, 1994): from the errors, and from errors and steps if these go
+        on changing as between the last two. Before a slip event steps have to shrink by a constant factor, where the
+        second is right; after it they grow again, where the first is the better guide.
         """
         per = 0.5 / self.kernel.method.order
-        goal = AIM / per
-        before = larger(self.earlier, goal + LITTLE)
-        asked = per * (PROPORTIONAL * (goal - self.size) - EARLIER * (goal - before))
+        goal = LOG_SAFETY / per
+        before = larger(self.earlier, goal + LOWEST_TREND)
+        asked = per * (LAST_ERROR_WEIGHT * (goal - self.size) - EARLIER_ERROR_WEIGHT * (goal - before))
         trend = primitive("rough_log", self.h * (1.0 / larger(self.program.load(Row.H_OLD), 1e-300)))
-        wanted: Node = smaller(asked, AIM - per * self.size + trend + per * (before - self.size))
+        wanted: Node = smaller(asked, LOG_SAFETY - per * self.size + trend + per * (before - self.size))
         return wanted
 
     def _squared(self, errors: Sequence[Value]) -> Value:
-        """Sum of squares of errors as shares of what is allowed."""
+        """Sum of squares of errors over allowed errors."""
         found: Value = 0.0
         for i, e in enumerate(errors):
             scaled = e * (1.0 / (self.atol[i] + self.rtol * larger(abs(self.old[i]), abs(self.new[i]))))
@@ -90,7 +90,7 @@ class Step(Evaluator):
         return found
 
     def _estimate(self, weights: Sequence[float]) -> list[Value]:
-        """Errors of an explicit method."""
+        """Error estimates of an explicit method."""
         return [self.h * weighted(weights, [k[i] for k in self.stages]) for i in range(self.kernel.size)]
 
     def _inputs_of(self, s: int) -> Values:
@@ -115,11 +115,11 @@ class Step(Evaluator):
         return self._estimate(method.error)
 
     def _reached(self, weights: Sequence[float], i: int) -> Value:
-        """Variable i at a stage from the stages before it."""
+        """Variable i in the argument of a stage, from the stages before it."""
         known = [k[i] for k in self.stages]
         if self.kernel.choice.lanes > 1:
             return self.old[i] + self.h * weighted(weights, known)
-        # one trajectory waits for the newest stage: all else is added up before
+        # latency: the newest stage comes last, so that all other terms are added up before it is known
         return (self.old[i] + self.h * weighted(weights, known[:-1])) + (self.h * weights[len(known) - 1]) * known[-1]
 
     def _rosenbrock(self) -> list[Value]:
@@ -159,11 +159,11 @@ class Step(Evaluator):
         return list(self.stages[-1])
 
     def keep(self) -> None:
-        """Keep or reject the step; raise the flag where the driver is needed."""
+        """Write the decision to keep or reject the step, and the flag that calls the driver."""
         load, store, good = self.program.load, self.program.store, self.good
         if self.kernel.choice.dense:
-            self.keep_stages()
-        self.keep_state()
+            self.store_stages()
+        self.store_state()
         before = [load(row) for row in (Row.V, Row.ACCELERATION, Row.SIGMA)]
         v, acceleration, sigma = (select(good, a, b) for a, b in zip(self.outputs[:3], before, strict=True))
         for row, value in ((Row.V, v), (Row.ACCELERATION, acceleration), (Row.SIGMA, sigma)):
@@ -175,7 +175,7 @@ class Step(Evaluator):
         accepted, rejected = load(Row.ACCEPTED) + select(good, 1.0, 0.0), load(Row.REJECTED) + select(good, 0.0, 1.0)
         store(Row.ACCEPTED, accepted)
         store(Row.REJECTED, rejected)
-        failures = select(self._gets_on(moved), 0.0, load(Row.FAILURES) + 1.0)
+        failures = select(self._made_progress(moved), 0.0, load(Row.FAILURES) + 1.0)
         store(Row.FAILURES, failures)
         reasons = [
             moved >= self.end,
@@ -185,7 +185,7 @@ class Step(Evaluator):
             sigma <= load(Row.SIGMA_LOW),
             moved > load(Row.NEXT),
         ]
-        for c, (place, value) in enumerate(self.elsewhere(self.outputs)):
+        for c, (place, value) in enumerate(self.further_contact_rows(self.outputs)):
             store(place, select(good, value, load(place)))
             if c % 3:
                 lost, away = value <= load(Row.SIGMA_LOW), abs(as_node(value)) >= load(Row.V_HIGH)
@@ -197,32 +197,32 @@ class Step(Evaluator):
             flag = flag + select(happened > 0.0, 1.0, 0.0)
         store(Row.FLAG, flag * load(Row.ACTIVE))
 
-    def _gets_on(self, moved: Value) -> Node:
-        """Whether the step was accepted and changed anything.
+    def _made_progress(self, moved: Value) -> Node:
+        """True if the step was accepted and changed anything.
 
-        At a fold of the balance steps shrink to the rounding of time, change no state and are accepted for ever; only
-        where the balance has to be solved there are folds.
+        At a fold of the balance steps shrink to the rounding of time, change no state and would be accepted for ever.
+        There are folds only where a balance has to be solved.
         """
         if not self.kernel.unknowns:
             return as_node(self.good, "bool")
         changed = moved - self.tau > INSTANT * moved
         for new, old, error in zip(self.new, self.old, self.atol, strict=True):
-            changed = changed | (abs(new - old) > NOTHING * error)
+            changed = changed | (abs(new - old) > UNCHANGED * error)
         return as_node(changed, "bool") & self.good
 
     def _events(self) -> Node:
-        """Which functions of events changed sign; returns how many, where that is watched."""
+        """Write the sign changes of event functions; returns their number, zero for lanes that do not watch them."""
         load, store, layout = self.program.load, self.program.store, self.kernel.layout
         here = self.here | {f"y{i}": value for i, value in enumerate(self.new)}
         moments = [self._with_errors(moment) for moment in self.moments(here, self.outputs, self.h)]
         count = as_node(0.0)
-        for e, value in enumerate(self.marks(moments)):
+        for e, value in enumerate(self.event_values(moments)):
             event, at = EVENTS[e % len(EVENTS)], moments[e // len(EVENTS)]
             before = load(layout.mark + e)
             known, least, small = self.good, as_node(0.0), 0.0
             if event.uncertain is not None:
                 least = event.uncertain(at)
-                small = event.uncertain(replace(at, error=BEGUN * at.error))
+                small = event.uncertain(replace(at, error=INITIAL_SHARE * at.error))
                 known = known & (abs(value) > least)
             change = as_node(0.0)
             if event.falls:
@@ -237,18 +237,18 @@ class Step(Evaluator):
                     place = layout.counted + kind
                     store(place, load(place) + select(own, 1.0, 0.0))
             store(layout.mark + e, select(known, value, before))
-            if e % len(EVENTS) not in tuple(EventPlace):  # its count is all there is to the tally
+            if e % len(EVENTS) not in tuple(EventPlace):  # other events are only counted, unless there is a log
                 change = select(load(Row.LOG) > 0.0, change, 0.0)
             count = count + abs(change)
         happened = count * load(Row.ACTIVE)
         store(Row.HAPPENED, happened)
         return happened
 
-    def _with_errors(self, moment: Moment) -> Moment:
-        """What cannot be told of velocity and acceleration at a contact at the end of the step.
+    def _with_errors(self, moment: EventArguments) -> EventArguments:
+        """Arguments of event functions with the uncertainty of velocity and acceleration at the end of the step.
 
-        Velocity is known to the error allowed of its variable: of a logarithm a share of the velocity itself, else one
-        of the drive's too. Acceleration is rounded like velocity, times how fast the fastest variable answers.
+        Velocity is known to the error allowed for its variable: relative for a logarithm, else relative to the drive's
+        velocity too. Acceleration has the rounding of velocity times the fastest rate of the system.
         """
         one, load = self.kernel.reduction.slidings[moment.contact], self.program.load
         size = abs(as_node(moment.v))
@@ -257,8 +257,8 @@ class Step(Evaluator):
             size = size + times(abs(load(Row.V_DRIVE)), self.shares(moment.contact)[0])
         return replace(moment, error=self.rtol * size, rounding=rounding)
 
-    def keep_state(self) -> None:
-        """The new state and its rates, if the step is good."""
+    def store_state(self) -> None:
+        """Store the new state and its rates if the step is good, else the old ones."""
         layout, store, good = self.kernel.layout, self.program.store, self.good
         for i in range(self.kernel.size):
             store(layout.state + i, select(good, self.new[i], self.old[i]))
@@ -269,8 +269,8 @@ class Step(Evaluator):
             place = guess_at(layout, k)
             store(place, select(good, z, self.program.load(place)))
 
-    def keep_stages(self) -> None:
-        """What dense output needs."""
+    def store_stages(self) -> None:
+        """Store old state, stages and unknowns for dense output."""
         layout, n, store = self.kernel.layout, self.kernel.size, self.program.store
         for i in range(n):
             store(layout.old + i, self.old[i])

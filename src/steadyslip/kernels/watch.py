@@ -1,8 +1,8 @@
-"""The program that finds frequent events in a group of lanes at once, and keeps the tally of lanes without a log.
+"""Program that finds frequent events in a group of lanes at once, and updates the statistics where there is no log.
 
-Extremes of velocity and the begin and end of slip are roots of the dense output's polynomial in the velocity variable,
-or of its derivative. A lane where that is not enough keeps its flag and is left to the driver: contact that is lost,
-several events within a step, slip that begins or ends while inputs change, a root that is not found at once.
+Extremes of velocity and begin and end of slip are roots of the velocity variable's dense output or of its derivative.
+Lanes with other cases keep their flag and are left to the driver: lost contact, several events within a step, begin or
+end of slip while inputs change, a root that is not found at once.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from steadyslip.kernels.nodes import Node, Program, Value, as_node, larger, log,
 from steadyslip.kernels.record import Evaluator, horner, slope_of
 from steadyslip.kernels.source import Formulas
 
-ROUNDS = 2  # of Halley's method, from the root of a straight line
-FOUND = 3e-4  # last change, as a share of the step, of a root that is found to the cube of that
+ROUNDS = 2  # iterations of Halley's method (cubic) from the root of a straight line
+FOUND = 3e-4  # largest last change, as share of the step: with cubic convergence the error is near its cube, 3e-11
 
 
 class Watch(Evaluator):
-    """Writes it."""
+    """Writer of this program."""
 
     def __init__(self, kernel: Formulation, speed: Formulas) -> None:
         super().__init__(kernel, Program("watch_group"))
@@ -51,12 +51,12 @@ class Watch(Evaluator):
         return self.program
 
     def _locate(self) -> None:
-        """The fraction of the step at which velocity turns or slip begins."""
+        """Write the fraction of the step at which velocity turns or slip begins or ends."""
         kernel, program, w = self.kernel, self.program, self.kernel.layout.w
-        own, course = self.polynomial(w), self.course(w)
+        own, smooth_polynomial = self.polynomial(w), self.smooth_polynomial(w)
         limit = program.load(Row.W_LIMIT)
         crossing: list[Value] = [own[0] - limit, *own[1:]]
-        turning = slope_of(course)
+        turning = slope_of(smooth_polynomial)
         turning += [0.0] * (len(crossing) - len(turning))
         crossing += [0.0] * (len(turning) - len(crossing))
         wanted = [select(self.turns, a, b) for a, b in zip(turning, crossing, strict=True)]
@@ -73,7 +73,7 @@ class Watch(Evaluator):
             theta = smaller(larger(theta - change, 0.0), 1.0)
         self.found = abs(change) <= FOUND
         self.tau = self.tau_old + theta * self.h
-        self.there = self.between(theta)
+        self.there = self.state_at_fraction(theta)
         start, stop = program.load(Row.START), program.load(Row.STOP)
         self.time = select(self.tau < program.load(Row.END), smaller(start + self.tau, stop), stop)
         point = self.inputs(self.tau) | {f"y{i}": y for i, y in enumerate(self.there)}
@@ -82,13 +82,13 @@ class Watch(Evaluator):
         self.place = self.there[kernel.layout.x] + program.load(Row.LOAD_MOVED) + self.load_advance(self.tau)
 
     def _kept(self, row: int, condition: Node, value: Value) -> Node:
-        """Store a value where a condition holds, and return what is there now."""
+        """Store a value in a row where a condition holds; returns the row's new value."""
         new: Node = select(condition, value, self.program.load(row))
         self.program.store(row, new)
         return new
 
     def _turn(self) -> None:
-        """Peaks and troughs of velocity."""
+        """Update the statistics of peaks and troughs of velocity."""
         load = self.program.load
         peak = self.here & self.peak
         self._kept(Row.PEAK_VELOCITY, peak, larger(load(Row.PEAK_VELOCITY), self.v))
@@ -102,7 +102,7 @@ class Watch(Evaluator):
         self._kept(Row.LAST_PEAK_TIME, peak, self.time)
 
     def _size(self) -> Node:
-        """ln of velocity over that of the load point."""
+        """ln of velocity over load-point velocity."""
         kernel, v_lp = self.kernel, as_node(self.v_lp)
         size: Value = log(abs(as_node(self.v) / v_lp))
         if kernel.reduction.velocity == "logarithm" and kernel.choice.level == "constant":
@@ -111,7 +111,7 @@ class Watch(Evaluator):
         return found
 
     def _slip(self) -> None:
-        """Slip that begins, that becomes a slip event at a peak, or that ends before it does."""
+        """Update begin of slip, its becoming a slip event at a peak, and its end."""
         load, here = self.program.load, self.here
         anew = self.trough & (self.now_event <= 0.0) & (as_node(self.v) < self.now_from)
         anew = here & (self.begins | (anew & (self.now_from < float("inf"))))
@@ -129,14 +129,14 @@ class Watch(Evaluator):
             self._kept(row, anew, value)
 
     def _complete(self, complete: Node) -> None:
-        """The tally of a slip event that ends."""
+        """Update the statistics at the end of a slip event."""
         load, begin = self.program.load, self.program.load(Row.NOW_BEGIN)
         self._kept(Row.RECURRENCE, complete & (load(Row.ANY_BEGIN) > 0.0), begin - load(Row.EVENT_BEGIN))
         found: Sequence[tuple[int, Value]] = (
             (
                 Row.ANY_BEGIN,
                 select(begin > 0.0, 1.0, 0.0),
-            ),  # one that was going on at the start has no begin of its own
+            ),  # slip that went on at the start of the run has no known begin
             (Row.EVENTS, load(Row.EVENTS) + 1.0),
             (Row.EVENT_BEGIN, begin),
             (Row.EVENT_DURATION, self.time - begin),

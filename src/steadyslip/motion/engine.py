@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steadyslip.kernels.driver.looking import hold
-from steadyslip.kernels.driver.places import breadth, point_at, unknown_at, width
+from steadyslip.kernels.driver.interpolate import copy_state
+from steadyslip.kernels.driver.places import output_size, point_at, point_size, unknown_at
 from steadyslip.kernels.driver.segments import clock
 from steadyslip.kernels.layout import LOG_COLUMNS, Cursor, Final, Recorded, Row, Setting
 from steadyslip.kernels.runner import STATUSES, TALLY, Runner
@@ -79,11 +79,11 @@ class Call:
         self.cursor = np.zeros(len(Cursor), dtype=np.int64)
         self.cursor[[Cursor.LAST_JOB, Cursor.BUSY, Cursor.PAUSED]] = size, lanes, -1
         self.status = np.zeros(size, dtype=np.int64)
-        self.final = np.full((size, Final.POINT + breadth(layout)), np.nan)
+        self.final = np.full((size, Final.POINT + point_size(layout)), np.nan)
         self.tally = np.full((size, layout.contacts * len(TALLY)), np.nan)
-        self.samples = np.full((size, len(times), breadth(layout)), np.nan)
+        self.samples = np.full((size, len(times), point_size(layout)), np.nan)
         self.log = np.zeros((0, LOG_COLUMNS))
-        self.recorded = np.zeros((0, Recorded.POINT + breadth(layout)))
+        self.recorded = np.zeros((0, Recorded.POINT + point_size(layout)))
 
     def go(self, quota: int) -> int:
         """0 done, 1 a buffer is full, 2 quota used up."""
@@ -99,8 +99,8 @@ class Call:
 
     def cut_off(self) -> None:
         """Where the job of the only lane is, as its end: it will not go on."""
-        layout, y = self.layout, np.empty(width(self.layout))
-        hold(self.work, layout, y)
+        layout, y = self.layout, np.empty(output_size(self.layout))
+        copy_state(self.work, layout, y)
         self.final[0, : Final.POINT] = [self.time(), *self.work[[Row.SEGMENT, Row.ACCEPTED, Row.REJECTED]]]
         self.final[0, Final.STATE : Final.STATE + layout.size] = y[: layout.size]
         for k in range(max(layout.unknowns, 1)):

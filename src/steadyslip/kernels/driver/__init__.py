@@ -1,17 +1,16 @@
-"""What happens between steps: jobs, breakpoints, jumps, events, samples, the end. The same code for every model.
+"""Work between integration steps, one code for all models: jobs, breakpoints, jumps, events, samples, the end.
 
-The loops around a model's step are `lanes.advance`, where each lane goes its own way, and `table.through_table`, where
-all go through one table of inputs together; `states` answers for given states. What they do when a step is over is in
-the other modules: `segments` (breakpoints, jumps) with `balance`, `crossings` (events) with `slip` (what becomes of
-them) and `looking` (dense output), `samples`, `jobs` (begin and end).
+Loops around the compiled step: `lanes.advance` (each lane runs its own job) and `table.through_table` (all lanes follow
+one table of inputs). `states` evaluates outputs at given states without a loop. Other modules: `segments` (breakpoints,
+jumps) with `balance` (force balance), `crossings` (events) with `slip` (log and statistics of slip events),
+`interpolate` (dense output), `samples` (output at requested times), `jobs` (start and end of a job).
 
-Everything particular to a model is called through `Routines`; sizes and places are in `Layout`. The modules run as
-they stand, slowly, with plain Python routines; `steadyslip.kernels.build` compiles them once for all models, the
-functions of all modules side by side, so that each has a name of its own. They know nothing of expressions, rigs or
-results.
+All that depends on a model is called through `Routines`; sizes and indices are in `Layout`. The modules run as they
+stand, slowly, with Python routines; `steadyslip.kernels.build` compiles them once for all models into one namespace, so
+every function needs a name that is unique among these modules.
 
-A lane that needs attention is copied to a record R and back. Arrays of the caller have one row per job (or a single row
-shared by all): constants, initial continuous variables, settings, segments; results are written to the job's own row,
-whatever the lane. A row of `segments` is start, end, jump of the load point, values and slopes of the inputs, then
-amplitudes, angular frequencies and phases of their harmonics.
+A lane that raises its flag is copied to a record R and back. Input arrays have one row per job, or one row shared by
+all: constants, initial continuous variables, settings, segments. Results go to the row of the job. A row of `segments`
+is start, end, jump of the load point, values and slopes of the inputs, then amplitudes, angular frequencies and phases
+of their harmonics.
 """

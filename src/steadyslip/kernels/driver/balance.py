@@ -1,4 +1,4 @@
-"""Balances of forces, solved for the unknowns and velocity variables where a jump or a start leaves them open."""
+"""Solution of the force balances for velocity variables and unknowns, at the start of a run and after a jump."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import math
 from steadyslip.kernels.driver.places import guess_at, scale_at
 from steadyslip.kernels.layout import Array, Layout, Routines, call
 
-FIRST_REACH = 0.01  # natural sizes of w within which a balance is looked for first
-ROUNDS = 300  # of several balances that depend on each other, solved in turn
-NEWTON_STEPS = 50
-ROUNDED = 1e-11  # share of an unknown by which rounding may keep it from settling any further
+FIRST_REACH = 0.01  # first step of a bracket over the natural size of w; by trial: larger ones may skip a root
+ROUNDS = 300  # sweeps over coupled balances before giving up; chosen by trial
+NEWTON_STEPS = 50  # most Newton steps for all balances; the steps at least halve, so that 37 lead from 1 to ROUNDED
+ROUNDED = 1e-11  # relative change of an unknown that rounding of the balances may cause: below it, converged
 
 
 def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bool:
-    """All unknowns and velocity variables that balances fix, in place of the guesses; False if there are none.
+    """Solve all balances for their unknowns and velocity variables, in place of the guesses; False if one has no root.
 
-    Each is solved for with the others as they are: that leads to the balance which is next in the direction of the
-    forces. Where a dashpot or a normal force ties them together this takes ever smaller steps, and Newton's method for
-    all ends it as soon as it closes in.
+    Each balance is solved with the other unknowns fixed, in turn, which leads to the solution that is next in the
+    direction of the forces. Where balances are strongly coupled (dashpot, normal force) this converges slowly, and
+    Newton's method for all unknowns finishes it.
     """
     for _ in range(ROUNDS):
         moved = 0.0
@@ -36,8 +36,8 @@ def solve_balances(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
 
 
 def solve_together(R: Array, layout: Layout, routines: Routines, y: Array) -> bool:
-    """Newton's method for all balances, as long as each step is much smaller than the one before; else False, and the
-    guesses are as they were.
+    """Apply Newton's method to all balances while each step at least halves; if it fails, return False and restore the
+    guesses.
     """
     n = layout.massless
     last, size, changes, kept = 2.0, 0.0, 2 * n, 3 * n
@@ -62,10 +62,10 @@ def solve_together(R: Array, layout: Layout, routines: Routines, y: Array) -> bo
 
 
 def solve_balance(R: Array, layout: Layout, routines: Routines, k: int, y: Array) -> float:
-    """The unknown w that fulfils balance k, nearest to the guess: bracketed outwards, then safeguarded Newton.
+    """Root w of balance k nearest to the guess: bracketed outwards from it, then safeguarded Newton; NaN if none.
 
-    Forces may balance at several w. A block without mass takes the first on the side to which forces drive it, so
-    the search begins with steps much smaller than the natural size of w.
+    Several w may be roots. A massless block moves to the first one in the direction of the force, so the first step is
+    much smaller than the natural size of w.
     """
     place, scale = guess_at(layout, k), R[scale_at(layout, k)]
     own = layout.massless + k

@@ -1,22 +1,30 @@
-"""Events: where their functions change sign, within a step or in a jump."""
+"""Detection of events: sign changes of event functions within a step or in a jump."""
 
 from __future__ import annotations
 
-from steadyslip.kernels.driver.looking import look_back, look_now
-from steadyslip.kernels.driver.places import guess_at, kinds, marks_at, outputs_at, tally_at, unknown_at, velocity_at
-from steadyslip.kernels.driver.slip import note, outrun, quicken
+from steadyslip.kernels.driver.interpolate import state_at_fraction, state_now
+from steadyslip.kernels.driver.places import (
+    event_functions_at,
+    events_per_contact,
+    guess_at,
+    outputs_at,
+    tally_at,
+    unknown_at,
+    velocity_at,
+)
+from steadyslip.kernels.driver.slip import begin_slip_event, record_event, track_slowest
 from steadyslip.kernels.layout import SLIP_EVENT, Array, EventPlace, Kind, Layout, Out, Routines, Row
 
 
 def event_function(R: Array, layout: Layout, routines: Routines, kind: int, theta: float, y: Array) -> float:
-    """Positive before the event of a kind, not after."""
-    look_back(R, layout, routines, theta, y)
-    value = y[marks_at(layout) + (kind - 1) // 2]
+    """Value of an event function at the fraction theta of the last step, with sign: positive before the event."""
+    state_at_fraction(R, layout, routines, theta, y)
+    value = y[event_functions_at(layout) + (kind - 1) // 2]
     return float(value if kind % 2 == 1 else -value)
 
 
 def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -> float:
-    """Fraction of the last step at which an event happens: regula falsi (Illinois) on the dense output."""
+    """Fraction of the last step at which an event happens, by regula falsi (Illinois variant) on the dense output."""
     low, high = 0.0, 1.0
     at_low = event_function(R, layout, routines, kind, low, y)
     at_high = event_function(R, layout, routines, kind, high, y)
@@ -45,12 +53,12 @@ def located(R: Array, layout: Layout, routines: Routines, kind: int, y: Array) -
     return high
 
 
-def follow(
+def process_events(
     R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array, order: Array
 ) -> bool:  # fmt: skip
-    """Events within the step just taken, in the order of time. True if the contact is lost in it."""
+    """Handle the events of the last step in order of time; True if contact is lost in it."""
     tau_old, h = R[Row.TAU_OLD], R[Row.DONE]
-    each, count = kinds(layout), 0
+    each, count = events_per_contact(layout), 0
     for e in range(layout.events if R[Row.HAPPENED] > 0.0 else 0):
         change = R[layout.happened + e]
         if change != 0.0 and (e % each <= EventPlace.CONTACT or log.shape[0] > 0):
@@ -64,16 +72,16 @@ def follow(
                 first = i
         theta, kind = order[first, 0], int(order[first, 1])
         order[first, 0] = 2.0
-        look_back(R, layout, routines, theta, y)
+        state_at_fraction(R, layout, routines, theta, y)
         tau = tau_old + theta * h
-        note(R, layout, kind, tau, y, log, cursor)
+        record_event(R, layout, kind, tau, y, log, cursor)
         if kind % (2 * each) == Kind.LOST:
             R[Row.TAU] = tau
             for k in range(max(layout.unknowns, 1)):
                 R[guess_at(layout, k)] = y[unknown_at(layout, k)]
             for i in range(layout.size):
                 R[layout.state + i] = y[i]
-            for i in range(count):  # what would have come later was counted by the step
+            for i in range(count):  # the step counted later events, which do not happen any more
                 if order[i, 0] < 2.0:
                     R[layout.counted + int(order[i, 1]) - 1] -= 1.0
             return True
@@ -84,30 +92,30 @@ def follow(
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)
         R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], v)
         if R[own + Row.NOW_EVENT] == 0.0 and R[Row.TAU] >= R[Row.END] and v >= SLIP_EVENT * R[own + Row.NOW_FROM]:
-            look_now(R, layout, routines, R[Row.TAU], y)
-            quicken(R, layout, c, y, log, cursor)
+            state_now(R, layout, routines, R[Row.TAU], y)
+            begin_slip_event(R, layout, c, y, log, cursor)
     return False
 
 
-def before_jump(R: Array, layout: Layout) -> None:
-    """Keep velocities and which contacts slip, for `crossed`."""
+def save_before_jump(R: Array, layout: Layout) -> None:
+    """Store velocity and slip state of each contact before a jump, for `events_of_jump`."""
     for c in range(layout.contacts if layout.events > 0 else 0):
         R[layout.jumped + 2 * c] = velocity_at(R, layout, c)
-        R[layout.jumped + 2 * c + 1] = R[layout.mark + kinds(layout) * c + EventPlace.SLIP]
+        R[layout.jumped + 2 * c + 1] = R[layout.mark + events_per_contact(layout) * c + EventPlace.SLIP]
 
 
-def crossed(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
-    """A jump can begin or end a slip event at once."""
-    look_now(R, layout, routines, 0.0, y)
+def events_of_jump(R: Array, layout: Layout, routines: Routines, cursor: Array, log: Array, y: Array) -> None:
+    """Handle events caused by a jump: begin and end of slip, and of slip events."""
+    state_now(R, layout, routines, 0.0, y)
     for c in range(layout.contacts):
-        own, each, v = tally_at(layout, c), kinds(layout), y[outputs_at(layout, c) + Out.V]
+        own, each, v = tally_at(layout, c), events_per_contact(layout), y[outputs_at(layout, c) + Out.V]
         before, was_slipping = R[layout.jumped + 2 * c], R[layout.jumped + 2 * c + 1] > 0.0
         slipping = R[layout.mark + each * c + EventPlace.SLIP] > 0.0
         if slipping != was_slipping:
             kind = Kind.SLIP_BEGINS if slipping else Kind.SLIP_ENDS
-            note(R, layout, kind + 2 * each * c, 0.0, y, log, cursor)
+            record_event(R, layout, kind + 2 * each * c, 0.0, y, log, cursor)
         if slipping and R[own + Row.NOW_EVENT] == 0.0 and before < min(v, R[own + Row.NOW_FROM]):
-            outrun(R, layout, c, before, 0.0, y)
-            quicken(R, layout, c, y, log, cursor)
+            track_slowest(R, layout, c, before, 0.0, y)
+            begin_slip_event(R, layout, c, y, log, cursor)
         R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)

@@ -1,15 +1,23 @@
-"""Jobs: how one begins in a lane, goes on when its lane asks for attention, and ends."""
+"""Start, continuation and end of a job in a lane."""
 
 from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.driver.crossings import before_jump, crossed, follow
-from steadyslip.kernels.driver.looking import look_now
-from steadyslip.kernels.driver.places import guess_at, kinds, point_at, scale_at, searched, tally_at, velocity_at
-from steadyslip.kernels.driver.samples import await_sample, record_now, record_step, take_samples
+from steadyslip.kernels.driver.crossings import events_of_jump, process_events, save_before_jump
+from steadyslip.kernels.driver.interpolate import state_now
+from steadyslip.kernels.driver.places import (
+    events_per_contact,
+    guess_at,
+    guess_count,
+    point_at,
+    scale_at,
+    tally_at,
+    velocity_at,
+)
+from steadyslip.kernels.driver.samples import record_now, record_step, schedule_sample, take_samples
 from steadyslip.kernels.driver.segments import clock, enter_segment
-from steadyslip.kernels.driver.slip import note
+from steadyslip.kernels.driver.slip import record_event
 from steadyslip.kernels.layout import (
     MOST_FAILURES,
     Array,
@@ -25,14 +33,14 @@ from steadyslip.kernels.layout import (
 )
 
 RUNAWAY = 1e9
-"""So many times as fast as the drive, a block without mass that no step of time resolves any more reaches infinite
-velocity: contacts that a dashpot joins run away together, and time is rounded before they are beyond all numbers."""
+"""Velocity over that of the drive above which a massless block whose steps fail counts as blown up. Contacts that a
+dashpot joins run away together, and time is too coarsely rounded to resolve that before the velocity overflows."""
 Arrays = tuple[Array, Array, Array, Array, Array]
 Results = tuple[Array, Array, Array, Array, Array, Array]
 
 
 def first_step(R: Array, layout: Layout) -> float:
-    """A cautious first step: a hundredth of the time in which the fastest variable changes by its scale."""
+    """First step (s): a hundredth of the time in which the fastest variable changes by its scale, at most `Row.H`."""
     rtol = R[Row.RTOL]
     fastest = 0.0
     for i in range(layout.size):
@@ -46,7 +54,7 @@ def load_job(
     S: Array, layout: Layout, lanes: int, lane: int, j: int, first: int, constants: Array, initial: Array,
     settings: Array,
 ) -> None:  # fmt: skip
-    """A job's numbers for one lane; those it starts with go where `first` says."""
+    """Copy the inputs of job j into a lane; its initial values go to the rows from `first` on."""
     for i in range(layout.rows):
         S[i * lanes + lane] = 0.0
     for i in range(layout.constants):
@@ -67,7 +75,7 @@ def load_job(
     S[Row.H * lanes + lane] = own[Setting.FIRST_STEP]
     for i in range(layout.size):
         S[(layout.atol + i) * lanes + lane] = own[Setting.ATOL + i]
-    count = searched(layout)
+    count = guess_count(layout)
     for k in range(1, count):
         S[guess_at(layout, k) * lanes + lane] = own[Setting.ATOL + layout.size + k - 1]
         S[scale_at(layout, k) * lanes + lane] = own[Setting.ATOL + layout.size + count + k - 2]
@@ -75,7 +83,7 @@ def load_job(
 
 
 def exhausted(S: Array, lanes: int, lane: int) -> int:
-    """The status of a lane that may not go on: too many steps refused in a row, or taken at all; else RUNNING."""
+    """Status of a lane that must stop (too many rejected steps in a row, or steps in all); RUNNING if it may go on."""
     if S[Row.FAILURES * lanes + lane] >= MOST_FAILURES:
         return Status.STUCK
     if S[Row.ACCEPTED * lanes + lane] + S[Row.REJECTED * lanes + lane] >= S[Row.MOST * lanes + lane]:
@@ -86,12 +94,12 @@ def exhausted(S: Array, lanes: int, lane: int) -> int:
 def start_job(
     R: Array, layout: Layout, routines: Routines, j: int, cursor: Array, log: Array, arrays: Arrays, y: Array
 ) -> bool:
-    """Load a job into a lane. False if there is no velocity to start with."""
+    """Load a job into a lane and enter its first segment; False if the balances give no velocity."""
     constants, initial, settings, segments, times = arrays
     load_job(R, layout, 1, 0, j, layout.continuous, constants, initial, settings)
     if not enter_segment(R, layout, routines, j, 0, segments, y):
         return False
-    await_sample(R, times)
+    schedule_sample(R, times)
     R[Row.H] = first_step(R, layout)
     R[Row.LOG] = 1.0 if log.shape[0] > 0 else 0.0
     for c in range(layout.contacts):
@@ -102,7 +110,7 @@ def start_job(
 def start_tally(
     R: Array, layout: Layout, routines: Routines, contact: int, log: Array, cursor: Array, y: Array
 ) -> None:
-    """There has been no event so far; slip may be going on."""
+    """Initialise the event statistics of a contact; slip that is going on counts as begun."""
     own, v = tally_at(layout, contact), velocity_at(R, layout, contact)
     R[own + Row.PEAK_VELOCITY] = v
     R[own + Row.LOWEST_VELOCITY] = v
@@ -112,13 +120,13 @@ def start_tally(
     R[own + Row.PEAK_GROWTH] = math.nan
     R[own + Row.NOW_BEGIN] = math.nan
     R[own + Row.NOW_FROM] = math.inf
-    if R[Row.WATCH] > 0.0 and R[layout.mark + kinds(layout) * contact + EventPlace.SLIP] > 0.0:
-        look_now(R, layout, routines, 0.0, y)
-        note(R, layout, Kind.SLIP_BEGINS + 2 * kinds(layout) * contact, 0.0, y, log, cursor)
+    if R[Row.WATCH] > 0.0 and R[layout.mark + events_per_contact(layout) * contact + EventPlace.SLIP] > 0.0:
+        state_now(R, layout, routines, 0.0, y)
+        record_event(R, layout, Kind.SLIP_BEGINS + 2 * events_per_contact(layout) * contact, 0.0, y, log, cursor)
 
 
 def highest_velocity(R: Array, layout: Layout) -> float:
-    """The highest velocity of the contacts, each as a share of its own."""
+    """Highest velocity (m/s) of all contacts, each divided by its share of the first contact's slip rate."""
     found = abs(R[Row.V])
     for c in range(1, layout.contacts):
         found = max(found, abs(R[layout.elsewhere + 3 * (c - 1) + 2]))
@@ -126,7 +134,7 @@ def highest_velocity(R: Array, layout: Layout) -> float:
 
 
 def lowest_stress(R: Array, layout: Layout) -> float:
-    """The lowest normal stress of the contacts, each as a share of its own."""
+    """Lowest normal stress (Pa) of all contacts, each divided by its share of the first contact's."""
     found = R[Row.SIGMA]
     for c in range(1, layout.contacts):
         found = min(found, R[layout.elsewhere + 3 * (c - 1) + 1])
@@ -134,7 +142,7 @@ def lowest_stress(R: Array, layout: Layout) -> float:
 
 
 def finish(R: Array, layout: Layout, row: int, status: int, results: Results) -> None:
-    """Write a job's results."""
+    """Write the results of a job to its row and mark the lane as free."""
     statuses, final, tally = results[0], results[1], results[2]
     statuses[row] = status
     final[row, Final.TIME] = clock(R, R[Row.TAU])
@@ -145,7 +153,7 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
         final[row, Final.STATE + i] = R[layout.state + i]
     for k in range(max(layout.unknowns, 1)):
         final[row, Final.POINT + point_at(layout, k)] = R[guess_at(layout, k)]
-    first, counted = Row.PEAK_SIZE - Row.EVENTS, 2 * kinds(layout)
+    first, counted = Row.PEAK_SIZE - Row.EVENTS, 2 * events_per_contact(layout)
     for c in range(layout.contacts):
         place = c * (tally.shape[1] // layout.contacts)
         for i in range(first):
@@ -156,20 +164,20 @@ def finish(R: Array, layout: Layout, row: int, status: int, results: Results) ->
     R[Row.FLAG] = 0.0
 
 
-def go_on(
+def continue_job(
     R: Array, layout: Layout, routines: Routines, j: int, cursor: Array, arrays: Arrays, results: Results, y: Array,
     order: Array,
 ) -> int:  # fmt: skip
-    """Look after a job that has raised its flag. Returns its status."""
+    """Process the last step of a flagged job (events, samples, segment ends); returns the job's status."""
     j0 = cursor[Cursor.FIRST_JOB]
     segments, times = arrays[3], arrays[4]
     samples, log, recorded = results[3], results[4], results[5]
     good = R[Row.GOOD] > 0.0
     if layout.massless > 0 and layout.w >= 0:
         for k in range(layout.unknowns, layout.massless):
-            R[guess_at(layout, k)] = R[layout.state + layout.w + k - layout.unknowns]  # for after the next jump
+            R[guess_at(layout, k)] = R[layout.state + layout.w + k - layout.unknowns]  # guess for the next jump
     if layout.stages > 0 and good:
-        lost = R[Row.WATCH] > 0.0 and follow(R, layout, routines, cursor, log, y, order)
+        lost = R[Row.WATCH] > 0.0 and process_events(R, layout, routines, cursor, log, y, order)
         take_samples(R, layout, routines, j - j0, times, samples, False, y)
         if R[Row.RECORD] > 0.0 and lost:
             record_now(R, layout, cursor, recorded, y)
@@ -189,33 +197,33 @@ def go_on(
     while R[Row.TAU] >= R[Row.END]:
         k = int(R[Row.SEGMENT]) + 1
         s = j if segments.shape[0] > 1 else 0
-        if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # empty ones fill a lane up
+        if k >= segments.shape[1] or segments[s, k, 1] <= segments[s, k, 0]:  # rows of no length pad shorter protocols
             return Status.DONE
         h = R[Row.H]
-        before_jump(R, layout)
+        save_before_jump(R, layout)
         if not enter_segment(R, layout, routines, j, k, segments, y):
             return Status.NO_VELOCITY
-        await_sample(R, times)
+        schedule_sample(R, times)
         R[Row.H] = h
         if R[Row.RECORD] > 0.0:
             record_now(R, layout, cursor, recorded, y)
         if R[Row.WATCH] > 0.0:
-            crossed(R, layout, routines, cursor, log, y)
+            events_of_jump(R, layout, routines, cursor, log, y)
     return Status.RUNNING
 
 
-def attend(
+def serve_lane(
     R: Array, layout: Layout, routines: Routines, lane: int, ids: Array, cursor: Array, arrays: Arrays,
     results: Results, y: Array, order: Array,
 ) -> None:  # fmt: skip
-    """Whatever a flagged lane needs: go on with its job, or finish it and take the next one."""
+    """Serve a flagged lane: continue its job, or finish it and start the next one."""
     j = ids[lane]
     if j >= 0:
-        status = go_on(R, layout, routines, j, cursor, arrays, results, y, order)
+        status = continue_job(R, layout, routines, j, cursor, arrays, results, y, order)
         R[Row.FLAG] = 0.0
         if status == Status.RUNNING:
             return
-        if status != Status.NO_VELOCITY:  # there is no state after that jump
+        if status != Status.NO_VELOCITY:  # otherwise there is no state after the jump
             take_samples(R, layout, routines, j - cursor[Cursor.FIRST_JOB], arrays[4], results[3], True, y)
         finish(R, layout, j - cursor[Cursor.FIRST_JOB], status, results)
     while cursor[Cursor.NEXT_JOB] < cursor[Cursor.LAST_JOB]:

@@ -1,17 +1,17 @@
-"""The loop of single runs and ensembles: each lane has a job of its own and looks after its own breakpoints."""
+"""Loop of single runs and ensembles: each lane integrates a job of its own, with its own breakpoints."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from steadyslip.kernels.driver.jobs import attend
-from steadyslip.kernels.driver.places import width
+from steadyslip.kernels.driver.jobs import serve_lane
+from steadyslip.kernels.driver.places import output_size
 from steadyslip.kernels.driver.samples import BETWEEN
 from steadyslip.kernels.layout import GROUP, Array, Cursor, Layout, Routines, Row, Setting, call
 
 
 def flagged(S: Array, lanes: int) -> int:
-    """How many lanes need attention."""
+    """Number of lanes whose flag is raised."""
     count = 0
     for lane in range(lanes):
         count += 1 if S[Row.FLAG * lanes + lane] != 0.0 else 0
@@ -19,7 +19,7 @@ def flagged(S: Array, lanes: int) -> int:
 
 
 def watch(layout: Layout, routines: Routines, S: Array, y: Array) -> None:
-    """Look for events in the groups of lanes in which one asks for attention."""
+    """Search for events in each group of lanes in which a flag is raised."""
     for first in range(0, layout.lanes, GROUP):
         for lane in range(first, first + GROUP):
             if S[Row.FLAG * layout.lanes + lane] != 0.0:
@@ -32,7 +32,7 @@ def advance(
     settings: Array, segments: Array, times: Array, statuses: Array, final: Array, tally: Array, samples: Array,
     log: Array, recorded: Array, quota: int,
 ) -> int:  # fmt: skip
-    """Advance all jobs of `cursor`.
+    """Integrate all jobs that `cursor` numbers.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def advance(
     arrays = (constants, initial, settings, segments, times)
     results = (statuses, final, tally, samples, log, recorded)
     lanes = layout.lanes
-    y, order = np.empty(width(layout)), np.empty((layout.events, 2))
+    y, order = np.empty(output_size(layout)), np.empty((layout.events, 2))
     R = S if lanes == 1 else np.zeros(layout.rows)
     together = layout.watched > 0 and log.shape[0] == 0 and settings[0, Setting.WATCH] > 0.0
     steps = 0
@@ -71,7 +71,7 @@ def advance(
                     if lanes > 1:
                         for i in range(layout.rows):
                             R[i] = S[i * lanes + lane]
-                    attend(R, layout, routines, lane, ids, cursor, arrays, results, y, order)
+                    serve_lane(R, layout, routines, lane, ids, cursor, arrays, results, y, order)
                     if lanes > 1:
                         for i in range(layout.rows):
                             S[i * lanes + lane] = R[i]

@@ -1,4 +1,4 @@
-"""Where what belongs to a contact is: in the outputs, in a record."""
+"""Indices of quantities in the output array and in a record, for any contact and unknown."""
 
 from __future__ import annotations
 
@@ -6,73 +6,73 @@ from steadyslip.kernels.layout import TALLIED, Array, Layout, Out, Row, Sampled
 
 
 def outputs_at(layout: Layout, contact: int) -> int:
-    """Where the outputs of a contact begin."""
+    """Index of the first output of a contact, in the output array."""
     return layout.size + contact * Out.COUNT
 
 
-def marks_at(layout: Layout) -> int:
-    """Where the functions of events begin, among the outputs."""
+def event_functions_at(layout: Layout) -> int:
+    """Index of the first event function in the output array."""
     return layout.size + layout.contacts * Out.COUNT
 
 
 def further_at(layout: Layout) -> int:
-    """Where what else is observed begins, among the outputs."""
-    return marks_at(layout) + layout.events
+    """Index of the first further observable in the output array."""
+    return event_functions_at(layout) + layout.events
 
 
 def unknown_at(layout: Layout, index: int) -> int:
-    """Where an unknown is, or a guess of it, among the outputs."""
+    """Index of an unknown, or of its guess, in the output array."""
     return further_at(layout) + layout.further + index - 1 if index > 0 else layout.size + Out.UNKNOWN
 
 
-def width(layout: Layout) -> int:
-    """How many numbers there are: state, outputs, functions of events, what else is observed, further unknowns.
+def output_size(layout: Layout) -> int:
+    """Length of the output array: state, outputs, event functions, further observables, further unknowns.
 
-    Balances to be solved leave residuals, derivatives and Newton's changes in the same array, and the guesses before.
+    The solution of balances uses the array for residuals, derivatives, Newton changes and saved guesses.
     """
     return max(further_at(layout) + layout.further + layout.unknowns, 4 * layout.massless)
 
 
-def breadth(layout: Layout) -> int:
-    """How many numbers a point has."""
+def point_size(layout: Layout) -> int:
+    """Length of a point (first unknown, state, further unknowns)."""
     return Sampled.STATE + layout.size + max(layout.unknowns - 1, 0)
 
 
 def point_at(layout: Layout, index: int) -> int:
-    """Where an unknown is in a point."""
+    """Index of an unknown in a point."""
     return Sampled.STATE + layout.size + index - 1 if index > 0 else int(Sampled.UNKNOWN)
 
 
-def kinds(layout: Layout) -> int:
-    """How many events every contact has."""
+def events_per_contact(layout: Layout) -> int:
+    """Number of event functions per contact."""
     return layout.events // layout.contacts
 
 
 def tally_at(layout: Layout, contact: int) -> int:
-    """What has to be added to `Row.EVENTS` and the places up to `Row.NOW_SEGMENT`."""
+    """Offset that turns a row between `Row.EVENTS` and `Row.NOW_SEGMENT` into that of a contact."""
     return layout.tallies + (contact - 1) * TALLIED - Row.EVENTS if contact > 0 else 0
 
 
-def searched(layout: Layout) -> int:
-    """How many unknowns and velocity variables there are guesses of."""
+def guess_count(layout: Layout) -> int:
+    """Number of quantities that have a guess: unknowns and velocity variables that balances fix, at least one."""
     return max(max(layout.massless, layout.unknowns), 1)
 
 
 def guess_at(layout: Layout, index: int) -> int:
-    """Where an unknown is, or the guess of a velocity variable that a balance fixes."""
+    """Index in a record of an unknown, or of the guess of a velocity variable that a balance fixes."""
     return layout.guess + index - 1 if index > 0 else int(Row.Z)
 
 
 def scale_at(layout: Layout, index: int) -> int:
-    """Where its scale is."""
+    """Index in a record of the scale of an unknown."""
     return layout.scale + index - 1 if index > 0 else int(Row.Z_SCALE)
 
 
 def earlier_at(layout: Layout, index: int) -> int:
-    """Where an unknown is as it was at the start of the last step."""
+    """Index in a record of an unknown's value at the start of the last step."""
     return layout.earlier + index - 1 if index > 0 else int(Row.Z_OLD)
 
 
 def velocity_at(R: Array, layout: Layout, contact: int) -> float:
-    """Velocity at a contact at the end of the step."""
+    """Velocity (m/s) of a contact at the end of the step."""
     return float(R[layout.elsewhere + 3 * (contact - 1)] if contact > 0 else R[Row.V])

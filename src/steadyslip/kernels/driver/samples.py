@@ -1,19 +1,19 @@
-"""What is written down on the way: states at requested times, and the solver's own steps."""
+"""Storage of states at requested times and of the solver's own steps."""
 
 from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.driver.looking import between, hold
+from steadyslip.kernels.driver.interpolate import copy_state, interpolate_state
 from steadyslip.kernels.driver.places import point_at, unknown_at
 from steadyslip.kernels.driver.segments import clock
 from steadyslip.kernels.layout import Array, Cursor, Layout, Recorded, Routines, Row, Sampled
 
-BETWEEN = 3  # points that are recorded between the ends of a step whose dense output has stages of its own
+BETWEEN = 3  # extra points recorded within each step of a method of high order, whose steps are long; chosen by trial
 
 
-def await_sample(R: Array, times: Array) -> None:
-    """How far into the segment the next requested time is, for the kernel's flag."""
+def schedule_sample(R: Array, times: Array) -> None:
+    """Set the local time of the next requested sample, which the kernel compares with its own."""
     k = int(R[Row.TAKEN])
     R[Row.NEXT] = times[k] - R[Row.START] if k < times.shape[0] else math.inf
 
@@ -21,9 +21,9 @@ def await_sample(R: Array, times: Array) -> None:
 def take_samples(
     R: Array, layout: Layout, routines: Routines, row: int, times: Array, samples: Array, at_end: bool, y: Array
 ) -> None:
-    """Write the state at every requested time: before now, from the dense output; `at_end`, now, as it is.
+    """Store the state at each requested time that the step has passed, by dense output; at the end of a run, as it is.
 
-    A breakpoint itself belongs to the segment that begins there, the end of the run to the last one.
+    A sample at a breakpoint belongs to the segment that begins there, one at the end of the run to the last segment.
     """
     arrived = R[Row.TAU] >= R[Row.END]
     k = int(R[Row.TAKEN])
@@ -32,22 +32,22 @@ def take_samples(
         if at_end:
             if times[k] > clock(R, R[Row.TAU]):
                 break
-            hold(R, layout, y)
+            copy_state(R, layout, y)
         else:
             if times[k] >= R[Row.STOP] or (tau >= R[Row.TAU] and not arrived):
                 break
-            between(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
+            interpolate_state(R, layout, routines, min(max((tau - R[Row.TAU_OLD]) / R[Row.DONE], 0.0), 1.0), y)
         for i in range(layout.size):
             samples[row, k, Sampled.STATE + i] = y[i]
         for j in range(max(layout.unknowns, 1)):
             samples[row, k, point_at(layout, j)] = y[unknown_at(layout, j)]
         k += 1
     R[Row.TAKEN] = k
-    await_sample(R, times)
+    schedule_sample(R, times)
 
 
 def record(R: Array, layout: Layout, tau: float, y: Array, cursor: Array, recorded: Array) -> None:
-    """Write down the point that y holds, at tau into the segment."""
+    """Append the point in `y`, at local time tau, to the recorded steps."""
     i = cursor[Cursor.RECORDED]
     recorded[i, Recorded.TIME] = clock(R, tau)
     recorded[i, Recorded.SEGMENT] = R[Row.SEGMENT]
@@ -59,15 +59,15 @@ def record(R: Array, layout: Layout, tau: float, y: Array, cursor: Array, record
 
 
 def record_step(R: Array, layout: Layout, routines: Routines, cursor: Array, recorded: Array, y: Array) -> None:
-    """The solver's own step; steps of high order are long, and get points between."""
+    """Record the end of the last step, with points between where a method of high order takes long steps."""
     for i in range(1, BETWEEN + 1 if layout.extra > 0 else 1):
         theta = i / (BETWEEN + 1)
-        between(R, layout, routines, theta, y)
+        interpolate_state(R, layout, routines, theta, y)
         record(R, layout, R[Row.TAU_OLD] + theta * R[Row.DONE], y, cursor, recorded)
     record_now(R, layout, cursor, recorded, y)
 
 
 def record_now(R: Array, layout: Layout, cursor: Array, recorded: Array, y: Array) -> None:
-    """Write down where the record is."""
-    hold(R, layout, y)
+    """Record the current state."""
+    copy_state(R, layout, y)
     record(R, layout, R[Row.TAU], y, cursor, recorded)

@@ -1,4 +1,4 @@
-"""Segments of a protocol: the time within them, their inputs, and the jump at the start of each."""
+"""Segments of a protocol: local time, inputs, and the jump at the start of each."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from steadyslip.kernels.layout import Array, Layout, Routines, Row, call
 
 
 def clock(R: Array, tau: float) -> float:
-    """Time since the start of the run, at tau into the segment: at its end that of the breakpoint, to the last bit."""
+    """Time since the start of the run at local time tau; at the segment's end exactly that of the breakpoint."""
     return float(min(R[Row.START] + tau, R[Row.STOP]) if tau < R[Row.END] else R[Row.STOP])
 
 
 def set_inputs(S: Array, layout: Layout, lanes: int, lane: int, row: Array, first: int) -> None:
-    """Values and slopes of the inputs, for one lane, from where they begin in a row."""
+    """Copy values and slopes of the inputs to a lane, from column `first` of a row on."""
     for i in range(layout.inputs):
         S[(layout.level + i) * lanes + lane] = row[first + i]
         S[(layout.slope + i) * lanes + lane] = row[first + layout.inputs + i]
 
 
 def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -> None:
-    """Times and inputs of a segment, for one lane."""
+    """Copy times and inputs of a segment to a lane."""
     S[Row.TAU * lanes + lane] = 0.0
     S[Row.START * lanes + lane] = row[0]
     S[Row.STOP * lanes + lane] = row[1]
@@ -35,7 +35,7 @@ def begin_segment(S: Array, layout: Layout, lanes: int, lane: int, row: Array) -
 
 
 def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, segments: Array, y: Array) -> bool:
-    """Start segment k: jump of the load point, new inputs, velocity from the balance. False if there is none."""
+    """Enter segment k: jump of the load point, new inputs, velocity from the balance; False if there is none."""
     s = j if segments.shape[0] > 1 else 0
     if k > 0:
         call(routines.restore, R, 0.0, y)
@@ -45,7 +45,7 @@ def enter_segment(R: Array, layout: Layout, routines: Routines, j: int, k: int, 
     call(routines.shift, R, row[2], y)
     R[Row.LOAD_MOVED] += row[2]
     good = True
-    if layout.massless > 0:  # velocity variables before the jump are the guesses
+    if layout.massless > 0:  # velocity variables before the jump serve as guesses
         good = solve_balances(R, layout, routines, y)
     call(routines.place, R, 0.0, y)
     call(routines.rates, R, 0.0, y)

@@ -1,16 +1,16 @@
-"""What becomes of events: the log, the tally, and when slip becomes a slip event. Each contact has its own."""
+"""Log and statistics of events per contact, and the distinction of slip events from slow slip."""
 
 from __future__ import annotations
 
 import math
 
-from steadyslip.kernels.driver.places import kinds, outputs_at, tally_at
+from steadyslip.kernels.driver.places import events_per_contact, outputs_at, tally_at
 from steadyslip.kernels.driver.segments import clock
 from steadyslip.kernels.layout import SLIP_EVENT, Array, Cursor, Kind, Layout, Out, Row
 
 
-def outrun(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y: Array) -> None:
-    """Keep where a block ahead of the load point was slowest: there its slip begins, if it becomes a slip event."""
+def track_slowest(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y: Array) -> None:
+    """Store the state at the lowest velocity of a block ahead of the load point: a slip event counts from there."""
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     R[own + Row.NOW_FROM] = slowest
     R[own + Row.NOW_EVENT] = 0.0
@@ -24,10 +24,10 @@ def outrun(R: Array, layout: Layout, contact: int, slowest: float, tau: float, y
     R[own + Row.NOW_SEGMENT] = R[Row.SEGMENT]
 
 
-def quicken(R: Array, layout: Layout, contact: int, y: Array, log: Array, cursor: Array) -> None:
-    """Slip becomes a slip event when the block is SLIP_EVENT times as fast as asked and as at its slowest.
+def begin_slip_event(R: Array, layout: Layout, contact: int, y: Array, log: Array, cursor: Array) -> None:
+    """Mark slip as a slip event if its velocity reaches SLIP_EVENT times both that of the load point and its lowest.
 
-    Asked is the velocity of the load point, or of the drive while the load point rests.
+    While the load point rests, the velocity of the drive replaces its own.
     """
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     v, v_lp, share = y[n + Out.V], y[n + Out.V_LP], y[n + Out.SHARE]
@@ -37,23 +37,23 @@ def quicken(R: Array, layout: Layout, contact: int, y: Array, log: Array, cursor
     R[own + Row.NOW_EVENT] = 1.0
     if log.shape[0] > 0:
         i = cursor[Cursor.LOGGED]
-        log[i, 0] = Kind.SLIP_BEGINS + 2 * kinds(layout) * contact
+        log[i, 0] = Kind.SLIP_BEGINS + 2 * events_per_contact(layout) * contact
         log[i, 1], log[i, 2] = R[own + Row.NOW_BEGIN], R[own + Row.NOW_V]
         log[i, 3], log[i, 4], log[i, 5] = R[own + Row.NOW_SIGMA], R[own + Row.NOW_TAU], R[own + Row.NOW_STRESS]
         log[i, 6], log[i, 7] = R[own + Row.NOW_X], R[own + Row.NOW_SEGMENT]
         cursor[Cursor.LOGGED] = i + 1
 
 
-def note(R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
-    """Keep the tally of events, and the log where there is one; `number` is a `Kind`, of a further contact a higher."""
-    contact = (number - 1) // (2 * kinds(layout))
-    kind = number - 2 * kinds(layout) * contact
+def record_event(R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array, cursor: Array) -> None:
+    """Add an event to statistics and log (if kept); `number` is its `Kind`, plus an offset for further contacts."""
+    contact = (number - 1) // (2 * events_per_contact(layout))
+    kind = number - 2 * events_per_contact(layout) * contact
     n, own = outputs_at(layout, contact), tally_at(layout, contact)
     time = clock(R, tau)
     place = y[n + Out.PLACE]
     v, stress = y[n + Out.V], y[n + Out.T]
-    if kind == Kind.SLIP_BEGINS:  # logged once it is fast, if ever: see quicken
-        outrun(R, layout, contact, v, tau, y)
+    if kind == Kind.SLIP_BEGINS:  # logged once it is fast enough for a slip event: see begin_slip_event
+        track_slowest(R, layout, contact, v, tau, y)
         return
     is_event = R[own + Row.NOW_EVENT] > 0.0
     if kind == Kind.SLIP_ENDS:
@@ -68,7 +68,7 @@ def note(R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array
         cursor[Cursor.LOGGED] = i + 1
     if kind == Kind.SLIP_ENDS:
         begin = R[own + Row.NOW_BEGIN]
-        if R[own + Row.ANY_BEGIN] > 0.0:  # one that was going on at the start has no beginning of its own
+        if R[own + Row.ANY_BEGIN] > 0.0:  # slip that went on at the start of the run has no known begin
             R[own + Row.RECURRENCE] = begin - R[own + Row.EVENT_BEGIN]
         R[own + Row.ANY_BEGIN] = 1.0 if begin > 0.0 else 0.0
         R[own + Row.EVENTS] += 1.0
@@ -86,8 +86,8 @@ def note(R: Array, layout: Layout, number: int, tau: float, y: Array, log: Array
         R[own + Row.LAST_PEAK_TIME] = time
         R[own + Row.PEAK_VELOCITY] = max(R[own + Row.PEAK_VELOCITY], v)
         R[own + Row.NOW_PEAK] = max(R[own + Row.NOW_PEAK], v)
-        quicken(R, layout, contact, y, log, cursor)
+        begin_slip_event(R, layout, contact, y, log, cursor)
     elif kind == Kind.TROUGH:
         R[own + Row.LOWEST_VELOCITY] = min(R[own + Row.LOWEST_VELOCITY], v)
-        if not is_event and v < R[own + Row.NOW_FROM] < math.inf:  # what came before was no event
-            outrun(R, layout, contact, v, tau, y)
+        if not is_event and v < R[own + Row.NOW_FROM] < math.inf:  # slip before this trough was too slow for an event
+            track_slowest(R, layout, contact, v, tau, y)

@@ -1,4 +1,4 @@
-"""No loop at all: outputs and rates at points that are given."""
+"""Outputs and rates at given points, without integration."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from steadyslip.kernels.driver.places import (
     earlier_at,
     further_at,
     guess_at,
+    guess_count,
+    output_size,
     outputs_at,
     point_at,
     scale_at,
-    searched,
     unknown_at,
-    width,
 )
 from steadyslip.kernels.driver.segments import begin_segment, set_inputs
 from steadyslip.kernels.layout import Array, Layout, Out, Routines, Row, Sampled, Setting, call
 
 
-def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
-    """Constants of a rig, and its guesses of the unknowns."""
+def set_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: int) -> None:
+    """Copy constants, guesses and scales of a rig to a record."""
     for i in range(layout.constants):
         R[layout.constant + i] = constants[own if constants.shape[0] > 1 else 0, i]
-    row, count = own if settings.shape[0] > 1 else 0, searched(layout)
+    row, count = own if settings.shape[0] > 1 else 0, guess_count(layout)
     R[Row.Z] = settings[row, Setting.GUESS]
     R[Row.Z_SCALE] = settings[row, Setting.Z_SCALE]
     for k in range(1, count):
@@ -34,10 +34,10 @@ def place_rig(R: Array, layout: Layout, constants: Array, settings: Array, own: 
         R[scale_at(layout, k)] = settings[row, Setting.ATOL + layout.size + count + k - 2]
 
 
-def place_point(R: Array, layout: Layout, routines: Routines, points: Array, m: int, y: Array) -> None:
-    """Bring point m into a record and into y, balances solved where there are some left to solve.
+def set_point(R: Array, layout: Layout, routines: Routines, points: Array, m: int, y: Array) -> None:
+    """Copy point m to a record and to `y`, and solve the balances where the state does not determine the velocity.
 
-    Where the point does not tell its unknowns (NaN), what the record has are the guesses.
+    Unknowns that are NaN in the point keep the guesses of the record.
     """
     for k in range(max(layout.unknowns, 1)):
         if math.isfinite(points[m, point_at(layout, k)]):
@@ -53,18 +53,18 @@ def place_point(R: Array, layout: Layout, routines: Routines, points: Array, m: 
         if not solve_balances(R, layout, routines, y):
             for k in range(layout.unknowns):
                 R[guess_at(layout, k)] = R[earlier_at(layout, k)]
-        for i in range(layout.size):  # what `solve_balances` left there
+        for i in range(layout.size):  # `solve_balances` uses y as work space
             y[i] = points[m, Sampled.STATE + i]
     for k in range(max(layout.unknowns, 1)):
         y[unknown_at(layout, k)] = R[guess_at(layout, k)]
 
 
-def go_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array, s: int, k: int, y: Array) -> None:
-    """From the segment that the record is in (-1 before the first) to a later one, with the way of the load point."""
+def advance_to_segment(R: Array, layout: Layout, routines: Routines, segments: Array, s: int, k: int, y: Array) -> None:
+    """Advance the record from its segment (-1: before the first) to segment k, adding up the load point's motion."""
     while R[Row.SEGMENT] < k:
         if R[Row.SEGMENT] >= 0.0:
             R[Row.TAU] = R[Row.END]
-            call(routines.restore, R, 0.0, y)  # for the way of the load point
+            call(routines.restore, R, 0.0, y)  # adds the motion of the load point
         R[Row.SEGMENT] += 1.0
         row = segments[s, int(R[Row.SEGMENT])]
         begin_segment(R, layout, 1, 0, row)
@@ -75,19 +75,19 @@ def observe(
     layout: Layout, routines: Routines, constants: Array, settings: Array, segments: Array, points: Array, own: Array,
     segment: Array, times: Array, values: Array,
 ) -> None:  # fmt: skip
-    """Outputs and continuous variables at given points.
+    """Compute outputs and continuous variables at given points, into `values`.
 
-    `points` is (m, 1 + size + further unknowns); `own` (m,) the rig's row, `segment` and `times` where and when in its
-    protocol, since the start of the run. `values` is (7 contacts + kept + further, m): `Out` up to ADVANCE of each
-    contact, which is here the way of the load point since the start of the run, the variables that jumps leave alone,
-    and what else is observed.
+    `points` is (m, 1 + size + further unknowns); `own` (m,) the row of the rig; `segment` and `times` (m,) segment and
+    time since the start of the run, s. `values` is (7 contacts + kept + further, m): per contact `Out` up to ADVANCE,
+    which is here the load point's displacement since the start of the run, then the variables that jumps leave
+    unchanged, then further observables.
     """
-    R, y = np.zeros(layout.rows), np.empty(width(layout))
+    R, y = np.zeros(layout.rows), np.empty(output_size(layout))
     rig = -1
     for m in range(points.shape[0]):
         if own[m] != rig:
             rig = own[m]
-            place_rig(R, layout, constants, settings, rig)
+            set_rig(R, layout, constants, settings, rig)
             R[Row.SEGMENT] = -1.0
             R[Row.LOAD_MOVED] = 0.0
         for i in range(layout.size):
@@ -95,9 +95,9 @@ def observe(
         if R[Row.SEGMENT] > segment[m]:
             R[Row.SEGMENT] = -1.0
             R[Row.LOAD_MOVED] = 0.0
-        go_to_segment(R, layout, routines, segments, rig if segments.shape[0] > 1 else 0, segment[m], y)
+        advance_to_segment(R, layout, routines, segments, rig if segments.shape[0] > 1 else 0, segment[m], y)
         R[Row.TAU] = times[m] - R[Row.START]
-        place_point(R, layout, routines, points, m, y)
+        set_point(R, layout, routines, points, m, y)
         call(routines.outputs, R, R[Row.TAU], y)
         moved = R[Row.LOAD_MOVED]
         for c in range(layout.contacts):
@@ -117,16 +117,16 @@ def field(
     layout: Layout, routines: Routines, constants: Array, settings: Array, points: Array, inputs: Array, own: Array,
     values: Array,
 ) -> None:  # fmt: skip
-    """Rates (m, size) at given points, (m, 1 + size + further unknowns).
+    """Compute rates (m, size) at given points (m, 1 + size + further unknowns), into `values`.
 
-    `inputs` (m, 2 inputs + 1) holds v_lp, q, p, ..., their slopes and the time, `own` the rig.
+    `inputs` (m, 2 inputs + 1) holds v_lp, q, p, ..., their slopes and the time; `own` (m,) the row of the rig.
     """
-    R, y = np.zeros(layout.rows), np.empty(width(layout))
+    R, y = np.zeros(layout.rows), np.empty(output_size(layout))
     for m in range(points.shape[0]):
-        place_rig(R, layout, constants, settings, own[m])
+        set_rig(R, layout, constants, settings, own[m])
         set_inputs(R, layout, 1, 0, inputs[m], 0)
         R[Row.START] = inputs[m, 2 * layout.inputs]
-        place_point(R, layout, routines, points, m, y)
+        set_point(R, layout, routines, points, m, y)
         call(routines.rates, R, 0.0, y)
         for i in range(layout.size):
             values[m, i] = R[layout.rate + i]

@@ -1,8 +1,8 @@
-"""The loop of fits: all lanes go through one table of inputs together, with sensitivities (`kernels/lockstep.py`).
+"""Loop of fits: all lanes follow one table of inputs together, with sensitivities (`kernels/lockstep.py`).
 
-A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs. What is observed is
-wanted at the same times in every job. Lanes take steps of their own size and look back to the times in each of them;
-where there are fewer jobs than lanes, several lanes do the same job and share its times among them.
+A row of `segments` is start, end, jump of the load point, then values and slopes of the inputs. All jobs are observed
+at the same times. Each lane takes steps of its own size and interpolates at the times within them; where there are
+fewer jobs than lanes, several lanes integrate the same job and share its times.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from steadyslip.kernels.driver.jobs import exhausted, load_job
 from steadyslip.kernels.driver.segments import begin_segment
 from steadyslip.kernels.layout import Array, Layout, Routines, Row, Status, call
 
-INSTANT = 1e-14  # share of the row: a motion that needs shorter steps runs away, and ends
+INSTANT = 1e-14  # share of a row's length: a motion that needs shorter steps runs away; about 50 roundings of time
 
 
 def lanes_of_job(layout: Layout, count: int, lane: int) -> int:
-    """How many of the lanes do the job that a lane does, of so many jobs."""
+    """Number of lanes that integrate the same job as a lane, if there are `count` jobs."""
     return (layout.lanes - 1 - lane % count) // count + 1
 
 
@@ -27,14 +27,14 @@ def enter_row(
     S: Array, layout: Layout, group: int, count: int, k: int, segments: Array, times: Array, input_rates: Array,
     places: Array,
 ) -> None:  # fmt: skip
-    """Start row k of the table: new inputs, jump of the load point, how far into it the next sample is."""
+    """Start row k of the table in all lanes: inputs, jump of the load point, local time of the next sample."""
     W = layout.lanes
     for lane in range(W):
         job = group + lane % count
         row = segments[min(job, segments.shape[0] - 1), k]
         begin_segment(S, layout, W, lane, row)
         S[(layout.state + layout.x) * W + lane] -= row[2]
-        await_look(S, W, lane, times, k == segments.shape[1] - 1)
+        schedule_table_sample(S, W, lane, times, k == segments.shape[1] - 1)
         if input_rates.shape[1] > 0:
             own = min(job, input_rates.shape[0] - 1)
             for d in range(layout.directions):
@@ -44,10 +44,10 @@ def enter_row(
                         S[(layout.constant + place) * W + lane] = input_rates[own, d, k, i]
 
 
-def await_look(S: Array, lanes: int, lane: int, times: Array, is_last: bool) -> None:
-    """How far into the row the next sample of a lane is; never, if it is not in this row.
+def schedule_table_sample(S: Array, lanes: int, lane: int, times: Array, is_last: bool) -> None:
+    """Set the local time of a lane's next sample; infinite if it is not in this row.
 
-    A sample at the end of a row belongs to the next one.
+    A sample at the end of a row belongs to the next row.
     """
     S[Row.NEXT * lanes + lane] = math.inf
     k = int(S[Row.TAKEN * lanes + lane])
@@ -57,8 +57,8 @@ def await_look(S: Array, lanes: int, lane: int, times: Array, is_last: bool) -> 
             S[Row.NEXT * lanes + lane] = times[k] - S[Row.START * lanes + lane]
 
 
-def move_nodes(S: Array, layout: Layout, group: int, count: int, k: int, node_rates: Array) -> bool:
-    """Sensitivities jump where the start of a row moves with a direction: by the difference of the rates there."""
+def shift_sensitivities(S: Array, layout: Layout, group: int, count: int, k: int, node_rates: Array) -> bool:
+    """Shift sensitivities where the start of row k depends on a direction, by the change of rates; True if any."""
     moved = False
     W, own = layout.lanes, layout.own
     for lane in range(W):
@@ -73,11 +73,11 @@ def move_nodes(S: Array, layout: Layout, group: int, count: int, k: int, node_ra
     return moved
 
 
-def cross(
+def finish_row(
     S: Array, layout: Layout, routines: Routines, group: int, count: int, times: Array, is_last: bool, seen: Array,
     y: Array,
 ) -> None:  # fmt: skip
-    """Take every living lane to the end of the row; a motion that runs away in no time at all ends there."""
+    """Integrate all active lanes to the end of the row; a lane whose steps become too small stops."""
     W = layout.lanes
     while True:
         waiting = 0
@@ -97,11 +97,11 @@ def cross(
             call(routines.extend_lanes, S, 0.0, y)
         while passed > 0:
             call(routines.look_lanes, S, 0.0, y)
-            passed = write_down(S, layout, group, count, times, is_last, seen)
+            passed = store_samples(S, layout, group, count, times, is_last, seen)
 
 
 def lanes_due(S: Array, lanes: int) -> int:
-    """How many living lanes have passed their next sample."""
+    """Number of active lanes that have passed their next sample."""
     found = 0
     for lane in range(lanes):
         if S[Row.NEXT * lanes + lane] <= S[Row.TAU * lanes + lane] and S[Row.ACTIVE * lanes + lane] > 0.0:
@@ -109,8 +109,8 @@ def lanes_due(S: Array, lanes: int) -> int:
     return found
 
 
-def write_down(S: Array, layout: Layout, group: int, count: int, times: Array, is_last: bool, seen: Array) -> int:
-    """What is observed in every living lane that has passed its next sample; how many have passed the next but one."""
+def store_samples(S: Array, layout: Layout, group: int, count: int, times: Array, is_last: bool, seen: Array) -> int:
+    """Store observables and derivatives of lanes that are due; returns how many are due again in the same step."""
     W, passed = layout.lanes, 0
     for lane in range(W):
         if S[Row.NEXT * W + lane] <= S[Row.TAU * W + lane] and S[Row.ACTIVE * W + lane] > 0.0:
@@ -118,7 +118,7 @@ def write_down(S: Array, layout: Layout, group: int, count: int, times: Array, i
             for i in range(1 + layout.directions):
                 seen[group + lane % count, i, sample] = S[(layout.seen + i) * W + lane]
             S[Row.TAKEN * W + lane] = sample + lanes_of_job(layout, count, lane)
-            await_look(S, W, lane, times, is_last)
+            schedule_table_sample(S, W, lane, times, is_last)
             if S[Row.NEXT * W + lane] <= S[Row.TAU * W + lane]:
                 passed += 1
     return passed
@@ -128,13 +128,13 @@ def through_table(
     layout: Layout, routines: Routines, places: Array, constants: Array, initial: Array, settings: Array,
     segments: Array, times: Array, node_rates: Array, input_rates: Array, seen: Array, steps: Array,
 ) -> None:  # fmt: skip
-    """Take all jobs through the table.
+    """Integrate all jobs through the table.
 
-    One row per job, or one shared row: `constants`, `initial` (states), `settings`, `segments` (jobs, k, 9). `times`
-    (samples,) are those at which everything observed is written to `seen` (jobs, 1 + directions, samples), which a
-    motion that does not get there leaves as it is. `node_rates` (jobs, directions, k) and `input_rates` (jobs,
-    directions, k, 3) have no directions where none moves the table; `places` says where among the constants the rates
-    of the inputs belong.
+    `constants`, `initial` (states), `settings` and `segments` (jobs, k, 9) have one row per job or one shared row. At
+    `times` (samples,) the observable and its derivatives are written to `seen` (jobs, 1 + directions, samples); entries
+    of a motion that stops early stay unchanged. `node_rates` (jobs, directions, k) and `input_rates` (jobs, directions,
+    k, 3) are the derivatives of breakpoint times and inputs, with no directions where none changes the table; `places`
+    are the indices of the rates of inputs among the constants. `steps` receives accepted and rejected steps.
     """
     W = layout.lanes
     S, y = np.zeros(layout.rows * W), np.empty(2)
@@ -151,12 +151,12 @@ def through_table(
                 S[layout.before * W + i] = S[layout.rate * W + i]
             enter_row(S, layout, group, count, k, segments, times, input_rates, places)
             call(routines.rates_lanes, S, 0.0, y)
-            if k > 0 and node_rates.shape[1] > 0 and move_nodes(S, layout, group, count, k, node_rates):
+            if k > 0 and node_rates.shape[1] > 0 and shift_sensitivities(S, layout, group, count, k, node_rates):
                 call(routines.rates_lanes, S, 0.0, y)
             if lanes_due(S, W) > 0:
                 call(routines.see_lanes, S, 0.0, y)
-                write_down(S, layout, group, count, times, is_last, seen)
-            cross(S, layout, routines, group, count, times, is_last, seen, y)
+                store_samples(S, layout, group, count, times, is_last, seen)
+            finish_row(S, layout, routines, group, count, times, is_last, seen, y)
         for lane in range(count):
             steps[group + lane, 0] = S[Row.ACCEPTED * W + lane]
             steps[group + lane, 1] = S[Row.REJECTED * W + lane]

@@ -1,4 +1,4 @@
-"""Programs as JavaScript, for the browser; elementary functions are those of `runtime.js`."""
+"""Programs as JavaScript for browsers, with the elementary functions of `runtime.js`."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _OWN = {"abs", "sqrt"}
 
 
 def runtime() -> str:
-    """The text of the module whose functions programs and driver call."""
+    """Text of the module with the elementary functions."""
     return files("steadyslip.kernels.printers").joinpath("runtime.js").read_text(encoding="utf-8")
 
 
 def runtime_names() -> set[str]:
-    """What `runtime` exports."""
+    """Names that `runtime` exports."""
     return set(_EXPORTED.findall(runtime()))
 
 
 def as_script(*modules: str) -> str:
-    """Modules one behind the other in one scope: without what they import from each other, and export.
+    """Join modules into one scope, without their imports from each other and `export`.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def as_script(*modules: str) -> str:
 
 
 def machine(programs: Sequence[Program], layout: Layout) -> str:
-    """A kernel as an expression: an object with its `layout` and `routines`, as the transpiled driver takes them."""
+    """JavaScript expression of a kernel: an object with its `layout` and `routines`, for the transpiled driver."""
     known = {program.name for program in programs}
     routines = ", ".join(name if name in known else "absent" for name in Routines._fields)
     functions = "".join(map(text, programs))
@@ -56,12 +56,12 @@ def machine(programs: Sequence[Program], layout: Layout) -> str:
 
 
 def text(program: Program) -> str:
-    """A program as a JavaScript function of a record, a number and an array."""
+    """JavaScript function of a program, with arguments record, number, array."""
     return f"function {program.name}(R, x, y) {{\n{''.join(_JavaScript(program).body())}}}\n"
 
 
 def literal(value: Any) -> str:
-    """A number, not finite ones too, or a truth."""
+    """JavaScript literal of a number (also nan, inf) or bool."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float) and not math.isfinite(value):

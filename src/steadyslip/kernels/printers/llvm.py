@@ -1,7 +1,7 @@
 """Programs as LLVM assembly: scalar code for one record, vectors for lanes side by side.
 
-A program for lanes does the same operation for several vectors in turn: one chain of dependent operations leaves a
-processor idle for most of the time, several fill its gaps.
+In a program for lanes each operation is written for several vectors in turn: one chain of dependent operations would
+leave the processor idle for most of the time.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from steadyslip.kernels import primitives
 from steadyslip.kernels.layout import GROUP
 from steadyslip.kernels.nodes import PRIMITIVES, Loop, Node, Program, reachable
 
-_FAST = "nsz contract"  # what may be done with arithmetic: fused multiply-add, no care for the sign of zero
+_FAST = "nsz contract"  # freedom of the compiler: ignore the sign of zero, fuse multiplications with additions
 _REAL = {"add": f"fadd {_FAST}", "sub": f"fsub {_FAST}", "mul": f"fmul {_FAST}", "div": f"fdiv {_FAST}"}
 _WHOLE = {"add": "add", "sub": "sub", "mul": "mul", "and": "and", "or": "or", "shl": "shl", "shr": "ashr"}
 _COMPARE = {"lt": ("olt", "slt"), "le": ("ole", "sle"), "gt": ("ogt", "sgt"), "ge": ("oge", "sge")}
@@ -23,19 +23,19 @@ Lines = list[str]
 
 
 def assembly(programs: Sequence[Program], lanes: int, names: dict[str, str], pointer: str) -> str:
-    """The text of a module.
+    """Assembly of a module.
 
     Parameters
     ----------
     programs : sequence of Program
-        Those whose name ends in ``lanes`` or is ``step`` do all lanes, those whose name ends in ``group``
-        `GROUP` of them, from the one on that their number says.
+        Programs named ``step`` or ``...lanes`` process all lanes, those named ``...group`` `GROUP` lanes from the one
+        that their number argument gives, others one record.
     lanes : int
         One, or a multiple of `GROUP`.
     names : dict of str to str
-        Symbols of the programs.
+        Symbol of each program.
     pointer : str
-        How this LLVM writes a pointer to a double.
+        Type of a pointer to a double in this LLVM.
     """
     text, used = [], set()
     for program in programs:
@@ -64,7 +64,7 @@ def _suffix(width: int) -> str:
 
 @lru_cache(maxsize=64)
 def _primitive(name: str, width: int) -> str:
-    """One elementary function, to be put in place of its calls."""
+    """Definition of an elementary function, which LLVM inlines."""
     arguments = [Node("argument", (i,)) for i in range(2 if name in ("power", "asinh_exp") else 1)]
     result = getattr(primitives, name)(*arguments)
     writer = _Writer(width, "", chains=1)
@@ -81,11 +81,11 @@ def _primitive(name: str, width: int) -> str:
 
 
 class _Writer:
-    """Writes one function."""
+    """Writer of one function."""
 
     def __init__(self, lanes: int, pointer: str, chains: int = 0, apart: int = 0) -> None:
         self.pointer = pointer
-        self.apart = apart or lanes  # between two numbers of one lane
+        self.apart = apart or lanes  # distance between two rows of one lane
         self.record = "R"
         self.width = lanes if chains else min(lanes, GROUP)
         self.chains = chains or lanes // self.width
@@ -95,9 +95,9 @@ class _Writer:
         self.block, self.count = "entry", 0
 
     def function(self, program: Program, symbol: str) -> str:
-        """The whole function."""
+        """Definition of the whole function."""
         self.values[program.number.order] = ["%x"] * self.chains
-        if self.apart > self.width * self.chains:  # a group of the lanes
+        if self.apart > self.width * self.chains:  # processes a group of the lanes
             self.lines.append("  %first = fptosi double %x to i64")
             self.lines.append(f"  %G = getelementptr inbounds double, {self.pointer} %R, i64 %first")
             self.record = "G"
@@ -110,11 +110,11 @@ class _Writer:
         body = "\n".join(self.lines)
         array = f"{self.pointer} noalias nocapture"
         head = f"define void @{symbol}({array} %R, double %x, {array} %y) nounwind"
-        aligned = "" if self.width == 1 else f" alignstack({8 * GROUP})"  # a fifth of the time
+        aligned = "" if self.width == 1 else f" alignstack({8 * GROUP})"  # saves a fifth of the time
         return f"{head}{aligned} {{\nentry:\n{body}\n  ret void\n}}"
 
     def emit(self, nodes: Sequence[Node], loop: Loop | None = None) -> None:
-        """Everything that is not inside a loop, or that is inside this one."""
+        """Write all nodes that belong to a loop, or to none."""
         for node in nodes:
             if node.order in self.values or node.loop is not loop:
                 continue
@@ -139,7 +139,7 @@ class _Writer:
         return "<" + ", ".join([f"{_SCALAR[node.kind]} {text}"] * self.width) + ">"
 
     def _vector(self) -> str:
-        """Type of a pointer to what is loaded and stored."""
+        """Type of pointers to loaded and stored values."""
         if self.width == 1 or self.pointer == "ptr":
             return self.pointer
         return f"{_type('real', self.width)}*"
@@ -189,7 +189,7 @@ class _Writer:
         return name
 
     def _loop(self, loop: Loop) -> None:
-        """A block that is left after a fixed number of rounds."""
+        """Write a loop as a block that is left after a fixed number of rounds."""
         if loop.results[0].order in self.values:
             return
         self.emit(reachable(loop.given))

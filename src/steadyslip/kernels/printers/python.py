@@ -1,4 +1,4 @@
-"""Programs as plain Python: slow, readable, to be stepped through."""
+"""Programs as Python: slow and readable, to be stepped through."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OF_INTEGERS = {"shl": "<<", "shr": ">>"}
 
 
 def function(program: Program, steppable: bool = False) -> Callable[[Any, float, Any], None]:
-    """A program as a Python function, its lines at hand for debuggers if it is to be `steppable`."""
+    """Python function of a program; if `steppable`, debuggers can show its lines."""
     known = {name: _as_numpy(getattr(primitives, name)) for name in PRIMITIVES} | {"float64": np.float64}
     known |= {name: getattr(primitives, name) for name in ("bits", "real", "as_float")}
     found: dict[str, Any] = {}
@@ -33,12 +33,12 @@ def function(program: Program, steppable: bool = False) -> Callable[[Any, float,
 
 
 def _as_numpy(primitive: Callable[..., Any]) -> Callable[..., np.float64]:
-    """The same with NumPy's numbers, which can be divided by zero, as those of a record."""
+    """Primitive that returns NumPy floats, which can be divided by zero as those of a record can."""
     return lambda *given: np.float64(primitive(*given))
 
 
 def text(program: Program) -> str:
-    """Its source."""
+    """Source of a program."""
     return f"def {program.name}(R, x, y):\n" + ("".join(_Python(program).body()) or "    pass\n")
 
 
@@ -50,7 +50,7 @@ class _Python(Writer):
         )
 
     def select(self, condition: str, value: str, other: str) -> str:
-        value, other = (f"float64({one})" if one == "0.0" else one for one in (value, other))  # may be divided by
+        value, other = (f"float64({one})" if one == "0.0" else one for one in (value, other))  # may be a divisor
         return f"({value} if {condition} else {other})"
 
     def operation(self, node: Node, arguments: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""Programs as lines of text, for languages with expressions: what is used once is put where it is used."""
+"""Programs as text of a language with expressions: values that are used once are inlined."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from steadyslip.kernels.nodes import Loop, Node, Program, reachable
 
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
 _SUMS, _PRODUCTS = frozenset(("add", "sub")), frozenset(("mul", "div"))
-_DEEPEST = 8  # operations in one line
+_DEEPEST = 8  # most nested operations in one line, for readability
 
 
 class Writer(ABC):
-    """Names what is used more than once, and puts the rest into the expressions that use it.
+    """Writer of a program: names values used more than once, inlines the others.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Writer(ABC):
         self.program = program
         self.lines: list[str] = []
         self.known: dict[int, str] = {program.number.order: "x"}
-        self.signs: dict[int, str] = {}  # operations of what is in brackets
+        self.signs: dict[int, str] = {}  # outermost operator of expressions in brackets
         self.depth: dict[int, int] = {}
         self.uses: dict[int, int] = {}
         for _, _, node in program.stores:
@@ -34,51 +34,51 @@ class Writer(ABC):
         self._count(program.nodes())
 
     def body(self) -> list[str]:
-        """The statements of the whole program."""
+        """Statements of the whole program."""
         self.emit(self.program.nodes(), 1)
         for array, place, node in self.program.stores:
             self.line(1, self.assigned(f"{array}[{place}]", self.known[node.order]))
         return self.lines
 
-    # -- what a language says in its own way
+    # -- syntax of a language
 
     @abstractmethod
     def number(self, value: Any) -> str:
-        """A number or a truth."""
+        """Literal of a number or bool."""
 
     @abstractmethod
     def select(self, condition: str, value: str, other: str) -> str:
-        """`value` where the condition holds, else `other`."""
+        """Expression for `value` where the condition holds, else `other`."""
 
     @abstractmethod
     def operation(self, node: Node, arguments: Sequence[str]) -> str:
-        """Any other operation without a sign that is the same everywhere."""
+        """Expression for any operation whose syntax differs between languages."""
 
     @abstractmethod
     def named(self, name: str, value: str) -> str:
-        """A new name for a value, as a statement; the name holds after a loop too."""
+        """Statement that gives a value a new name, valid after a loop too."""
 
     @abstractmethod
     def assigned(self, name: str, value: str) -> str:
-        """A value for what has a name, as a statement."""
+        """Statement that assigns a value to an existing name."""
 
     @abstractmethod
     def carried(self, name: str, value: str) -> str:
-        """A name for what changes from round to round, as a statement."""
+        """Statement that declares a name whose value changes from round to round."""
 
     @abstractmethod
     def rounds(self, count: int) -> str:
-        """The head of a loop."""
+        """Head of a loop."""
 
     @abstractmethod
     def following(self, names: Sequence[str], values: Sequence[str]) -> str:
-        """All names get their values at once, as a statement."""
+        """Statement that assigns all values to all names at once."""
 
     def end(self) -> str:
-        """What ends a loop; empty for nothing."""
+        """End of a loop; empty for none."""
         return ""
 
-    # -- the same for all
+    # -- common to all languages
 
     def _count(self, nodes: Sequence[Node]) -> None:
         for node in nodes:
@@ -88,11 +88,11 @@ class Writer(ABC):
                 self._count(node.args[0].nodes)
 
     def line(self, level: int, statement: str) -> None:
-        """Add a line."""
+        """Append a line."""
         self.lines.append("    " * level + statement + "\n")
 
     def emit(self, nodes: Sequence[Node], level: int, loop: Loop | None = None) -> None:
-        """Everything that is not inside a loop, or that is inside this one."""
+        """Write all nodes that belong to a loop, or to none."""
         for node in nodes:
             if node.order in self.known or node.loop is not loop:
                 continue
@@ -125,11 +125,11 @@ class Writer(ABC):
         return f"(-{a[0]})" if node.op == "neg" else self.operation(node, a)
 
     def bare(self, node: Node) -> str:
-        """A value without the brackets that it needs beside signs."""
+        """Expression of a node without its outer brackets, if it has any."""
         return self.known[node.order][1:-1] if node.order in self.signs else self.known[node.order]
 
     def _beside(self, node: Node) -> tuple[str, str]:
-        """Both operands, without brackets that change nothing, not even the order of operations."""
+        """Both operands, without brackets that do not change the order of operations."""
         signs = [self.signs.get(operand.order, "") for operand in node.operands]
         product, compares = node.op in _PRODUCTS, node.op not in _SUMS | _PRODUCTS
         spare = _PRODUCTS if product else _SUMS | _PRODUCTS, _SUMS | _PRODUCTS if compares else _PRODUCTS

@@ -1,9 +1,9 @@
-"""Modules of the driver as JavaScript: a small part of Python, written anew from its syntax tree.
+"""Translation of the driver's modules to JavaScript, from their syntax trees.
 
-The part is what `native` compiles: numbers, arrays that are indexed, functions of positional arguments,
-``for`` over a range, ``while``, ``if``. Everything else is refused by module and line, so that a driver that grows
-beyond it fails where it is generated and not in a browser. Arrays of several indices are nested, the innermost are
-typed; there is one lane.
+The subset of Python is the one that `native` compiles: numbers, indexed arrays, functions of positional arguments,
+``for`` over a range, ``while``, ``if``. Anything else raises an error with module and line, so that a driver outside
+the subset fails when it is generated and not in a browser. Arrays of several indices are nested, the innermost typed;
+there is one lane.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _RESERVED = frozenset(
 
 
 def transpiled(entries: Mapping[str, str]) -> str:
-    """The functions of driver modules, and of those that they need, as JavaScript.
+    """JavaScript of functions of driver modules, and of all that they need.
 
     Parameters
     ----------
     entries : mapping of str to str
-        Functions that are called from outside, and the modules that they are in.
+        Functions called from outside, and their modules.
 
     Raises
     ------
     NotAvailable
-        If a module says what cannot be written; module and line are named.
+        If a module uses Python outside the subset; module and line are named.
     """
     found: dict[str, str] = {}
     for module in entries.values():
@@ -61,28 +61,28 @@ def transpiled(entries: Mapping[str, str]) -> str:
 
 
 def module_text(name: str, text: str, functions: set[str]) -> str:
-    """The functions of one module; `functions` are all that may be called."""
+    """JavaScript of the functions of one module; `functions` are all that may be called."""
     known = vars(import_module(name)) if name.startswith("steadyslip.") else {}
     numbers = {key: value for key, value in known.items() if type(value) in (int, float)}
     return _Module(name, functions, numbers).text(numbered(text))
 
 
 class _Module:
-    """Writes one module."""
+    """Translator of one module."""
 
     def __init__(self, name: str, functions: set[str], numbers: Mapping[str, float]) -> None:
         self.name, self.functions, self.numbers = name, functions, numbers
         self.local: set[str] = set()
 
     def refuse(self, node: ast.AST, what: str) -> NotAvailable:
-        """The error that names what cannot be written, and where it is."""
+        """Error that names unsupported syntax and its position."""
         return NotAvailable(
             f"{self.name}, line {getattr(node, 'lineno', '?')}: {what} cannot be written in JavaScript; drivers may "
             "use numbers, arrays that are indexed, functions with positional arguments, for over range, while and if"
         )
 
     def text(self, tree: ast.Module) -> str:
-        """All functions; of the rest, constants and imports are known by their values."""
+        """All functions; constants and imports are inlined by their values."""
         lines: list[str] = []
         for node in tree.body:
             if isinstance(node, ast.FunctionDef):
@@ -149,7 +149,7 @@ class _Module:
         raise self.refuse(node, type(node).__name__)
 
     def _several(self, targets: list[ast.expr], value: ast.expr) -> list[str]:
-        """Several at once: one by one where none of the values reads what is written."""
+        """Assignments of several targets: in turn if no value reads a target, else at once."""
         if isinstance(value, ast.Name):
             return [f"[{', '.join(map(self._write, targets))}] = {self._write(value)};"]
         if not isinstance(value, ast.Tuple) or len(value.elts) != len(targets):
@@ -169,7 +169,7 @@ class _Module:
         return [f"{pad}for ({self._range(node, i)}) {{", *self._block(node.body, level + 1), pad + "}"]
 
     def _range(self, node: ast.For, i: str) -> str:
-        """What a loop runs over: numbers in a row, or a few that are listed."""
+        """Head of a loop over a range or over a few listed values."""
         match node.iter:
             case ast.Tuple(elts=elements):
                 return f"const {i} of [{', '.join(map(self._write, elements))}]"
@@ -190,7 +190,7 @@ class _Module:
     # -- expressions
 
     def _truth(self, node: ast.expr) -> str:
-        """A condition: of a number, whether it is not zero, which NaN is in Python and not in JavaScript."""
+        """Condition; a number is compared with zero, because NaN is true in Python and false in JavaScript."""
         if isinstance(node, ast.BinOp | ast.Subscript):
             return f"({self._write(node)} !== 0)"
         if isinstance(node, ast.Constant) and not isinstance(node.value, bool):
@@ -280,7 +280,7 @@ def _is_docstring(node: ast.AST) -> bool:
 
 
 def _names(nodes: list[ast.expr]) -> set[str]:
-    """Names that occur, but for those in the places of what is written."""
+    """All names that occur in expressions."""
     return {one.id for node in nodes for one in ast.walk(node) if isinstance(one, ast.Name)}
 
 
@@ -289,7 +289,7 @@ def _inside(loop: ast.For) -> list[Any]:
 
 
 def _set_otherwise(function: ast.FunctionDef) -> set[str]:
-    """Names that are set by anything but the head of a loop."""
+    """Names that are assigned outside heads of loops."""
     heads = {id(one.target) for one in ast.walk(function) if isinstance(one, ast.For)}
     names = (one for one in ast.walk(function) if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store))
     return {one.id for one in names if id(one) not in heads}

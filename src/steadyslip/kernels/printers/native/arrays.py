@@ -1,6 +1,7 @@
-"""NumPy's arrays as LLVM assembly sees them: where their objects keep what it takes to use them.
+"""Access to NumPy arrays from LLVM assembly, by the memory layout of their objects.
 
-The places are part of NumPy's binary interface (``PyArrayObject``, ``PyArray_Descr``), which extension modules rely on.
+The offsets are part of NumPy's binary interface (``PyArrayObject``, ``PyArray_Descr``), on which extension modules
+rely.
 """
 
 from __future__ import annotations
@@ -12,41 +13,41 @@ import numpy as np
 
 from steadyslip.kernels.printers.native.lines import MEMORY, ArrayView, Lines, Operand, Scalar, Type
 
-HEAD = object.__basicsize__  # bytes of every object of Python
+HEAD = object.__basicsize__  # bytes of the head of every Python object
 DATA, INDICES, SIZES, DESCRIPTOR, FLAGS = HEAD, HEAD + 8, HEAD + 16, HEAD + 40, HEAD + 48
-ORDER, NUMBER = HEAD + 10, HEAD + 12  # of a descriptor: order of bytes, number of the type
-USABLE = 0x1 | 0x100 | 0x400  # in one piece, aligned, may be written to
+ORDER, NUMBER = HEAD + 10, HEAD + 12  # offsets in a dtype: byte order, type number
+USABLE = 0x1 | 0x100 | 0x400  # flags: contiguous, aligned, writeable
 SWAPPED = ord(">" if sys.byteorder == "little" else "<")
 ELEMENTS = {"real": np.dtype(np.float64), "int": np.dtype(np.int64)}
 
 
 def argument(text: str) -> tuple[str, int]:
-    """Kind and number of indices of what a declaration like ``real[:,:]`` or ``int`` means."""
+    """Kind and number of indices of a declared type like ``real[:,:]`` or ``int``."""
     kind, _, rest = text.partition("[")
     return kind, rest.count(":")
 
 
 def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: int, opaque: bool) -> list[str]:
-    """A function that is called from Python with arrays and whole numbers, and calls another one.
+    """Function callable from Python with arrays and integers, which checks them and calls another one.
 
     Parameters
     ----------
     symbol : str
-        Its name.
+        Its symbol.
     called : tuple of str
-        The other's name, and the kind of its result: ``int`` or ``none``.
+        Symbol of the called function, and kind of its result: ``int`` or ``none``.
     types : sequence of str
-        Of the arguments.
+        Types of the arguments.
     constant : int
-        How many of them, from the first on, are arrays that never change.
+        Number of leading arguments whose arrays never change.
     opaque : bool
-        See `Lines`.
+        As in `Lines`.
 
     Returns
     -------
     list of str
-        Lines. The function returns the other's result, which must not be negative, 0 if it has none, -1 - i if argument
-        i is not as declared.
+        Lines. The function returns the result of the other one (which must not be negative; 0 if none), or -1 - i if
+        argument i is not of its declared type.
     """
     body, given = Lines(opaque), list[Operand]()
     for i, text in enumerate(types):
@@ -59,14 +60,14 @@ def entry(symbol: str, called: tuple[str, str], types: Sequence[str], constant: 
 
 
 def types_of(types: Sequence[str], constant: int) -> tuple[Type, ...]:
-    """Types of the arguments as a function sees them that is translated."""
+    """Types of the arguments within a translated function."""
     declared = [argument(text) for text in types]
     return tuple(ArrayView(kind, "", ("",) * count, i < constant).type if count else kind
                  for i, (kind, count) in enumerate(declared))  # fmt: skip
 
 
 def _array(body: Lines, place: int, kind: str, count: int, is_constant: bool) -> ArrayView:
-    """The array at the address that an argument is, if it is as declared; else the function ends."""
+    """View of the array at the address given by an argument; the function returns early if it is not as declared."""
 
     def at(address: str, offset: int, what: str) -> str:
         moved = body.name(f"add i64 {address}, {offset}")
@@ -95,19 +96,19 @@ def _array(body: Lines, place: int, kind: str, count: int, is_constant: bool) ->
     return ArrayView(kind, pointer, tuple(at(sizes, 8 * i, "i64") for i in range(count)), is_constant)
 
 
-def made(body: Lines, sizes: Sequence[str], room: str) -> ArrayView:
-    """A new array of zeros; where it is kept is written down in `room`, for `ended`."""
+def new_array(body: Lines, sizes: Sequence[str], slot: str) -> ArrayView:
+    """New array of zeros; its address is stored in `slot`, for `free_array`."""
     total = sizes[0]
     for size in sizes[1:]:
         total = body.name(f"mul nsw i64 {total}, {size}")
     pointer = body.pointer("real")
     found = body.name(f"call {pointer} @{MEMORY[0]}(i64 {total}, i64 8)")
-    body.add(f"store {pointer} {found}, {body.pointer(pointer)} {room}")
+    body.add(f"store {pointer} {found}, {body.pointer(pointer)} {slot}")
     return ArrayView("real", found, tuple(sizes))
 
 
-def ended(body: Lines, room: str) -> None:
-    """Give back what `made` took."""
+def free_array(body: Lines, slot: str) -> None:
+    """Free an array made by `new_array`."""
     pointer = body.pointer("real")
-    found = body.name(f"load {pointer}, {body.pointer(pointer)} {room}")
+    found = body.name(f"load {pointer}, {body.pointer(pointer)} {slot}")
     body.add(f"call void @{MEMORY[1]}({pointer} {found})")

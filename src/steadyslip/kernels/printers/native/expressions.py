@@ -1,4 +1,4 @@
-"""Expressions of the driver as LLVM assembly, and what names hold."""
+"""Translation of the driver's expressions and variables to LLVM assembly."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Protocol
 
 from steadyslip.core.errors import NotAvailable
 from steadyslip.kernels.printers.native import arrays
-from steadyslip.kernels.printers.native.lines import TEXT, ArrayView, Lines, Operand, Scalar, Several, Type, real
+from steadyslip.kernels.printers.native.lines import TEXT, ArrayView, Lines, Operand, Scalar, TupleValue, Type, real
 
 ANNOTATED = {"float": "real", "int": "int", "bool": "bool", "None": "none"}
 _ARITHMETIC: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
@@ -22,7 +22,7 @@ _MATH = {"nan": math.nan, "inf": math.inf}
 
 
 class Others(Protocol):
-    """What a function has to know of the others."""
+    """Other functions of the translation, as one function needs them."""
 
     opaque: bool
     functions: dict[str, tuple[ast.FunctionDef, str]]
@@ -32,36 +32,36 @@ class Others(Protocol):
 
 @dataclass(frozen=True)
 class _Variable:
-    """Where what a name holds is kept: its type, and a place for each part."""
+    """Variable: its type, and a stack slot for each part of it."""
 
     type: Type
-    rooms: tuple[str, ...]
+    slots: tuple[str, ...]
 
 
 class Expressions:
-    """Writes the expressions of one function.
+    """Translator of the expressions of one function.
 
     Parameters
     ----------
     others : Others
         All functions.
     module : str
-        Where it is from, for messages.
+        Module of the function, for messages.
     numbers : mapping of str to float
-        Constants that it may name.
+        Module constants that the function may use.
     """
 
     def __init__(self, others: Others, module: str, numbers: Mapping[str, float]) -> None:
         self.others, self.module, self.numbers = others, module, numbers
         self.lines = Lines(others.opaque)
         self.variables: dict[str, _Variable] = {}
-        self.several: dict[str, Several] = {}
-        self.loops: list[tuple[str, str]] = []  # where continue and break lead
-        self.made: list[str] = []  # where arrays that the function makes are kept
+        self.tuples: dict[str, TupleValue] = {}
+        self.loops: list[tuple[str, str]] = []  # labels where continue and break lead
+        self.arrays_made: list[str] = []  # stack slots with the addresses of arrays that the function makes
         self.choices = 0
 
     def refuse(self, node: ast.AST, what: str) -> NotAvailable:
-        """The error that names what cannot be translated, and where it is."""
+        """Error that names unsupported syntax and its position."""
         return NotAvailable(
             f"{self.module}, line {getattr(node, 'lineno', '?')}: {what} cannot be translated; drivers may use "
             "numbers, arrays that are indexed, functions with positional arguments, for over range, while and if"
@@ -70,24 +70,24 @@ class Expressions:
     # -- names
 
     def _assign(self, node: ast.AST, name: str, value: Operand) -> None:
-        """What a name holds from now on."""
-        if isinstance(value, Several):
+        """Assign a value to a variable."""
+        if isinstance(value, TupleValue):
             raise self.refuse(node, f"another value for {name}")
         known = self.variables.get(name)
         if known is None:
             kinds = [kind for kind, _ in self.lines.flat(value)]
-            known = self.variables[name] = _Variable(value.type, tuple(map(self.lines.room, kinds)))
+            known = self.variables[name] = _Variable(value.type, tuple(map(self.lines.slot, kinds)))
         if isinstance(value, Scalar):
             value = self._as(node, value, str(known.type))
         elif value.type != known.type:
             raise self.refuse(node, f"an array in place of another kind of {name}")
-        for (kind, text), room in zip(self.lines.flat(value), known.rooms, strict=True):
-            self.lines.add(f"store {kind} {text}, {self.lines.pointer(kind)} {room}")
+        for (kind, text), slot in zip(self.lines.flat(value), known.slots, strict=True):
+            self.lines.add(f"store {kind} {text}, {self.lines.pointer(kind)} {slot}")
 
     def _held(self, node: ast.AST, name: str) -> Operand:
-        """What a name holds."""
-        if name in self.several:
-            return self.several[name]
+        """Value of a variable or constant."""
+        if name in self.tuples:
+            return self.tuples[name]
         if name in self.variables:
             return self._kept(self.variables[name])
         if name in self.numbers:
@@ -99,8 +99,8 @@ class Expressions:
         kind, count = arrays.argument(type_.removeprefix("constant "))
         kinds = [self.lines.pointer(kind), *["i64"] * count] if "[" in type_ else [TEXT[kind]]
         names = [
-            self.lines.name(f"load {one}, {self.lines.pointer(one)} {room}")
-            for one, room in zip(kinds, variable.rooms, strict=True)
+            self.lines.name(f"load {one}, {self.lines.pointer(one)} {slot}")
+            for one, slot in zip(kinds, variable.slots, strict=True)
         ]
         if "[" in type_:
             return ArrayView(kind, names[0], tuple(names[1:]), type_.startswith("constant "))
@@ -112,14 +112,14 @@ class Expressions:
         return real(value) if isinstance(value, float) else Scalar("int", str(int(value)))
 
     def _as(self, node: ast.AST, value: Operand, kind: str) -> Scalar:
-        """A value as the kind of number that is wanted."""
+        """Value converted to a kind of number; an error if that is not possible."""
         found = self.lines.converted(value, kind) if isinstance(value, Scalar) else None
         if found is None:
             raise self.refuse(node, f"{ast.unparse(node) if isinstance(node, ast.expr) else 'what it gets'} as {kind}")
         return found
 
     def _branches(self, test: ast.expr, yes: Callable[[], None], no: Callable[[], None]) -> None:
-        """What is done if a condition holds, and what if not."""
+        """Write an if statement from functions that write both branches."""
         lines = self.lines
         then, other, done = lines.label("then"), lines.label("else"), lines.label("done")
         lines.fork(self._truth(test), then, other)
@@ -132,7 +132,7 @@ class Expressions:
     # -- expressions
 
     def _truth(self, node: ast.expr) -> str:
-        """A condition; of a number, whether it is not zero."""
+        """Condition as assembly; a number is compared with zero."""
         value = self._value(node)
         if not isinstance(value, Scalar) or value.kind == "none":
             raise self.refuse(node, "a condition that is no number")
@@ -148,7 +148,7 @@ class Expressions:
             case ast.Name(id=name):
                 return self._held(node, name)
             case ast.Tuple(elts=parts):
-                return Several(tuple(map(self._value, parts)))
+                return TupleValue(tuple(map(self._value, parts)))
             case ast.BinOp(left=left, op=op, right=right):
                 return self._arithmetic(node, op, left, right)
             case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
@@ -198,9 +198,9 @@ class Expressions:
         return [self._whole_number(one) for one in nodes]
 
     def _indexed(self, node: ast.expr, owner: ast.expr, index: ast.expr) -> Operand:
-        """An element, a view of an array, or one of several values."""
+        """Element or view of an array, or one value of a tuple."""
         found = self._value(owner)
-        if isinstance(found, Several) and isinstance(index, ast.Constant) and isinstance(index.value, int):
+        if isinstance(found, TupleValue) and isinstance(index, ast.Constant) and isinstance(index.value, int):
             return found.values[index.value]
         if not isinstance(found, ArrayView):
             raise self.refuse(node, f"an index of {ast.unparse(owner)}")
@@ -212,7 +212,7 @@ class Expressions:
         return ArrayView(found.kind, self.lines.place(found, places), found.sizes[len(places) :], found.is_constant)
 
     def _pair(self, left: ast.expr, right: ast.expr) -> tuple[Scalar, Scalar]:
-        """Two numbers of one kind."""
+        """Two numbers converted to a common kind."""
         a, b = self._numeric(left), self._numeric(right)
         kind = "real" if "real" in (a.kind, b.kind) else "int"
         return self._as(left, a, kind), self._as(right, b, kind)
@@ -243,24 +243,24 @@ class Expressions:
         return Scalar("bool", found)
 
     def _connected(self, all_of_them: bool, values: Sequence[ast.expr]) -> Scalar:
-        """And, or: what comes later is asked only where it matters."""
+        """``and`` or ``or``; later operands are evaluated only if needed."""
         lines = self.lines
-        room, done = lines.room("bool"), lines.label("done")
+        slot, done = lines.slot("bool"), lines.label("done")
         for i, one in enumerate(values):
             truth = self._truth(one)
-            lines.put(Scalar("bool", truth), room)
+            lines.put(Scalar("bool", truth), slot)
             if i < len(values) - 1:
                 further = lines.label("further")
                 lines.fork(truth, *((further, done) if all_of_them else (done, further)))
                 lines.begin(further)
         lines.jump(done)
         lines.begin(done)
-        return lines.get("bool", room)
+        return lines.get("bool", slot)
 
     def _either(self, test: ast.expr, yes: ast.expr, no: ast.expr) -> Operand:
-        """One of two values, of which only one is found."""
+        """Conditional expression; only the chosen value is evaluated."""
         self.choices += 1
-        name = f"either {self.choices}"  # no name of Python
+        name = f"either {self.choices}"  # has a space, so it is no name of Python
         mixed = {"real", "int"} == {self._type(yes), self._type(no)}
 
         def written(node: ast.expr) -> None:
@@ -271,13 +271,13 @@ class Expressions:
         return self._held(test, name)
 
     def _type(self, node: ast.expr) -> Type:
-        """The type of an expression, whose lines are forgotten."""
-        lines, made, known = self.lines, list(self.made), dict(self.variables)
+        """Type of an expression; the lines written to find it are discarded."""
+        lines, made, known = self.lines, list(self.arrays_made), dict(self.variables)
         self.lines = Lines(self.others.opaque)
         try:
             return self._value(node).type
         finally:
-            self.lines, self.made, self.variables = lines, made, known
+            self.lines, self.arrays_made, self.variables = lines, made, known
 
     def _call(self, node: ast.expr, function: ast.expr, given: Sequence[ast.expr]) -> Operand:
         match function:
@@ -311,11 +311,11 @@ class Expressions:
         if self.loops:
             raise self.refuse(node, "an array that is made in a loop")
         sizes = [self._whole_number(one) for one in (shape.elts if isinstance(shape, ast.Tuple) else [shape])]
-        self.made.append(self.lines.room(self.lines.pointer("real")))
-        return arrays.made(self.lines, sizes, self.made[-1])
+        self.arrays_made.append(self.lines.slot(self.lines.pointer("real")))
+        return arrays.new_array(self.lines, sizes, self.arrays_made[-1])
 
     def _function(self, node: ast.expr, name: str, given: Sequence[ast.expr]) -> Operand:
-        """A call of another of the driver's functions; numbers are handed over as it declares them."""
+        """Call of another driver function; numbers are converted to its declared types."""
         heads = self.others.functions[name][0].args.args
         if len(heads) != len(given):
             raise self.refuse(node, f"a call of {name} with {len(given)} arguments")
@@ -328,7 +328,7 @@ class Expressions:
         return self.lines.call(symbol, result, values)
 
     def _routine(self, given: Sequence[ast.expr]) -> Scalar:
-        """A call of a model's routine, whose address is one of an array's numbers."""
+        """Call of a model's routine by its address."""
         lines, array = self.lines, self.lines.pointer("real")
         record, changed = self._array_of(given[1]), self._array_of(given[3])
         number = self._as(given[2], self._value(given[2]), "real")

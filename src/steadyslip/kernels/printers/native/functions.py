@@ -1,9 +1,9 @@
-"""Modules of the driver as LLVM assembly: the part of Python that `transpile` takes too, with types.
+"""Translation of the driver's modules to LLVM assembly: the subset of Python of `transpile`, with types.
 
-A name holds what is first assigned to it: a number, a truth, an array, or several of these. Arguments and results are
-as annotated; arrays have the elements and the number of indices that a call hands over, and lie in memory without gaps.
-An array with fewer indices than it has is a view of it. Arrays that a function makes end with it. Everything else is
-refused by module and line.
+A variable keeps the type of its first assignment: number, bool, array, or tuple of these. Arguments and results have
+their annotated types; arrays have the element kind and number of indices of the call, and are contiguous. An array with
+fewer indices than dimensions is a view. Arrays that a function makes are freed at its end. Anything else raises an
+error with module and line.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ from importlib import import_module
 from steadyslip.kernels.driver_text import numbered
 from steadyslip.kernels.printers.native import arrays
 from steadyslip.kernels.printers.native.expressions import ANNOTATED, Expressions
-from steadyslip.kernels.printers.native.lines import MEMORY, TEXT, ArrayView, Lines, Operand, Scalar, Several, Type
+from steadyslip.kernels.printers.native.lines import MEMORY, TEXT, ArrayView, Lines, Operand, Scalar, TupleValue, Type
 
 
 def translated(
     modules: Mapping[str, str], entries: Mapping[str, Sequence[str]], symbols: Mapping[str, str], constant: int,
     opaque: bool,
 ) -> str:  # fmt: skip
-    """Functions of some modules that are called from Python, and those that they need.
+    """Assembly of functions of some modules that are called from Python, and of all that they need.
 
     Parameters
     ----------
     modules : mapping of str to str
-        Texts of the modules.
+        Source of each module.
     entries : mapping of str to sequence of str
-        What is called from outside: types of the arguments, ``int``, or ``real[:,:]`` for an array.
+        Functions called from Python: types of their arguments, ``int``, or ``real[:,:]`` for an array.
     symbols : mapping of str to str
-        Their names in the assembly.
+        Symbol of each function.
     constant : int
-        How many arguments of each, from the first on, are arrays that never change.
+        Number of leading arguments of each that are arrays that never change.
     opaque : bool
-        Whether pointers of this LLVM say nothing of what they point to.
+        True if pointers of this LLVM have no element type.
 
     Raises
     ------
     NotAvailable
-        If a module says what cannot be translated; module and line are named.
+        If a module uses Python outside the subset; module and line are named.
     """
     whole = _Whole(modules, opaque)
     lines: list[str] = []
@@ -64,7 +64,7 @@ def translated(
 
 
 class _Whole:
-    """All functions that are needed, each once for the types of its arguments."""
+    """All functions that are needed, each translated once per combination of argument types."""
 
     def __init__(self, modules: Mapping[str, str], opaque: bool) -> None:
         self.opaque = opaque
@@ -80,7 +80,7 @@ class _Whole:
                     self.functions[node.name] = (node, module)
 
     def called(self, name: str, types: tuple[Type, ...]) -> tuple[str, str]:
-        """The function's name in the assembly for arguments of these types, and the kind of its result."""
+        """Symbol of a function for given argument types, and kind of its result."""
         key = (name, types)
         if key not in self.known:
             node, module = self.functions[name]
@@ -91,7 +91,7 @@ class _Whole:
 
 
 class _Function(Expressions):
-    """Writes one function for one choice of types."""
+    """Translator of one function for given argument types."""
 
     def __init__(self, whole: _Whole, node: ast.FunctionDef, module: str, symbol: str, types: tuple[Type, ...]) -> None:
         super().__init__(whole, module, whole.numbers[module])
@@ -104,12 +104,12 @@ class _Function(Expressions):
             raise self.refuse(node, f"the result of {node.name}")
 
     def written(self) -> list[str]:
-        """The whole function."""
+        """Definition of the whole function."""
         heads: list[str] = []
         for argument, type_ in zip(self.node.args.args, self.types, strict=True):
             value = self._received(type_, heads)
-            if isinstance(value, Several):
-                self.several[argument.arg] = value
+            if isinstance(value, TupleValue):
+                self.tuples[argument.arg] = value
             else:
                 self._assign(self.node, argument.arg, value)
         self._block(self.node.body)
@@ -117,7 +117,7 @@ class _Function(Expressions):
             self._leave(self.node, None)
         else:
             self.lines.add("unreachable")
-        empty = [f"  store {self._array} null, {self.lines.pointer(self._array)} {room}" for room in self.made]
+        empty = [f"  store {self._array} null, {self.lines.pointer(self._array)} {slot}" for slot in self.arrays_made]
         head = f"define internal {TEXT[self.result]} {self.symbol}({', '.join(heads)}) nounwind {{"
         return [head, "entry:", *self.lines.heads, *empty, *self.lines.lines, "}"]
 
@@ -126,9 +126,9 @@ class _Function(Expressions):
         return self.lines.pointer("real")
 
     def _received(self, type_: Type, heads: list[str]) -> Operand:
-        """An argument, and what it is in the head of the function."""
+        """Argument of the function; its parts are appended to `heads`."""
         if not isinstance(type_, str):
-            return Several(tuple(self._received(one, heads) for one in type_))
+            return TupleValue(tuple(self._received(one, heads) for one in type_))
         kind, count = arrays.argument(type_.removeprefix("constant "))
         value: Operand = Scalar(kind, f"%a{len(heads)}")
         if "[" in type_:
@@ -183,7 +183,7 @@ class _Function(Expressions):
         self.loops.pop()
 
     def _loop(self, node: ast.For, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> None:
-        """Over a range, or over a few numbers, for each of which the body is written anew."""
+        """Loop over a range, or over a few values, with the body written once for each."""
         lines = self.lines
         if isinstance(over, ast.Tuple):
             done = lines.label("done")
@@ -204,7 +204,7 @@ class _Function(Expressions):
         if step.startswith("-"):
             raise self.refuse(node, "a range that falls")
         check, inside, again, done = (lines.label(what) for what in ("check", "inside", "again", "done"))
-        count = lines.room("int")
+        count = lines.slot("int")
         lines.put(Scalar("int", start), count)
         lines.jump(check)
         lines.begin(check)
@@ -220,19 +220,19 @@ class _Function(Expressions):
         lines.begin(done)
 
     def _assigned(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
-        """An assignment; the values of several are all found before the first is written."""
+        """Assignment; the values of tuples targets are all computed before the first is stored."""
         match targets:
             case [ast.Tuple(elts=parts)]:
                 found = self._value(value)
-                if not isinstance(found, Several) or len(found.values) != len(parts):
+                if not isinstance(found, TupleValue) or len(found.values) != len(parts):
                     raise self.refuse(value, "unpacking of anything but as many values")
                 for part, one in zip(parts, found.values, strict=True):
                     self._write(part, one)
             case [ast.Name(id=name)] if isinstance(value, ast.Tuple):
-                if name in self.several or name in self.variables or self.loops:
+                if name in self.tuples or name in self.variables or self.loops:
                     raise self.refuse(value, f"another value for {name}")
                 found = self._value(value)
-                self.several[name] = Several(tuple(self._lasting(value, one) for one in _parts(found)))
+                self.tuples[name] = TupleValue(tuple(self._lasting(value, one) for one in _parts(found)))
             case _:
                 found = self._value(value)
                 for target in targets:
@@ -240,7 +240,7 @@ class _Function(Expressions):
 
     def _lasting(self, node: ast.AST, value: Operand) -> Operand:
         if isinstance(value, Scalar):
-            raise self.refuse(node, "a number among several that are kept")
+            raise self.refuse(node, "a number among tuples that are kept")
         return value
 
     def _write(self, target: ast.expr, value: Operand) -> None:
@@ -263,10 +263,10 @@ class _Function(Expressions):
             found = self._as(value or node, found, self.result)
         elif value is not None:
             raise self.refuse(node, "a result")
-        for room in self.made:
-            arrays.ended(self.lines, room)
+        for slot in self.arrays_made:
+            arrays.free_array(self.lines, slot)
         self.lines.add(f"ret {TEXT[self.result]} {found.text if isinstance(found, Scalar) else ''}".rstrip())
 
 
 def _parts(value: Operand) -> tuple[Operand, ...]:
-    return value.values if isinstance(value, Several) else (value,)
+    return value.values if isinstance(value, TupleValue) else (value,)

@@ -1,4 +1,4 @@
-"""Lines of LLVM assembly: values with their types, and what is done with them."""
+"""Lines of LLVM assembly: typed values and operations on them."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_FAST = "nsz contract"  # as in `llvm`: fused multiply-add, no care for the sign of zero
+_FAST = "nsz contract"  # freedom of the compiler, as in `llvm`: ignore the sign of zero, fuse multiply-add
 TEXT = {"real": "double", "int": "i64", "bool": "i1", "none": "void"}
 MEMORY = ("PyMem_RawCalloc", "PyMem_RawFree")
-"""Functions that whoever links the assembly has to know."""
+"""Functions of Python that have to be known when the assembly is linked."""
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """A number or a truth: its kind (``real``, ``int``, ``bool``; ``none`` for neither), its name in the assembly."""
+    """Scalar value: its kind (``real``, ``int``, ``bool``; ``none`` for no value) and its text in the assembly."""
 
     kind: str
     text: str
@@ -26,7 +26,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class ArrayView:
-    """An array: kind of its elements, where they begin, how many along each index, whether they never change."""
+    """Array: kind of elements, pointer to the first, number along each index, True if elements never change."""
 
     kind: str
     pointer: str
@@ -39,8 +39,8 @@ class ArrayView:
 
 
 @dataclass(frozen=True)
-class Several:
-    """Values at once, each known by its place."""
+class TupleValue:
+    """Tuple of values, addressed by index."""
 
     values: tuple[Operand, ...]
 
@@ -50,21 +50,21 @@ class Several:
 
 
 Type = str | tuple["Type", ...]
-Operand = Scalar | ArrayView | Several
+Operand = Scalar | ArrayView | TupleValue
 
 
 def real(number: float) -> Scalar:
-    """A number as the assembly writes it."""
+    """Literal of a real number in assembly."""
     return Scalar("real", "0x" + struct.pack(">d", number).hex().upper())
 
 
 class Lines:
-    """Lines of a function, and the names in it.
+    """Lines of a function, with fresh names.
 
     Parameters
     ----------
     opaque : bool
-        Whether pointers say nothing of what they point to, as in LLVM from version 17 on.
+        True if pointers have no element type, as in LLVM from version 17 on.
     """
 
     def __init__(self, opaque: bool) -> None:
@@ -74,20 +74,20 @@ class Lines:
         self.count = 0
 
     def pointer(self, kind: str) -> str:
-        """Type of a pointer to a kind of number, or to one of the assembly's own types."""
+        """Type of a pointer to a kind of number, or to a type of the assembly."""
         return "ptr" if self.opaque else f"{TEXT.get(kind, kind)}*"
 
     def add(self, line: str) -> None:
         self.lines.append(f"  {line}")
 
     def name(self, line: str) -> str:
-        """A name for what a line gives."""
+        """Fresh name for the result of an instruction."""
         self.count += 1
         self.add(f"%t{self.count} = {line}")
         return f"%t{self.count}"
 
     def label(self, what: str) -> str:
-        """A label that nothing else has."""
+        """Fresh label."""
         self.count += 1
         return f"{what}{self.count}"
 
@@ -102,23 +102,23 @@ class Lines:
 
     # -- variables
 
-    def room(self, kind: str) -> str:
-        """A place for a value of a kind, at the start of the function."""
+    def slot(self, kind: str) -> str:
+        """Stack slot for a value of a kind, allocated at the start of the function."""
         self.count += 1
         self.heads.append(f"  %r{self.count} = alloca {TEXT.get(kind, kind)}")
         return f"%r{self.count}"
 
-    def put(self, value: Scalar, room: str) -> None:
+    def put(self, value: Scalar, slot: str) -> None:
         kind = TEXT.get(value.kind, value.kind)
-        self.add(f"store {kind} {value.text}, {self.pointer(value.kind)} {room}")
+        self.add(f"store {kind} {value.text}, {self.pointer(value.kind)} {slot}")
 
-    def get(self, kind: str, room: str) -> Scalar:
-        return Scalar(kind, self.name(f"load {TEXT.get(kind, kind)}, {self.pointer(kind)} {room}"))
+    def get(self, kind: str, slot: str) -> Scalar:
+        return Scalar(kind, self.name(f"load {TEXT.get(kind, kind)}, {self.pointer(kind)} {slot}"))
 
     # -- arrays
 
     def place(self, array: ArrayView, indices: Sequence[str]) -> str:
-        """Pointer to an element, or to the first of those with the same first indices."""
+        """Pointer to an element, or to the first of those that share the first indices."""
         offset = ""
         for i, size in enumerate(array.sizes):
             if offset and offset != "0":
@@ -136,7 +136,7 @@ class Lines:
     # -- calls
 
     def flat(self, value: Operand) -> list[tuple[str, str]]:
-        """What a call hands over: types and names."""
+        """Types and names of a value as arguments of a call."""
         if isinstance(value, Scalar):
             return [(TEXT[value.kind], value.text)]
         if isinstance(value, ArrayView):
@@ -144,8 +144,8 @@ class Lines:
         return [one for part in value.values for one in self.flat(part)]
 
     def call(self, symbol: str, result: str, given: Sequence[Operand]) -> Scalar:
-        """The result of a function."""
-        arguments = ", ".join(f"{kind} {text}" for kind, text in self.flat(Several(tuple(given))))
+        """Result of a call of a function."""
+        arguments = ", ".join(f"{kind} {text}" for kind, text in self.flat(TupleValue(tuple(given))))
         line = f"call {TEXT[result]} {symbol}({arguments})"
         if result == "none":
             self.add(line)
@@ -155,7 +155,7 @@ class Lines:
     # -- numbers
 
     def converted(self, value: Scalar, kind: str) -> Scalar | None:
-        """The value as another kind of number, None if that is not possible."""
+        """Value converted to another kind of number; None if that is not possible."""
         if value.kind == kind:
             return value
         if value.kind == "int" and kind == "real" and value.text.lstrip("-").isdigit():
@@ -171,12 +171,12 @@ class Lines:
         return Scalar(kind, self.name(f"{line} {left}, {right}"))
 
     def compared(self, how: tuple[str, str], kind: str, left: str, right: str) -> Scalar:
-        """`how` is the comparison's name for real numbers and for others."""
+        """Comparison; `how` is its name for real numbers and for others."""
         line = f"fcmp {how[0]} double" if kind == "real" else f"icmp {how[1]} {TEXT[kind]}"
         return Scalar("bool", self.name(f"{line} {left}, {right}"))
 
     def divided(self, left: str, right: str) -> tuple[Scalar, Scalar]:
-        """Whole quotient, rounded down, and rest, with the sign of the divisor, as in Python."""
+        """Integer quotient (rounded down) and remainder (with the divisor's sign), as in Python."""
         quotient, rest = self.name(f"sdiv i64 {left}, {right}"), self.name(f"srem i64 {left}, {right}")
         signs = self.name(f"xor i64 {rest}, {right}")
         apart, inexact = self.name(f"icmp slt i64 {signs}, 0"), self.name(f"icmp ne i64 {rest}, 0")

@@ -25,6 +25,29 @@ def say_json(data: Any) -> None:
     say(json.dumps(stamped(data), indent=2, allow_nan=False))
 
 
+def formula_of(result: Any, along: str | None) -> dict[str, str | None]:
+    """The formula of an edge for JSON; null where there is none."""
+    from steadyslip.core.errors import NotAvailable
+
+    try:
+        return {"formula": str(result.formula(along).rhs)}
+    except NotAvailable:
+        return {"formula": None}
+
+
+def say_formula(result: Any, along: str | None) -> None:
+    """Print the formula of an edge, or why there is none."""
+    from steadyslip.core.errors import NotAvailable
+    from steadyslip.core.progress import progress_text
+
+    try:
+        with progress_text("simplifying the formula"):
+            equation = result.formula(along)
+        say(f"\n{f'Edge in {along}' if along else 'Critical stiffness'}\n  {equation.lhs} = {equation.rhs}")
+    except NotAvailable as reason:
+        say(f"\nNo formula: {reason}")
+
+
 def give(result: Any, output: Sequence[Path], as_json: bool, write: Callable[[Any, Path], bool | None]) -> None:
     """Print JSON or words, then write the files asked for: an answer is not lost with a file.
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from steadyslip.cli.answers import give, say, say_json
+from steadyslip.cli.answers import formula_of, give, say, say_formula, say_json
 from steadyslip.cli.ending import end, failed
-from steadyslip.cli.options import AsJson, Branch, Changes, Fitted, RigFile, outputs, refuse_branch
+from steadyslip.cli.options import AsJson, Branch, Changes, Fitted, Pieces, RigFile, Until, outputs, refuse_branch
 
 
 class _Commands(TyperGroup):
@@ -81,7 +81,7 @@ def analyze(
     if as_json:
         data = result.to_dict()
         if formula:
-            data |= _formula(result, along)
+            data |= formula_of(result, along)
         say_json(data)
     else:
         head, _, rest = str(result).partition("\n")
@@ -89,32 +89,11 @@ def analyze(
         say(typer.style(head, bold=True, fg=colour))
         say(rest)
         if formula:
-            _echo_formula(result, along)
+            say_formula(result, along)
     if any(one.interrupted for one in getattr(result, "kicks", ())):
         raise typer.Exit(130)
     if require_stable and (not result.stable or result.on_edge):
         raise typer.Exit(1)
-
-
-def _formula(result: Any, along: str | None) -> dict[str, str | None]:
-    from steadyslip.core.errors import NotAvailable
-
-    try:
-        return {"formula": str(result.formula(along).rhs)}
-    except NotAvailable:
-        return {"formula": None}
-
-
-def _echo_formula(result: Any, along: str | None) -> None:
-    from steadyslip.core.errors import NotAvailable
-    from steadyslip.core.progress import progress_text
-
-    try:
-        with progress_text("simplifying the formula"):
-            equation = result.formula(along)
-        say(f"\n{f'Edge in {along}' if along else 'Critical stiffness'}\n  {equation.lhs} = {equation.rhs}")
-    except NotAvailable as reason:
-        say(f"\nNo formula: {reason}")
 
 
 def _predicted(
@@ -139,12 +118,12 @@ def _predicted(
     found = predict(slider, load_fit(fitted), kick=kick)
     best = run(found.rig)
     if as_json:
-        data = best.to_dict() | {"prediction": found.to_dict()} | (_formula(best, along) if formula else {})
+        data = best.to_dict() | {"prediction": found.to_dict()} | (formula_of(best, along) if formula else {})
         say_json(data)
     else:
         say(f"{found}\n\nWith the best values\n{best}")
         if formula:
-            _echo_formula(best, along)
+            say_formula(best, along)
     if found.left_out:
         raise typer.Exit(130)
     if require_stable and not found.probability_stable >= 0.95:
@@ -282,13 +261,8 @@ def report(
 def simulate(
     rig: RigFile,
     changes: Changes = None,
-    until: Annotated[str | None, typer.Option(help="end of the run, such as '200 s'")] = None,
-    pieces: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--protocol", metavar="PIECE", help="add a piece, such as \"velocity-step at=10s to='2 um/s'\"; repeatable"
-        ),
-    ] = None,
+    until: Until = None,
+    pieces: Pieces = None,
     start: Annotated[
         list[str] | None,
         typer.Option("--initial", metavar="NAME=VALUE", help="start elsewhere than in steady sliding; SI; repeatable"),
@@ -407,11 +381,30 @@ def response(
 ) -> None:  # fmt: skip
     """Gain and phase of steady sliding under an input that swings: exact for small amplitudes, simulated for large."""
     from steadyslip.files.output import check_output
-    from steadyslip.nonlinear.commands import ANSWERED, response_of_file, write_response
+    from steadyslip.nonlinear.commands import ANSWERED, response_of_file, write_answers
 
     check_output(files or (), ANSWERED)
     found = response_of_file(rig, changes or (), periods, points, amplitudes or (), swings, answers, on, limits)
-    give(found, files or (), as_json, partial(write_response, source=rig))
+    give(found, files or (), as_json, partial(write_answers, title="Response", source=rig))
+
+
+@app.command()
+def verdicts(
+    rig: RigFile,
+    changes: Changes = None,
+    until: Until = None,
+    pieces: Pieces = None,
+    output: Annotated[list[Path] | None, outputs("write .csv, .html, .png, .svg or .pdf")] = None,
+    rtol: Annotated[float, typer.Option(help="error of the motion allowed per step")] = 1e-7,
+    as_json: AsJson = False,
+) -> None:
+    """Is it stable at every moment of a protocol of slow changes, and when does motion depart?"""
+    from steadyslip.files.output import check_output
+    from steadyslip.nonlinear.commands import ANSWERED, verdicts_of_file, write_answers
+
+    check_output(output or (), ANSWERED)
+    found = verdicts_of_file(rig, changes or (), pieces or (), until, rtol)
+    give(found, output or (), as_json, partial(write_answers, title="Verdicts", source=rig))
 
 
 @app.command("map")

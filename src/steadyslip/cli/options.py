@@ -29,6 +29,13 @@ Changes = Annotated[
     typer.Option("--set", metavar="NAME=VALUE", help="change a value, such as contact.angle='10 deg'; repeatable"),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON, in SI units")]
+Until = Annotated[str | None, typer.Option(help="end of the run, such as '200 s'; that of the file unless given")]
+Pieces = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--protocol", metavar="PIECE", help="add a piece, such as \"velocity-step at=10s to='2 um/s'\"; repeatable"
+    ),
+]
 Branch = Annotated[int, typer.Option(help="which steady sliding, where there are several")]
 Fitted = Annotated[
     Path | None,

@@ -94,15 +94,13 @@ def frozen_verdicts(found: FrozenVerdicts, ax: Any = None) -> Any:
             edgecolor=VERMILION, linewidth=0, alpha=0.5,
         )  # fmt: skip
     unstable.set_label("steady sliding is unstable")
-    names = [name for name in found.run.data if name == "v" or name.endswith(".v")]
-    for name, colour in zip(names, cycle((BLUE, GREEN, ORANGE)), strict=False):
-        label = "slip rate" if name == "v" else name.removesuffix(".v")
-        axes[1].plot(found.run["t"] / factor, np.abs(found.run[name]), color=colour, label=label)
+    for (name, own), colour in zip(found.slip_rates.items(), cycle((BLUE, GREEN, ORANGE)), strict=False):
+        axes[1].plot(found.run["t"] / factor, np.abs(own), color=colour, label=name or "slip rate")
     if np.isfinite(found.departure):
         axes[1].axvline(found.departure / factor, color=BLACK, linestyle="--", linewidth=1, label="motion departs")
     axes[1].set_yscale("log")
     axes[0].set_ylabel("growth rate (1/s)")
-    axes[1].set_ylabel("velocity (m/s)")
+    axes[1].set_ylabel("slip rate (m/s)")
     axes[1].set_xlabel(labelled("time", unit))
     axes[1].legend(fontsize="small")
     return axes

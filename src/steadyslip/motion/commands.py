@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -61,33 +62,45 @@ def run_file(
     ParameterError
         If anything is wrong; everything is listed.
     """
+    rig, protocol = read_experiment(path, changes, pieces, until)
+    check_contact(rig, contact)
+    times = None if samples is None else np.linspace(0.0, protocol.until or np.nan, samples)
+    with progress_of(protocol) as progress:
+        return simulate(
+            rig, protocol, initial=_starting_values(start), times=times, method=method, rtol=rtol, progress=progress
+        )
+
+
+def read_experiment(
+    path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None
+) -> tuple[Slider | Machine, Protocol]:
+    """The rig of a file, and its ``[protocol]`` with further pieces and its end; see `run_file`.
+
+    Raises
+    ------
+    ParameterError
+        If anything is wrong; everything is listed.
+    """
     changes = (changes,) if isinstance(changes, str) else tuple(changes)  # read twice
     rig = read_rig(path, changes)
     protocol = read_protocol(path, changes) or Protocol()
-    check_contact(rig, contact)
     machine = rig if isinstance(rig, Machine) else None
     area = rig.area if isinstance(rig, Slider) else None
     added = _pieces(pieces, area, machine)
-    if added:
-        protocol = Protocol(pieces=(*protocol.pieces, *added), until=protocol.until)
     end = protocol.until if until is None else _seconds(until)
     if end is None:
         raise ParameterError(
             [Problem("until", "missing; give the end as --until '200 s', or write [protocol] with until in the file")]
         )
-    times = None if samples is None else np.linspace(0.0, end, samples)
+    return rig, Protocol(pieces=(*protocol.pieces, *added), until=end)
+
+
+@contextmanager
+def progress_of(protocol: Protocol) -> Iterator[Callable[[float], None]]:
+    """Shows on a terminal how far a run is; what it yields is called with the time reached."""
+    end = format_quantity(protocol.until or np.nan, "s")
     with progress_text("simulating") as said:
-
-        def progress(time: float) -> None:
-            said(
-                f"simulating, at {format_quantity(time, 's')} of {format_quantity(end, 's')}; Ctrl-C keeps "
-                "what there is"
-            )
-
-        return simulate(
-            rig, protocol, until=end, initial=_starting_values(start), times=times, method=method, rtol=rtol,
-            progress=progress,
-        )  # fmt: skip
+        yield lambda time: said(f"simulating, at {format_quantity(time, 's')} of {end}; Ctrl-C keeps what there is")
 
 
 def _pieces(texts: Iterable[str], area: float | None, machine: Machine | None) -> list[Piece]:

@@ -23,7 +23,9 @@ from steadyslip.files.standalone import write_page
 from steadyslip.linear.boundary import margins, oscillatory_edge
 from steadyslip.machine.machine import Machine
 from steadyslip.machine.slider import Slider
+from steadyslip.motion.commands import progress_of, read_experiment
 from steadyslip.nonlinear.forced import FrequencyResponse, amplitude_unit, response
+from steadyslip.nonlinear.frozen import FrozenVerdicts, frozen_verdicts
 from steadyslip.nonlinear.kicks.basin import Basin, basin
 from steadyslip.nonlinear.kicks.kicks import kick_problems
 from steadyslip.nonlinear.kicks.threshold import Threshold, threshold
@@ -189,13 +191,28 @@ def _quantity(option: str, text: str, unit: str) -> float:
         raise ParameterError([Problem(option, str(error))]) from error
 
 
-def write_response(found: FrequencyResponse, path: Path, source: Path | None = None) -> None:
-    """Write columns, a document or a figure, by the ending of the name.
+def write_answers(found: FrequencyResponse | FrozenVerdicts, path: Path, title: str, source: Path) -> None:
+    """Write columns, a document with the hash of its `source`, or a figure, by the ending of the name.
 
     Raises
     ------
     NotAvailable
         If the ending is none of these, or the file cannot be written.
     """
-    writers = {".csv": found.to_csv, ".html": lambda p: write_page(found, p, "Response", source=source)}
+    writers = {".csv": found.to_csv, ".html": lambda p: write_page(found, p, title, source=source)}
     write_by_ending(path, writers, lambda: found.plot()[0])
+
+
+def verdicts_of_file(
+    path: str | os.PathLike[str], changes: Iterable[str], pieces: Iterable[str], until: str | None, rtol: float
+) -> FrozenVerdicts:
+    """`steadyslip.frozen_verdicts` for the rig and the protocol of a file, and further pieces in words.
+
+    Raises
+    ------
+    ParameterError
+        If anything is wrong; everything is listed.
+    """
+    rig, protocol = read_experiment(path, changes, pieces, until)
+    with progress_of(protocol) as progress:
+        return frozen_verdicts(rig, protocol, rtol=rtol, progress=progress)

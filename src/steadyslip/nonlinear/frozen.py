@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from os import PathLike
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
+from steadyslip.core.areas import outside
 from steadyslip.core.errors import NotAvailable
 from steadyslip.core.format import format_quantity
 from steadyslip.core.options import checked, finite
 from steadyslip.core.pictures import draw
+from steadyslip.core.records import parameters, replaced
 from steadyslip.core.results import ReadOnly
+from steadyslip.files.output import write_columns
+from steadyslip.laws.contact import ContactLaw, Motion
 from steadyslip.linear.stiffness import critical_stiffness, growth_rate
 from steadyslip.machine.input_units import in_units_of
 from steadyslip.machine.machine import Machine
@@ -20,11 +27,15 @@ from steadyslip.machine.slider import Slider
 from steadyslip.model.reducing import PORES
 from steadyslip.motion import History, simulate
 from steadyslip.motion.targets import targets
-from steadyslip.protocol import Protocol
+from steadyslip.protocol import Protocol, pack
+from steadyslip.protocol.inputs import inputs_at, segment_of
+from steadyslip.protocol.protocol import LOAD_POINT
 
 Array = np.ndarray
-MOMENTS = 1000  # at which the verdict is asked; crossings are interpolated between them
-DEPARTED = 2.0  # so many times as fast as asked a block must be for a slip event too
+MOMENTS = 1000  # at which the verdict is asked, besides those at which something jumps
+REFINED = 100  # moments between two of these, at which it is asked again where they differ
+DEPARTED = 2.0  # so many times as fast as asked slip must be for a slip event too
+ENDED = ("contact lost", "blow-up", "stuck", "no velocity")  # what ends steady sliding and the motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +58,9 @@ class FrozenVerdicts(ReadOnly):
     crossings : tuple of (float, str)
         Times (s) at which the verdict changes, and to what: ``unstable``, ``stable`` or ``no steady sliding``.
     departure : float
-        Time (s) at which, after the first of those to unstable, a body is twice as fast as the drive asks, and twice as
-        fast as at that crossing (a ramp of the load slows or quickens slip by itself); NaN if that does not happen.
+        Time (s) at which, after the first of those to unstable, slip is twice as fast as the drive asks, and twice as
+        fast as at that crossing (a ramp of the load slows or quickens slip by itself), or at which it cannot go on;
+        NaN if that does not happen.
     e_folds : float
         Growth of a small disturbance from that crossing to the departure: integral of the growth rate.
     """
@@ -80,7 +92,21 @@ class FrozenVerdicts(ReadOnly):
             )
         elif begun is not None:
             lines.append("motion does not depart from steady sliding before the run ends")
+        if self.run.status != "done":
+            lines.append(f"the motion ends at {format_quantity(self.run.end, 's')}: {self.run.status}")
         return "\n".join(lines)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the motion was cut short by Ctrl-C; verdicts are whole."""
+        return self.run.status == "interrupted"
+
+    @cached_property
+    def slip_rates(self) -> dict[str, Array]:
+        """Slip rate (m/s) over the run's own times, by contact; of a slider under ``""``."""
+        if isinstance(self.rig, Slider):
+            return {"": self.run["v"]}
+        return {name: self.run[f"{name}.slip_rate"] for name in self.rig.contacts}
 
     def _at(self, time: float) -> str:
         known = self.rig.parameters()
@@ -100,6 +126,30 @@ class FrozenVerdicts(ReadOnly):
             "status": self.run.status,
         }
 
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write one row for each moment: what is changed, growth rate, critical stiffness, slip rates of the motion.
+
+        What does not exist is ``nan``. Forces where the rig has an area.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        known = self.rig.parameters()
+        columns = {"time (s)": self.t}
+        for name, own in self.values.items():
+            factor, unit = outside(known[name].role.unit, self.rig.area_of(name))
+            columns[f"{name} ({unit})"] = factor * own
+        columns["growth rate (1/s)"] = self.growth_rate
+        if isinstance(self.rig, Slider):
+            factor, unit = outside("Pa/m", self.rig.area)
+            columns[f"critical stiffness ({unit})"] = factor * self.critical_stiffness
+        for name, own in self.slip_rates.items():
+            moved = np.interp(self.t, self.run["t"], own, right=np.nan)
+            columns[f"{name} slip rate (m/s)".strip()] = moved
+        write_columns(path, columns, "%.12g")
+
     def plot(self, ax: Any = None) -> Any:
         """Draw growth rate and slip rate over time; see `steadyslip.figures.frozen_verdicts`."""
         return draw(self, ax=ax)
@@ -118,7 +168,12 @@ def _plain(values: Array) -> list[float | None]:
 
 @checked(until=finite(0))
 def frozen_verdicts(
-    rig: Slider | Machine, protocol: Any, *, until: float | None = None, rtol: float = 1e-7
+    rig: Slider | Machine,
+    protocol: Any,
+    *,
+    until: float | None = None,
+    rtol: float = 1e-7,
+    progress: Callable[[float], None] | None = None,
 ) -> FrozenVerdicts:
     """Verdict at every moment of a slow change of load, velocity or pressure, beside the motion.
 
@@ -129,13 +184,15 @@ def frozen_verdicts(
     Parameters
     ----------
     rig : Slider or Machine
-        Contacts that are pressed or injected at have a `preload`.
+        Contacts that are pressed or injected at have a load of their own, `preload` as a rule.
     protocol : Protocol, Piece or sequence of Piece
         Changes of the drive's velocity, of normal stresses and of injected pressures.
     until : float, optional
         End, s; the protocol's own unless given.
     rtol : float, optional
         Relative tolerance of the motion.
+    progress : callable, optional
+        Called with the time reached, s, while the motion goes on.
 
     Returns
     -------
@@ -144,7 +201,8 @@ def frozen_verdicts(
     Raises
     ------
     NotAvailable
-        If the protocol pushes a body or lets the drive go: such a state has no steady sliding with the same parameters.
+        If the protocol pushes a body or lets the drive go, or a contact counts its normal stress from the steady
+        sliding at the start: such a state is no steady sliding of the rig with other values.
     ParameterError
         If anything given is wrong.
 
@@ -162,64 +220,129 @@ def frozen_verdicts(
     >>> found.departure > 100
     True
     """
-    plan = in_units_of(rig, Protocol.of(protocol))
-    acting = targets(rig, plan)
-    if acting.pushes:
-        raise NotAvailable("a push or creep has no verdict of its own; change velocity, normal stress or injection")
-    changed = {name: target for name, (_, kind, target) in acting.named().items() if kind == "press"}
-    run = simulate(rig, plan, until=until, rtol=rtol)
-    t = np.linspace(0.0, run.end, MOMENTS)
-    along = {name: np.interp(t, run["t"], run[name]) for name in ("load_velocity", *changed)}
-    values = {"drive.velocity": along["load_velocity"]}
-    for name, target in changed.items():
-        parameter = _preload(rig, target.removesuffix(PORES))
-        before = values.get(parameter, float(rig.value(parameter) or 0.0))
-        values[parameter] = before - along[name] if target.endswith(PORES) else before + along[name]
-    values = {name: own for name, own in values.items() if np.ptp(own) > 0}
-    sliding = np.logical_and.reduce([own > 0 for own in values.values()], initial=True)
-    rates, critical = np.full(MOMENTS, np.nan), np.full(MOMENTS, np.nan)
-    if np.any(sliding):
-        there = {name: own[sliding] for name, own in values.items()}
-        rates[sliding] = growth_rate(rig, there)
-        if isinstance(rig, Slider):
-            critical[sliding] = critical_stiffness(rig, there)
-    crossings = tuple(_crossings(t, rates))
+    slow = _Slow(rig, in_units_of(rig, Protocol.of(protocol)))
+    run = simulate(rig, protocol, until=until, rtol=rtol, progress=progress)
+    end = float(run.protocol.until or np.nan)
+    t = slow.moments(end)
+    values = slow.values(t)
+    rates, critical = slow.growth_rate(values), slow.critical_stiffness(values)
+    crossings = tuple(slow.crossings(t, rates))
     begun = 0.0 if rates[0] > 0 else next((time for time, verdict in crossings if verdict == UNSTABLE), np.nan)
-    departure = _departure(run, begun)
+    changed = {name: own for name, own in values.items() if np.ptp(own) > 0}
+    found = FrozenVerdicts(rig, run, t, changed, rates, critical, crossings, np.nan, np.nan)
+    departure = _departure(found, begun)
     between = (t >= begun) & (t <= departure)
-    grown = float(np.trapezoid(np.nan_to_num(rates[between]), t[between])) if np.any(between) else np.nan
-    return FrozenVerdicts(rig, run, t, values, rates, critical, crossings, departure, grown)
+    grown = np.trapezoid(np.where(np.isnan(rates), 0.0, rates)[between], t[between]) if np.any(between) else np.nan
+    return replace(found, departure=departure, e_folds=float(grown))
 
 
-def _preload(rig: Slider | Machine, contact: str) -> str:
-    """The parameter that a constant change of the normal stress adds to."""
-    law = rig.contacts[contact].contact if isinstance(rig, Machine) else rig.contact
-    prefix = f"contacts.{contact}." if isinstance(rig, Machine) else "contact."
-    name = next((one for one in rig.of_kind("normal stress") if one.startswith(prefix)), None)
-    if name is None or law.load() is None:
-        raise NotAvailable(f"{prefix.rstrip('.')} is not given by its preload; no other can be changed slowly")
-    return name
+class _Slow:
+    """A rig whose parameters a protocol changes."""
+
+    def __init__(self, rig: Slider | Machine, plan: Protocol) -> None:
+        self.rig, self.plan, self.acting = rig, plan, targets(rig, plan)
+        if self.acting.pushes:
+            raise NotAvailable("a push or creep has no verdict of its own; change velocity, normal stress or injection")
+        _refuse_remembered(rig)
+        self.changes: dict[str, dict[int, float]] = {}  # of parameters by a unit of a channel
+        for channel, kind, target in self.acting.named().values():
+            if kind == "press":
+                name, share = _load_of(rig, target.removesuffix(PORES))
+                self.changes.setdefault(name, {})[channel] = -share if target.endswith(PORES) else share
+
+    def moments(self, end: float) -> Array:
+        """Times (s) at which to ask: even ones, and those just before and after what happens at once."""
+        self.segments = pack(self.plan, float(self.rig.drive.velocity), end, self.acting.channels)
+        breaks = self.segments.start[0]
+        before = np.nextafter(breaks[breaks > 0], 0.0)
+        return np.unique(np.concatenate([np.linspace(0.0, end, MOMENTS), breaks, before]))
+
+    def values(self, t: Array) -> dict[str, Array]:
+        """Parameters over times, SI units."""
+        lane = np.zeros(len(t), dtype=int)
+        inputs = inputs_at(self.segments, lane, segment_of(self.segments, lane, t), t)
+        found = {"drive.velocity": inputs[:, LOAD_POINT]}
+        for name, shares in self.changes.items():
+            change = np.sum([share * inputs[:, channel] for channel, share in shares.items()], axis=0)
+            found[name] = float(self.rig.value(name) or 0.0) + change
+        return found
+
+    def growth_rate(self, values: dict[str, Array]) -> Array:
+        """1/s; NaN where there is no steady sliding."""
+        return self._where_it_slides(growth_rate, values)
+
+    def critical_stiffness(self, values: dict[str, Array]) -> Array:
+        """Pa/m, of a slider; else NaN."""
+        if isinstance(self.rig, Machine):
+            return np.full(len(values["drive.velocity"]), np.nan)
+        return self._where_it_slides(critical_stiffness, values)
+
+    def _where_it_slides(self, asked: Callable[..., Any], values: dict[str, Array]) -> Array:
+        sliding = np.logical_and.reduce([own > 0 for own in values.values()])
+        found = np.full(len(sliding), np.nan)
+        if np.any(sliding):
+            found[sliding] = asked(self.rig, {name: own[sliding] for name, own in values.items()})
+        return found
+
+    def crossings(self, t: Array, rates: Array) -> Iterator[tuple[float, str]]:
+        """Where the verdict changes, and what it becomes."""
+        for i in _changes(rates):
+            between = np.linspace(t[i - 1], t[i], REFINED)
+            own = self.growth_rate(self.values(between))
+            own[0], own[-1] = rates[i - 1], rates[i]
+            for j in _changes(own):
+                low, high = own[j - 1], own[j]
+                share = low / (low - high) if np.isfinite(low) and np.isfinite(high) and low != high else 1.0
+                yield float(between[j - 1] + share * (between[j] - between[j - 1])), _verdict(high)
 
 
-def _crossings(t: Array, rates: Array) -> Iterator[tuple[float, str]]:
-    """Where the verdict changes, between moments by a straight line, and what it becomes."""
-    verdicts = [_verdict(one) for one in rates]
-    for i in range(1, len(t)):
-        if verdicts[i] != verdicts[i - 1]:
-            low, high = rates[i - 1], rates[i]
-            share = low / (low - high) if np.isfinite(low) and np.isfinite(high) and low != high else 1.0
-            yield float(t[i - 1] + share * (t[i] - t[i - 1])), verdicts[i]
+def _changes(rates: Array) -> Array:
+    """Places whose verdict is not that before."""
+    verdicts = np.array([_verdict(one) for one in rates])
+    return np.flatnonzero(verdicts[1:] != verdicts[:-1]) + 1
 
 
-def _departure(run: History, begun: float) -> float:
-    """When a body is first twice as fast as the drive asks, and as it was when sliding became unstable."""
-    if np.isnan(begun):
-        return np.nan
+def _contacts(rig: Slider | Machine) -> dict[str, tuple[ContactLaw, float]]:
+    """Contact laws by the prefix of their parameters, and the area by which forces of channels are divided."""
+    if isinstance(rig, Slider):
+        return {"contact.": (rig.contact, 1.0)}
+    return {f"contacts.{name}.contact.": (own.contact, own.area or 1.0) for name, own in rig.contacts.items()}
+
+
+def _refuse_remembered(rig: Slider | Machine) -> None:
+    """Contacts that count from the steady sliding at the start: another has not the parameters of the rig."""
+    seen = {one.name: sp.Symbol(one.name) for one in fields(Motion)}
+    for prefix, (law, _) in _contacts(rig).items():
+        memory = {f"{kind}memory": tuple(sp.symbols([f"{kind}{n}" for n in law.memory()])) for kind in ("", "steady_")}
+        stress = sp.sympify(law.normal_stress(Motion(**seen | memory)))
+        if any(one.name == "slip" or one.name.startswith("steady_") for one in stress.free_symbols):
+            raise NotAvailable(
+                f"{prefix.rstrip('.')} counts its normal stress from the steady sliding at the start, which a slow "
+                "change leaves; give a preload in place of steady_normal_stress, and none that depends on displacement"
+            )
+
+
+def _load_of(rig: Slider | Machine, contact: str) -> tuple[str, float]:
+    """The parameter that a constant change of the normal stress adds to, and how much a unit of the channel adds."""
+    prefix = f"contacts.{contact}.contact." if contact else "contact."
+    law, area = _contacts(rig)[prefix]
+    load = law.load()
+    for name, own in parameters(law, prefix).items():
+        if load is not None and own.role.unit == "Pa" and own.value:
+            twice: Any = replaced(law, {name: 2 * own.value}, prefix).load()
+            if share := float(twice - load) / own.value:
+                return name, 1 / (share * area)
+    raise NotAvailable(f"{prefix.rstrip('.')} has no load of its own, such as a preload, that could be changed slowly")
+
+
+def _departure(found: FrozenVerdicts, begun: float) -> float:
+    """When slip is first twice as fast as the drive asks, and as it was when sliding became unstable."""
+    run = found.run
     asked = run["load_velocity"] / run["load_velocity"][0]
     apart = np.zeros(len(run["t"]), dtype=bool)
-    for name in run.data:
-        if (name == "v" or name.endswith(".v")) and run[name][0] > 0:
-            least = np.maximum(run[name][0] * asked, np.interp(begun, run["t"], run[name]))
-            apart |= run[name] > DEPARTED * least
-    found = np.flatnonzero(apart & (run["t"] >= begun))
-    return float(run["t"][found[0]]) if found.size else np.nan
+    for own in found.slip_rates.values():
+        apart |= own > DEPARTED * np.maximum(own[0] * asked, np.interp(begun, run["t"], own))
+    late = np.flatnonzero(apart & (run["t"] >= begun))
+    if not late.size and run.status in ENDED and run.end >= begun:
+        return run.end
+    return float(run["t"][late[0]]) if late.size else np.nan

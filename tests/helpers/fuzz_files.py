@@ -28,12 +28,14 @@ import numpy as np
 import xarray as xr
 
 import steadyslip as ss
+from steadyslip.experiments.answers.population import POPULATION, Population
 from steadyslip.experiments.fitting.identify import Combination
 from steadyslip.experiments.fitting.numbers import SearchStory
 from steadyslip.experiments.fitting.planning import make_plan
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.store import FIT
 from steadyslip.experiments.numerics.noise import Noise
+from steadyslip.experiments.numerics.pooling import Pooled
 from steadyslip.files.sealed import seal, unseal, write_sealed
 from steadyslip.kernels import build
 from steadyslip.maps.store.layout import _seal
@@ -79,10 +81,18 @@ def small_fit():
     return found
 
 
+def small_population():
+    """A population as it comes back, of two fits."""
+    fits, count = {"p1": small_fit(), "µ": small_fit()}, 6
+    draws = Pooled(np.ones((count, 1, 2)), np.ones((count, 1)), np.ones((count, 2, 1)), 30.0, 2)
+    return Population(fits, ("friction.a",), {"T": np.array([1.0, 2.0])}, 1.0, fits["p1"].space.unknowns[:1], draws)
+
+
 def make_sound(folder):
     """One file of each kind."""
     ss.simulate(rig(), ss.VelocityStep(at=1.0, to=2e-6), until=20.0).save(folder / "run.nc")
     small_fit().save(folder / "fit.nc")
+    small_population().save(folder / "population.nc")
     ss.run_map(plan(), folder / "map.zarr", workers=1, progress=False)
     write_sealed(folder / "key-advance", os.urandom(3000), build.KERNEL, "key-advance", private=True)
 
@@ -146,7 +156,7 @@ BYTEWISE = (flip, flip, flip, cut, lengthen, overwrite, replace, pipe, link, fol
 
 def resealed(path, change):
     """Somebody changes the content and seals it again."""
-    kind = RUN if path.name == "run.nc" else FIT
+    kind = {"run.nc": RUN, "fit.nc": FIT, "population.nc": POPULATION}[path.name]
     path.write_bytes(seal(change(bytes(unseal(path.read_bytes(), path, kind))), kind))
 
 
@@ -316,6 +326,7 @@ def marks(path, chance):
 BY_KIND = {
     "run.nc": (*BYTEWISE, *SEALED),
     "fit.nc": (*BYTEWISE, *SEALED),
+    "population.nc": (*BYTEWISE, *SEALED),
     "map.zarr": (*map(any_file, BYTEWISE), *[metadata] * 7, old_format, linked_folder, linked_folder, bomb, marks),
     "key-advance": BYTEWISE,
 }
@@ -346,6 +357,15 @@ def open_fit(path, sound, forged):
             raise Wrong("opened with other content")
 
 
+def open_population(path, sound, forged):
+    found = ss.load_population(path)
+    said = f"{json.dumps(found.to_dict(), allow_nan=False)} {[one.estimates for one in found.fits.values()]}"
+    if not forged:
+        same = ss.load_population(sound)
+        if said != f"{json.dumps(same.to_dict())} {[one.estimates for one in same.fits.values()]}":
+            raise Wrong("opened with other content")
+
+
 def open_map(path, sound, forged):
     found = ss.open_map(path)
     str(found), found.damaged(), json.dumps(found.to_dict())
@@ -367,7 +387,13 @@ def open_cache(path, sound, forged):
         raise Wrong("opened with other content")
 
 
-OPEN = {"run.nc": open_run, "fit.nc": open_fit, "map.zarr": open_map, "key-advance": open_cache}
+OPEN = {
+    "run.nc": open_run,
+    "fit.nc": open_fit,
+    "population.nc": open_population,
+    "map.zarr": open_map,
+    "key-advance": open_cache,
+}
 
 
 # -- trials

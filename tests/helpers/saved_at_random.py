@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-import lab_records as lab
+import fuzz_files
 import machines
 import machines_in_the_plane
 import scaled_machines
@@ -26,6 +26,7 @@ from fuzz_rigs import DRIVES, FRICTION
 from moving_machines import two_tables
 from protocols_by_scipy import RandomProtocol
 from rigs_of_theory import CONTACTS
+from steadyslip.experiments.numerics.pooling import Pooled
 from steadyslip.kernels import runner
 from steadyslip.kernels.build import interpreted
 from steadyslip.protocol.protocol import DISTURBANCE, Piece
@@ -273,28 +274,67 @@ def answers(random, folder):
 
 
 def draws(random, folder):
-    """Draws of a fit as the file that ArviZ writes."""
-    fit = lab.basalt()
+    """Draws of a fit as the file that is read back, and as that which ArviZ writes."""
+    fit = fuzz_files.small_fit()
     count, chains = int(random.integers(1, 40)), int(random.integers(1, 5))
     values = {name: odd_columns(random, count * chains) for name in fit.names}
     worth = odd_columns(random, count * chains) if random.random() < 0.5 else None
-    one = ss.Draws(fit, "posterior", values, {"acceptance": 0.3}, chains=chains, log_probability=worth)
+    kind = str(random.choice(["bootstrap", "posterior", "normal"]))
+    one = ss.Draws(fit, kind, values, {"acceptance": odd(random, 0.3)}, bool(random.integers(2)), chains, worth)
+    found = saved_twice(one, ss.load_draws, folder / "draws.nc")
     path = str(folder / f"draws-{random.integers(10**9)}.nc")
     one.to_arviz().to_netcdf(path)
     with xr.open_dataset(path, group="posterior") as read:
         again = {name: read[name].values.ravel() for name in values}
-    found = differs(values, again, "draws")
+    found = found or differs(values, again, "draws")
     if worth is not None:
         with xr.open_dataset(path, group="sample_stats") as read:
             found = found or differs(worth, read["lp"].values.ravel(), "log probability")
     return found
 
 
+def populations(random, folder):
+    """Populations of any sizes, with any labels and numbers."""
+    fits = {
+        f"{random.choice(['p', 'µ/', 'a b.c', 'part1.x'])}{j}": fuzz_files.small_fit()
+        for j in range(random.integers(1, 6))
+    }
+    given = [name for name in ("temperature", "normal stress") if random.random() < 0.5]
+    names = tuple(str(one) for one in random.choice(["friction.a", "friction.b", "friction.mu_ref"],
+                                                    int(random.integers(1, 4)), replace=False))  # fmt: skip
+    chains = int(random.integers(1, 4))
+    count, members, size = chains * int(random.integers(1, 5)), len(fits), len(names)
+    spread = np.abs(odd_columns(random, count * size)).reshape(count, size)
+    pooled = Pooled(
+        odd_columns(random, count * size * (1 + len(given))).reshape(count, size, -1), spread,
+        odd_columns(random, count * members * size).reshape(count, members, size), odd(random, 30.0), chains,
+    )  # fmt: skip
+    unknowns = tuple(
+        next(one for one in next(iter(fits.values())).space.unknowns if one.name == name) for name in names
+    )
+    one = ss.Population(
+        fits, names, {name: odd_columns(random, members) for name in given}, odd(random, 1.0), unknowns, pooled
+    )
+    return saved_twice(one, ss.load_population, folder / "population.nc")
+
+
+def saved_twice(one, load, path):
+    """What is not the same in what is read back; fits by their files, which are written once more."""
+    one.save(path)
+    content, again = path.read_bytes(), load(path)
+    again.save(path)
+    own, others = ({n: getattr(each, n) for n in kept(one) if n not in ("fit", "fits")} for each in (one, again))
+    found = differs(own, others)
+    return found or ("" if path.read_bytes() == content else "the file of what was read is another")
+
+
 def odd_columns(random, count):
     return np.array([odd(random, one) for one in random.standard_normal(count)])
 
 
-CAMPAIGNS = {"rigs": rigs, "runs": runs, "maps": maps, "answers": answers, "draws": draws}
+CAMPAIGNS = {
+    "rigs": rigs, "runs": runs, "maps": maps, "answers": answers, "draws": draws, "populations": populations,
+}  # fmt: skip
 
 
 def found(what, count, seed):

@@ -4,11 +4,11 @@ Knows no verdicts, maps or figures: fits come back as numbers and records.
 """
 
 from .answers.laws import LawComparison, compare, compare_laws
-from .answers.population import Population, population
+from .answers.population import Population, load_population, population
 from .answers.precision import Precision, best_protocol, precision
 from .answers.predict import Prediction, predict
 from .answers.profiles import Profile, profile
-from .answers.uncertainty import Draws, bootstrap, normal_draws, posterior
+from .answers.uncertainty import Draws, bootstrap, load_draws, normal_draws, posterior
 from .answers.validation import CrossValidation, cross_validate
 from .fitting.fit import fit
 from .fitting.numbers import Estimate
@@ -38,7 +38,9 @@ __all__ = [
     "fit",
     "fit_files",
     "lab_rig",
+    "load_draws",
     "load_fit",
+    "load_population",
     "normal_draws",
     "population",
     "population_files",

@@ -69,10 +69,7 @@ def write_population(found: Population, path: Path) -> None:
     def as_page(target: Path) -> None:
         write_page(found, target, "Population")
 
-    def as_draws(target: Path) -> None:
-        found.to_arviz().to_netcdf(str(target))
-
-    write_by_ending(path, {".nc": as_draws, ".html": as_page, ".json": as_text}, found.plot)
+    write_by_ending(path, {".nc": found.save, ".html": as_page, ".json": as_text}, found.plot)
 
 
 def as_json(fit: Fit, comparison: LawComparison | None) -> dict[str, Any]:

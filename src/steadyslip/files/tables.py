@@ -8,8 +8,9 @@ somebody made.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
@@ -21,6 +22,7 @@ from steadyslip.files.sealed import FileKind, read_sealed, write_sealed
 
 Array = np.ndarray
 _SIZES = "sizes"  # attribute: the format has no empty dimensions, so that variables along them are left out
+_PART = re.compile(r"part([1-9][0-9]{0,4})\.(.+)", re.DOTALL)  # name in the table of a name in one of its parts
 
 
 @dataclass(frozen=True)
@@ -41,39 +43,96 @@ class ColumnRule:
     text: bool = False
 
 
-def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any) -> None:
+def write_table(path: str | PathLike[str], kind: FileKind, dataset: Any, parts: Sequence[Any] = ()) -> None:
     """Write an xarray.Dataset of floats and words; a file of that name is replaced only once the new one is whole.
+
+    Parameters
+    ----------
+    path : str or path
+    kind : FileKind
+    dataset : xarray.Dataset
+    parts : sequence of xarray.Dataset
+        Results that this one is made of, as they are written on their own; their names get ``part1.`` in front.
 
     Raises
     ------
     NotAvailable
         If the file cannot be written, or the dataset is too large.
     """
-    if dataset.nbytes > kind.most:
-        size = f"it has {dataset.nbytes / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name}"
-        raise NotAvailable(f"cannot write {str(path)!r}: {size} may have; keep fewer samples")
-    kept = dataset.drop_vars([name for name, variable in dataset.variables.items() if not variable.size])
-    kept = kept.assign_attrs({_SIZES: json.dumps(dict(dataset.sizes))})
+    if (size := sum(one.nbytes for one in (dataset, *parts))) > kind.most:
+        told = f"it has {size / 2**20:.0f} MiB, more than the {kind.most // 2**20} MiB that a {kind.name}"
+        raise NotAvailable(f"cannot write {str(path)!r}: {told} may have; keep fewer samples")
+    kept = _whole(dataset)
+    for i, part in enumerate(map(_whole, parts), start=1):
+        part = part.rename({name: f"part{i}.{name}" for name in {*part.variables, *part.sizes}})
+        attributes = {f"part{i}.{name}": value for name, value in part.attrs.items()}
+        kept = kept.merge(part).assign_attrs(kept.attrs | attributes)
     encoding = {name: {"_FillValue": None} for name, variable in kept.variables.items() if variable.dtype.kind == "f"}
     content = kept.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
     write_sealed(path, bytes(content), kind)
 
 
+def _whole(dataset: Any) -> Any:
+    """With all sizes in an attribute, without columns that have no room."""
+    kept = dataset.drop_vars([name for name, variable in dataset.variables.items() if not variable.size])
+    return kept.assign_attrs({_SIZES: json.dumps(dict(dataset.sizes))})
+
+
+def _apart(file: File) -> list[File]:
+    """What is in a file besides its parts, and its parts in their order."""
+    found: dict[int, File] = {0: File({}, {}, {})}
+    for what in ("attributes", "variables"):
+        for name, value in getattr(file, what).items():
+            match = _PART.fullmatch(name)
+            part, own = (int(match[1]), match[2]) if match else (0, name)
+            if part and what == "variables":
+                value = replace(value, dims=tuple(dim.removeprefix(f"part{part}.") for dim in value.dims))
+            getattr(found.setdefault(part, File({}, {}, {})), what)[own] = value
+    if sorted(found) != list(range(len(found))):
+        raise FormatError("its parts are not numbered one by one")
+    return [found[i] for i in range(len(found))]
+
+
 class ExpectedTable:
     """A file that is open: its attributes, and its columns once somebody says which they must be.
+
+    Parameters
+    ----------
+    path : str or path
+    kind : FileKind
+    attributes : mapping of str to type
+        What it must have.
+    of_parts : mapping of str to type, optional
+        What each of its parts must have, for a result that is made of others.
 
     Attributes
     ----------
     attributes : dict
+    parts : list of ExpectedTable
     """
 
-    def __init__(self, path: str | PathLike[str], kind: FileKind, attributes: Mapping[str, type]) -> None:
+    def __init__(
+        self, path: str | PathLike[str], kind: FileKind, attributes: Mapping[str, type],
+        of_parts: Mapping[str, type] | None = None,
+    ) -> None:  # fmt: skip
         self.path, self.kind = path, kind
         try:
-            self._file: File = read(read_sealed(path, kind))
+            file = read(read_sealed(path, kind))
+            files = [file] if of_parts is None else _apart(file)
         except FormatError as error:
             raise self.fault(str(error)) from error
-        self.attributes: dict[str, Any] = dict(self._file.attributes)
+        self._open(files[0], attributes)
+        self.parts = [self._part(one, of_parts) for one in files[1:] if of_parts is not None]
+
+    def _part(self, file: File, attributes: Mapping[str, type]) -> ExpectedTable:
+        part = ExpectedTable.__new__(ExpectedTable)
+        part.path, part.kind, part.parts = self.path, self.kind, []
+        part._open(file, attributes)
+        return part
+
+    def _open(self, file: File, attributes: Mapping[str, type]) -> None:
+        self._file = file
+        self.attributes: dict[str, Any] = dict(file.attributes)
         sizes = self.json(self.attributes.pop(_SIZES, None), {str: int})
         self._compare("attributes", self.attributes, attributes)
         for name, type_ in attributes.items():

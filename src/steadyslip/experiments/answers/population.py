@@ -6,8 +6,10 @@ that say little are drawn towards the others (partial pooling); how much follows
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -20,14 +22,24 @@ from steadyslip.core.options import checked, finite, whole
 from steadyslip.core.pictures import draw
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.inference import inference_data
+from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.numbers import Estimate
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.fitting.settings import DRAWS, STRESS
 from steadyslip.experiments.fitting.unknowns import Unknown
 from steadyslip.experiments.numerics.pooling import Pooled, Told, pooled
+from steadyslip.files.sealed import FileKind
+from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 from steadyslip.model.sliding import steady_state
 
 FEWEST = 3  # experiments that determine a parameter: two cannot tell a spread from a difference
+POPULATION = FileKind("population", 1, 2**30, "make the population of its fits again and save it anew")
+_ATTRIBUTES = {"names": str, "scale": float, "chains": int, "time": float}
+_NAMES = {"experiments": [str], "parameters": [str], "conditions": [str]}
+_COLUMNS = {
+    "conditions": ColumnRule(("condition", "experiment")), "mean": ColumnRule(("draw", "parameter", "slope")),
+    "spread": ColumnRule(("draw", "parameter")), "members": ColumnRule(("draw", "experiment", "parameter")),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +140,28 @@ class Population(ReadOnly):
             lines.append(f"means           at {means}")
         return "\n".join(lines)
 
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write everything, fits and their records included, to a netCDF file; `load_population` reads it back.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        import xarray as xr
+
+        values = {
+            "conditions": np.array(list(self.conditions.values())).reshape(len(self.conditions), len(self.fits)),
+            "mean": self.draws.mean, "spread": self.draws.spread, "members": self.draws.members,
+        }  # fmt: skip
+        named = {"experiments": self.fits, "parameters": self.names, "conditions": self.conditions}
+        attributes = {
+            "names": json.dumps({what: list(own) for what, own in named.items()}), "scale": float(self.scale),
+            "chains": self.draws.chains, "time": float(self.draws.time),
+        }  # fmt: skip
+        table = xr.Dataset({name: (_COLUMNS[name].dims, own) for name, own in values.items()}, attrs=attributes)
+        write_table(path, POPULATION, table, [store.to_dataset(one) for one in self.fits.values()])
+
     def plot(self, ax: Any = None) -> Any:
         """Draw every parameter of every experiment, alone and with the others, and the population.
 
@@ -207,6 +241,39 @@ def _slope_words(found: tuple[float, float, float], one: Unknown, condition: str
             f"{format_quantity(high, one.unit)})"
         )
     return f"from {condition} {whole} the mean changes by {change}"
+
+
+@checked()
+def load_population(path: str | PathLike[str]) -> Population:
+    """Read a population that `Population.save` wrote.
+
+    Nothing in the file is executed; damage is found, whatever it is.
+
+    Raises
+    ------
+    NotAvailable
+        If the file is not one of ours, is damaged, or cannot be read.
+    """
+    table = ExpectedTable(path, POPULATION, _ATTRIBUTES, store.ATTRIBUTES)
+    named, about, found = table.json(table.attributes["names"], _NAMES), table.attributes, table.columns(_COLUMNS)
+    fits = {label: store.from_table(part, Fit) for label, part in zip(named["experiments"], table.parts, strict=False)}
+    conditions = dict(zip(named["conditions"], found["conditions"], strict=False))
+    sizes = {"experiment": len(fits), "condition": len(conditions), "parameter": len(named["parameters"]),
+             "slope": 1 + len(conditions)}  # fmt: skip
+    counted = len(fits) == len(table.parts) and all(table.sizes[name] == size for name, size in sizes.items())
+    if not counted or any(len(set(own)) != len(own) for own in named.values()):
+        raise table.fault(f"its sizes are {table.sizes}, of {len(table.parts)} fits")
+    if unknown := [name for name in named["parameters"] if not any(name in one.names for one in fits.values())]:
+        raise table.fault(f"no fit has the parameter {unknown[0]!r:.60}")
+    if about["chains"] < 1 or table.sizes["draw"] % about["chains"]:
+        raise table.fault(f"it has {table.sizes['draw']} draws of {about['chains']} chains")
+    if not all(np.all(np.isfinite(own)) for own in found.values()) or np.any(found["spread"] < 0):
+        raise table.fault("no population has its numbers")
+    return Population(
+        fits, tuple(named["parameters"]), conditions, about["scale"],
+        tuple(_unknown(fits, name) for name in named["parameters"]),
+        Pooled(found["mean"], found["spread"], found["members"], about["time"], about["chains"]),
+    )  # fmt: skip
 
 
 @checked(scale=finite(0, 100), count=whole(*DRAWS))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -14,15 +16,22 @@ from steadyslip.core.pictures import draw
 from steadyslip.core.progress import progress_bar
 from steadyslip.core.results import ReadOnly
 from steadyslip.experiments.answers.inference import inference_data
+from steadyslip.experiments.fitting import store
 from steadyslip.experiments.fitting.effort import Effort
 from steadyslip.experiments.fitting.result import Fit
 from steadyslip.experiments.numerics.least_squares import Minima, minimise
 from steadyslip.experiments.numerics.sampling import walked
+from steadyslip.files.sealed import FileKind
+from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
 TOGETHER = 32  # refits at a time: four vectors of lanes for each of two cores' worth of memory
 BOOTSTRAPS = ("auto", "block", "residual")
 WARM = 1e-6  # reduction still to be had, as a share of the sum, at which a refit is done: far below its scatter
 LONGEST_BLOCK = 0.1  # of a record
+DRAWS = FileKind("draws", 1, 2**30, "draw them again and save them anew")
+_ATTRIBUTES = {"kind": str, "about": str, "chains": int}
+_ABOUT = {"details": {str: float}, "interrupted": bool, "weighed": bool}
+KINDS = ("bootstrap", "posterior", "normal")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +88,24 @@ class Draws(ReadOnly):
             lines.append(f"  {one.name}  {drawn.shown()}   95 %: {drawn.range()}")
         return "\n".join(lines)
 
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write everything, the fit and its records included, to a netCDF file; `load_draws` reads it back.
+
+        Raises
+        ------
+        NotAvailable
+            If the file cannot be written.
+        """
+        import xarray as xr
+
+        weighed = self.log_probability is not None
+        about = {"details": self.details, "interrupted": self.interrupted, "weighed": weighed}
+        variables: dict[str, Any] = {"value": (("name", "draw"), np.array([self.values[n] for n in self.fit.names]))}
+        if weighed:
+            variables["log_probability"] = ("draw", self.log_probability)
+        attributes = {"kind": self.kind, "about": json.dumps(about), "chains": self.chains}
+        write_table(path, DRAWS, xr.Dataset(variables, attrs=attributes), [store.to_dataset(self.fit)])
+
     def plot(self, ax: Any = None) -> Any:
         """Draw the parameters against each other."""
         return draw(self, ax=ax)
@@ -99,6 +126,33 @@ class Draws(ReadOnly):
         statistics = None if self.log_probability is None else {"lp": self.log_probability}
         units = {one.name: one.unit for one in self.fit.space.unknowns}
         return inference_data(self.values, units, self.chains, statistics=statistics)
+
+
+@checked()
+def load_draws(path: str | PathLike[str]) -> Draws:
+    """Read draws that `Draws.save` wrote.
+
+    Nothing in the file is executed; damage is found, whatever it is.
+
+    Raises
+    ------
+    NotAvailable
+        If the file is not one of ours, is damaged, or cannot be read.
+    """
+    table = ExpectedTable(path, DRAWS, _ATTRIBUTES, store.ATTRIBUTES)
+    about = table.json(table.attributes["about"], _ABOUT)
+    weighed = {"log_probability": ColumnRule(("draw",))} if about["weighed"] else {}
+    columns = table.columns({"value": ColumnRule(("name", "draw")), **weighed})
+    kind, chains, count = table.attributes["kind"], table.attributes["chains"], table.sizes["draw"]
+    if kind not in KINDS or len(table.parts) != 1 or chains < 1 or count % chains:
+        raise table.fault(f"it has {count} draws of {chains} chains, of kind {kind!r:.60}, of {len(table.parts)} fits")
+    fit = store.from_table(table.parts[0], Fit)
+    if table.sizes["name"] != len(fit.names):
+        raise table.fault(f"it has {table.sizes['name']} parameters; expected {', '.join(fit.names)}")
+    return Draws(
+        fit, kind, dict(zip(fit.names, columns["value"], strict=True)), about["details"], about["interrupted"], chains,
+        columns.get("log_probability"),
+    )  # fmt: skip
 
 
 @checked(count=whole(1, 10**8))

@@ -26,7 +26,7 @@ from steadyslip.files.sealed import FileKind
 from steadyslip.files.tables import ColumnRule, ExpectedTable, write_table
 
 FIT = FileKind("fit", 6, 2**29, "write one with 'steadyslip fit ... -o fit.nc'")
-_ATTRIBUTES = {
+ATTRIBUTES = {
     "rig": str, "options": str, "ssq": float, "search": str, "unidentified": str, "noise": str, "records": str,
     "loading": str, "refits": str, "steadyslip": str,
 }  # fmt: skip
@@ -122,7 +122,11 @@ def read(path: str | PathLike[str], made: type[F]) -> F:
     NotAvailable
         If the file is not one of ours, is damaged, or cannot be read.
     """
-    table = ExpectedTable(path, FIT, _ATTRIBUTES)
+    return from_table(ExpectedTable(path, FIT, ATTRIBUTES), made)
+
+
+def from_table(table: ExpectedTable, made: type[F]) -> F:
+    """The fit in a file, or in a part of one, whose attributes are `ATTRIBUTES`."""
     stored = {name: table.json(table.attributes[name], form) for name, form in _FORMS.items()}
     described, noises, loading = stored["records"], stored["noise"], stored["loading"]
     weighted, present = stored["options"].pop("weighted"), stored["options"].pop("columns")

@@ -1,3 +1,4 @@
-"""What every other part stands on: declared records of parameters, quantities with units, errors, progress, registries.
+"""Foundations of all other folders: records of parameters, quantities with units, errors, progress, registries.
 
-Knows nothing of friction."""
+Nothing here depends on friction.
+"""

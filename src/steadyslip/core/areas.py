@@ -1,4 +1,4 @@
-"""Quantities per unit area inside, and the totals (N, N/m, kg, ...) that they are in a rig with an area."""
+"""Conversion between quantities per unit area (used inside) and totals of a contact with an area (N, N/m, kg, ...)."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from steadyslip.core.dimensions import Dimension, unit
 
 AREA = Dimension(length=2)
 TOTALS = ("N", "N/m", "N s/m", "N/m/s", "kg", "N s")
-"""Units of the totals that people have names for."""
+"""Units of totals that have a common name; others are written as the per-area unit times m^2."""
 
 
 def is_per_area(unit_name: str) -> bool:
-    """Whether a quantity is per unit area inside and a total (N, N/m, kg, ...) of a rig with an area."""
+    """True if a unit has mass to the first power (Pa, Pa/m, kg/m^2, ...), so that an area turns it into a total."""
     return unit(unit_name)[1].mass == 1
 
 
 def total_unit(unit_name: str) -> str:
-    """Name of the unit of the total that belongs to a per-area unit."""
+    """Unit of a per-area quantity times an area, such as N for Pa."""
     _, dimension = unit(unit_name)
     wanted = dimension.times(AREA)
     for candidate in TOTALS:
@@ -29,9 +29,9 @@ def total_unit(unit_name: str) -> str:
 
 
 def outside(unit_name: str, area: float | None) -> tuple[float, str]:
-    """Factor and unit in which people give and get a quantity: of the whole contact where the rig has an area.
+    """Factor and unit that turn an inside value into one for users: the total of the contact if there is an area (m²).
 
-    Everything that is read, printed, drawn or written as a table goes through this one place.
+    Reading, printing, drawing and tables all use this function.
 
     >>> outside("Pa/m", 0.01), outside("Pa/m", None), outside("m/s", 0.01)
     ((0.01, 'N/m'), (1.0, 'Pa/m'), (1.0, 'm/s'))
@@ -40,7 +40,7 @@ def outside(unit_name: str, area: float | None) -> tuple[float, str]:
 
 
 def totals(values: Mapping[str, float | None], units: Mapping[str, str], area: float | None) -> dict[str, Any]:
-    """What JSON has beside values per unit area: those of the whole contact, with their units; nothing without area.
+    """Totals of per-area values as a dict for JSON: area, values and units; empty if there is no area.
 
     >>> totals({"k": 9e9, "v": 1e-6}, {"k": "Pa/m", "v": "m/s"}, 0.01)
     {'area': 0.01, 'values': {'k': 90000000.0}, 'units': {'k': 'N/m'}}
@@ -53,16 +53,16 @@ def totals(values: Mapping[str, float | None], units: Mapping[str, str], area: f
 
 
 def total(value: float | None, unit_name: str, area: float | None) -> dict[str, Any]:
-    """The same beside a single value: ``total`` and ``total_unit``; nothing where it is not per unit area."""
+    """Total of one per-area value as a dict for JSON, ``total`` and ``total_unit``; empty if there is no total."""
     factor, name = outside(unit_name, area)
     return {} if name == unit_name else {"total": _times(value, factor), "total_unit": name}
 
 
 def _times(value: float | None, factor: float) -> float | None:
-    """A number for JSON; what does not exist and infinity are None."""
+    """Product for JSON; None if the value is missing or the product is not finite."""
     return value * factor if value is not None and math.isfinite(value * factor) else None
 
 
 def stress_name(name: str, area: float | None) -> str:
-    """Name of a stress for people: the force that it is in a rig with an area."""
+    """A name with "stress" replaced by "force" if the rig has an area, since its totals are forces."""
     return name if area is None else name.replace("stress", "force")

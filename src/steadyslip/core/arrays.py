@@ -1,4 +1,4 @@
-"""Arrays, and arrays in place of a record's numbers: the one place where these are checked and broadcast."""
+"""Checks and broadcasting of arrays that stand in place of a record's numbers."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from steadyslip.core.errors import ParameterError, Problem, QuantityError
+from steadyslip.core.errors import ParameterError, Problem, QuantityError, repr_short
 from steadyslip.core.quantities import parse
 from steadyslip.core.records import FrozenRecord, conditions, with_values
 from steadyslip.core.roles import Parameter
 
 Array = np.ndarray
-"""Of numbers; the docstring of what takes or gives it says which."""
+"""Array of numbers; the function that takes or returns it states shape and unit."""
 
 
 def checked_array(name: str, role: Parameter, value: Any) -> Any:
-    """A varied parameter as float array inside its domain; a DataArray keeps its dimensions.
+    """Convert a varied parameter to a float array and check its domain; a DataArray keeps its dimensions.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def checked_array(name: str, role: Parameter, value: Any) -> Any:
     try:
         array = _numbers(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ParameterError([Problem(name, f"got {brief(value)}; allowed: numbers in {role.unit}")]) from error
+        raise ParameterError([Problem(name, f"got {repr_short(value)}; allowed: numbers in {role.unit}")]) from error
     if not array.size:
         raise ParameterError([Problem(name, "got an empty array; give at least one value")])
     if not (role.domain.contains(array.min()) and role.domain.contains(array.max())):
@@ -55,17 +55,8 @@ def _numbers(value: Any) -> np.ndarray:
     return np.asarray(value, dtype=float)
 
 
-def brief(value: Any) -> str:
-    """What came, as a message shows it."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of more digits than Python writes out
-        return "a number of thousands of digits"
-    return text if len(text) <= 60 else f"{text[:50]}..."
-
-
 def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> None:
-    """Refuse arrays of a record's numbers that break a condition which they obey together.
+    """Check arrays of a record's numbers against the conditions between several parameters.
 
     Raises
     ------
@@ -79,7 +70,7 @@ def check_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any])
 
 
 def valid_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any]) -> Any:
-    """Where all those conditions hold."""
+    """Mask of the positions at which all conditions between several parameters hold, (bool or array of bool)."""
     valid: Any = True
     for _, condition in conditions(with_values(record, varied, prefix), prefix):
         valid = valid & np.asarray(condition.holds)
@@ -88,15 +79,16 @@ def valid_together(record: FrozenRecord, prefix: str, varied: Mapping[str, Any])
 
 @dataclass(frozen=True)
 class BroadcastArrays:
-    """Arrays of one broadcast shape.
+    """Named arrays that broadcast to one shape.
 
     Attributes
     ----------
     values : dict of str to ndarray or float
-        As they came; of DataArrays the numbers, with the dimensions of all.
+        As given; DataArrays as plain arrays with the dimensions of all.
     shape : tuple of int
+        Broadcast shape.
     dims, coords
-        Of DataArrays, if there are any; else None.
+        Dimensions and coordinates of the DataArrays; None if there are none.
     """
 
     values: dict[str, Any]
@@ -105,12 +97,14 @@ class BroadcastArrays:
     coords: Any = None
 
     def flat(self) -> dict[str, Any]:
-        """Arrays of one dimension and equal length; single values as they are."""
+        """Arrays broadcast to the common shape and flattened to 1-D; single values unchanged."""
         return {n: np.broadcast_to(v, self.shape).reshape(-1) if np.ndim(v) else v for n, v in self.values.items()}
 
     @property
     def wrap(self) -> Callable[..., Any]:
-        """Turns a result with leading axes `shape` into what came: ``wrap(array, name, unit, extra_dims)``."""
+        """Function ``wrap(array, name, unit, extra_dims)`` that makes a result with leading axes `shape` a DataArray,
+        if the input had DataArrays; otherwise it returns the array, or a float for a single value.
+        """
         return _bare if self.dims is None else self._labelled
 
     def _labelled(self, array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) -> Any:
@@ -126,7 +120,7 @@ def _bare(array: Any, name: str, unit: str, extra_dims: tuple[str, ...] = ()) ->
 
 
 def broadcast(named: Mapping[str, Any]) -> BroadcastArrays:
-    """Arrays as NumPy broadcasts them, DataArrays by the names of their dimensions.
+    """Broadcast named arrays: plain arrays by NumPy's rules, DataArrays by the names of their dimensions.
 
     Raises
     ------

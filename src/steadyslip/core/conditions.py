@@ -1,4 +1,4 @@
-"""Relations that numbers must obey together."""
+"""Conditions between several numbers of a record."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from steadyslip.core.errors import Problem
 
 @dataclass(frozen=True)
 class Condition:
-    """A relation that numbers of a record must obey together.
+    """A condition between several numbers of a record, evaluated.
 
     Attributes
     ----------
     name : str
-        Field that a message names, or a member of one, such as ``contacts.guide``.
+        Field named in the message, or a member of one, such as ``contacts.guide``.
     holds : bool or ndarray of bool
-        Per rig, where the numbers are arrays.
+        One value per rig if the numbers are arrays.
     message : str
-        What came and what is allowed, with places ``{}`` for `numbers`.
+        Message for a failure: what was given and what is allowed, with a ``{}`` for each of `numbers`.
     numbers : tuple of float or ndarray
-        On which the condition depends.
+        Numbers on which the condition depends.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Condition:
     numbers: tuple[Any, ...] = ()
 
     def problem(self, name: str = "") -> Problem | None:
-        """What is wrong, at the first position where it is; None if the condition holds."""
+        """The Problem at the first position where the condition fails; None if it holds everywhere."""
         holds = np.asarray(self.holds)
         if np.all(holds):
             return None

@@ -1,6 +1,6 @@
-"""Units and their dimensions: words with small whole powers, multiplied or divided, such as ``kg/m^2``.
+"""Units and their dimensions, such as ``kg/m^2``: words with small integer powers, multiplied or divided.
 
-Everyday units stand in the table below; other words go to pint.
+Common units are in the table below; pint is asked for all others.
 """
 
 from __future__ import annotations
@@ -26,12 +26,13 @@ class Dimension(NamedTuple):
     angle: float = 0
 
     def times(self, other: Dimension, power: float = 1) -> Dimension:
+        """Dimension of a product with `other` to a power."""
         return Dimension(*(a + power * b for a, b in zip(self, other, strict=True)))
 
 
 _PREFIX = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 MICRO = str.maketrans({"µ": "u", "μ": "u", "·": " ", "×": " ", "−": "-"})
-"""Signs of units as people write them, and as they stand in the table."""
+"""Translation of Unicode signs in units (µ, ·, ×, −) to the ASCII ones of the table."""
 _PREFIXED = {
     "Pa": Dimension(1, -1, -2),
     "N": Dimension(1, 1, -2),
@@ -66,31 +67,31 @@ for _base, _dimension in _PREFIXED.items():
     for _letter, _factor in _PREFIX.items():
         _TABLE.setdefault(_letter + _base, (_factor, _dimension))
 PLAIN_WORDS = {"1", "kg", "rad", *_PREFIXED}
-"""Words without a prefix."""
+"""SI unit words without a prefix."""
 PREFIXABLE = PLAIN_WORDS | {prefix + base for base in _PREFIXED for prefix in _PREFIX}
-"""Words that may have a prefix, with it and without."""
+"""SI unit words with every prefix and without."""
 
 _TOKEN = re.compile(r"\s*(?:([/()]|\*(?!\*))|([^\W\d_]+|[%°])(?:\s*(?:\^|\*\*)\s*([-+]?[0-9]+)|([0-9]+))?)\s*")
 _ONE = re.compile(r"1\s*(?=/|$)")
 _SUPERSCRIPT = re.compile("[⁻⁺]?[⁰¹²³⁴-⁹]+")
 _PLAIN = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
 MOST_TEXT = 200
-"""Characters of a quantity: longer texts are refused unread."""
+"""Longest text of a quantity, in characters; longer ones are refused without parsing. Chosen by trial."""
 MOST_POWER = 9
-"""Largest power of a word in a unit."""
+"""Largest power of a word in a unit; keeps the SI factor of one word inside floating point (1e12 to the 9th)."""
 
 
 @lru_cache(maxsize=256)
 def unit(text: str) -> tuple[float, Dimension]:
     """SI factor and dimension of a unit such as ``"Pa s/m"``.
 
-    A unit is words with small whole powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
-    arithmetic, a stroke divides by the one factor behind it. Words that the table does not have go to pint.
+    A unit is words with small integer powers, multiplied or divided: ``kg/m^2``, ``N s/m``, ``1/(m s)``. As in
+    arithmetic, a slash divides by the one factor after it. Words missing from the table are looked up in pint.
 
     Raises
     ------
     QuantityError
-        If the text is none, or a word is not that of a unit.
+        If the text is not a unit, or a word in it is not the name of one.
     """
     if len(text) > MOST_TEXT:
         raise QuantityError(f"{repr_short(text)} is not a unit: too long")
@@ -105,7 +106,7 @@ def unit(text: str) -> tuple[float, Dimension]:
 
 
 def factors(text: str) -> Iterator[tuple[str, int]]:
-    """The words of a unit with their powers, negative where divided by."""
+    """Yield the words of a unit with their powers, negative in the denominator."""
     fault = QuantityError(f"{text!r} is not a unit")
     plain = _SUPERSCRIPT.sub(lambda run: "^" + run[0].translate(_PLAIN), text.translate(MICRO)).strip()
     start = _ONE.match(plain)
@@ -139,16 +140,16 @@ def factors(text: str) -> Iterator[tuple[str, int]]:
 
 @lru_cache(maxsize=256)
 def _from_pint(word: str) -> tuple[float, Dimension]:
-    """SI factor and dimension of one word that the table does not have."""
+    """SI factor and dimension of one word, looked up in pint."""
     registry = _pint_registry()
     fault = QuantityError(f"{word!r} is not a unit")
     try:
         bases = [registry.Quantity(size, word).to_base_units() for size in (1.0, 2.0)]
         exponents = dict(bases[0].dimensionality)
         one, two = (float(base.magnitude) for base in bases)
-    except Exception as error:  # pint raises its own kinds, and others, for words that are none
+    except Exception as error:  # pint raises exceptions of many types for words that are not units
         raise fault from error
-    if not (math.isfinite(one) and one > 0 and math.isclose(two, 2 * one)):  # decibels, degrees Celsius
+    if not (math.isfinite(one) and one > 0 and math.isclose(two, 2 * one)):  # no plain factor: decibels, Celsius
         raise fault
     known = {"[mass]": "mass", "[length]": "length", "[time]": "time"}
     if not set(exponents) <= set(known):

@@ -1,4 +1,4 @@
-"""The values that parameters may take."""
+"""Domains: intervals of allowed parameter values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Domain:
-    """The values that a parameter may take: an interval, open or closed at each end."""
+    """Interval of allowed values, open or closed at each end, of integers only if `whole`; `text` describes it."""
 
     low: float
     high: float
@@ -21,7 +21,7 @@ class Domain:
     whole: bool = False
 
     def contains(self, value: Any) -> Any:
-        """Elementwise test, false for NaN and infinity."""
+        """Test values elementwise; False for NaN and infinity."""
         above = value >= self.low if self.low_allowed else value > self.low
         below = value <= self.high if self.high_allowed else value < self.high
         return above & below & np.isfinite(value) & (not self.whole or np.floor(value) == value)

@@ -1,4 +1,4 @@
-"""What tables hold besides parameters: choices, words, counts, names, quantities of any kind."""
+"""Field types of file tables besides parameters: choices, text, integers, names, intervals, quantities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steadyslip.core.roles import Entry, Schema, fault
 
 @dataclass(frozen=True)
 class Option(Entry):
-    """One of a few words or numbers, or true or false."""
+    """Field type: one of several listed words or numbers, or a bool."""
 
     choices: tuple[Any, ...]
     doc: str
@@ -42,7 +42,7 @@ class Option(Entry):
 
 @dataclass(frozen=True)
 class Text(Entry):
-    """A word or a name, kept as it is."""
+    """Field type: non-empty text."""
 
     doc: str
 
@@ -60,7 +60,7 @@ class Text(Entry):
 
 @dataclass(frozen=True)
 class Label(Entry):
-    """A name, or a number counted from 1."""
+    """Field type: a name, or an integer from 1."""
 
     doc: str
 
@@ -81,7 +81,7 @@ class Label(Entry):
 
 @dataclass(frozen=True)
 class Names(Entry):
-    """One name or a list of them, kept as a tuple."""
+    """Field type: one name or a list of names, kept as a tuple."""
 
     doc: str
 
@@ -102,7 +102,7 @@ class Names(Entry):
 
 @dataclass(frozen=True)
 class Whole(Entry):
-    """A whole number between two ends, both included."""
+    """Field type: an integer between two bounds, both included."""
 
     doc: str
     low: int
@@ -128,7 +128,7 @@ class Whole(Entry):
 
 @dataclass(frozen=True)
 class Span(Entry):
-    """Start and end, as a pair of numbers in the SI unit."""
+    """Field type: a pair of numbers, start and end, in the SI unit."""
 
     doc: str
     unit: str
@@ -155,7 +155,7 @@ class Span(Entry):
 
 @dataclass(frozen=True)
 class Quantity(Entry):
-    """A number in an SI unit, or text with a unit, of a dimension that another part of the file decides."""
+    """Field type: an SI number, or text with a unit, whose dimension another entry of the file sets."""
 
     doc: str
 

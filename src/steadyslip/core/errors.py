@@ -1,4 +1,4 @@
-"""Exceptions: each names the thing, shows what came, says what is allowed and what to do."""
+"""Exceptions; each message names the thing, shows the value, and says what is allowed and what to do."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-MOST_SHOWN = 120
+MOST_SHOWN = 120  # characters of a value's repr in a message; chosen by trial
 
 
 def one(name: str) -> str:
-    """A name with the article before it.
+    """A name preceded by its indefinite article.
 
     >>> one("Slider"), one("Evolution")
     ('a Slider', 'an Evolution')
@@ -26,7 +26,7 @@ def repr_short(value: object) -> str:
     """
     try:
         text = repr(value)
-    except Exception:  # integers of more than 4300 digits, and whatever a foreign object does
+    except Exception:  # integers of more than 4300 digits; foreign objects may raise anything
         text = f"a value of type {type(value).__name__} that cannot be shown"
     if len(text) > MOST_SHOWN:
         text = f"{text[:MOST_SHOWN]}... ({len(text)} characters in all)"
@@ -39,14 +39,14 @@ class SteadyslipError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with an input.
+    """One fault in an input.
 
     Parameters
     ----------
     name : str
         Dotted name of the parameter, such as ``friction.a``.
     message : str
-        What came and what is allowed, in one sentence.
+        One sentence: the value given and what is allowed.
     line : int, optional
         Line of the rig file, counted from 1.
     """
@@ -60,13 +60,13 @@ class Problem:
         return f"{where}{self.name}: {self.message}"
 
     def under(self, prefix: str) -> Problem:
-        """The same problem with `prefix` put before its name."""
+        """Copy of the problem with a prefix before its dotted name."""
         name = ".".join(part for part in (prefix, self.name) if part)
         return Problem(name, self.message, self.line)
 
 
 SHOWN = 40
-"""Problems that a message lists; `ParameterError.problems` has all."""
+"""Number of problems listed in a message (chosen by trial); `ParameterError.problems` has all of them."""
 
 
 class ParameterError(SteadyslipError, ValueError):
@@ -113,12 +113,12 @@ class NoSteadySliding(SteadyslipError, ValueError):
     Attributes
     ----------
     condition : str
-        Which condition fails: ``lock-up``, ``lift-off`` or ``no solution``.
+        The condition that fails: ``lock-up``, ``lift-off`` or ``no solution``.
     shortfall : float
-        By how much: the amount that would have to be positive (Pa for lift-off, dimensionless
-        for lock-up), NaN where no number tells it.
+        Value of the quantity that would have to be positive (Pa for lift-off, dimensionless
+        for lock-up); NaN if there is no such quantity.
     contact : str
-        Of a machine: the contact at which; empty where it is no single one.
+        Name of the contact of a machine that fails; empty if it is no single one.
     """
 
     def __init__(self, message: str, condition: str, shortfall: float = float("nan"), contact: str = "") -> None:
@@ -129,38 +129,41 @@ class NoSteadySliding(SteadyslipError, ValueError):
 
 
 class NotAvailable(SteadyslipError, ValueError):
-    """The question has no answer for this rig; the message says why and what to ask instead."""
+    """A quantity does not exist or is not implemented for this rig; the message says why and what to ask instead."""
 
 
 class OutOfRangeWarning(UserWarning):
-    """Some rigs of an array have no answer: their numbers leave the range of floating point."""
+    """Some rigs of an array have no result because their numbers leave the range of floating point."""
 
 
 class IllPosedWarning(UserWarning):
-    """Some rigs have no rightmost eigenvalue: their equations are ill-posed, so that infinitely many grow."""
+    """Some rigs are ill-posed: infinitely many eigenvalues have positive real part, so there is no rightmost one."""
 
 
 class NotKeptWarning(UserWarning):
-    """Machine code cannot be kept, so that every process compiles it anew."""
+    """The kernel cache cannot be written, so every process compiles its kernels again."""
 
 
 class InternalError(SteadyslipError, RuntimeError):
-    """Something that holds by the program's own design does not: a fault of ours, not of the input."""
+    """An assumption of the program itself is violated: a bug, not a fault of the input.
+
+    `expected` completes the sentence "a fault in steadyslip: expected ...".
+    """
 
     def __init__(self, expected: str) -> None:
         super().__init__(f"a fault in steadyslip: expected {expected}; please report how you came here")
 
 
 def legible(name: str) -> str:
-    """A name for a message: as it is, or quoted and cut where it would break the line."""
+    """A name for a message: unchanged, or its short repr if it is long or has unprintable characters."""
     return name if name.isprintable() and len(name) <= MOST_SHOWN // 2 else repr_short(name)
 
 
 def unknown_name(what: str, name: object, allowed: Iterable[str], guess: bool = True) -> str:
-    """Say that `name` is unknown, with all valid names, and unless not to `guess` the nearest of them."""
+    """Message that a name is unknown, with all allowed names and, if `guess`, the nearest of them."""
     allowed = list(allowed)
     close = get_close_matches(str(name), allowed, n=1, cutoff=0.5) if guess else []
-    if guess and not close and "." not in str(name):  # the last part of a dotted name is often enough
+    if guess and not close and "." not in str(name):  # users often give the last part of a dotted name only
         last = {full.rpartition(".")[2]: full for full in allowed}
         close = [last[part] for part in get_close_matches(str(name), last, n=1, cutoff=0.6)]
     hint = f"did you mean {close[0]!r}? " if close else ""

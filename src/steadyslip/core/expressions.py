@@ -1,4 +1,4 @@
-"""SymPy expressions to array functions, and the one primitive that SymPy lacks."""
+"""Array functions made of SymPy expressions, and the one elementary function that SymPy lacks."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ import sympy as sp
 from steadyslip.core.errors import NotAvailable
 
 Num = Any
-"""A number, an array of numbers or a SymPy expression: formulas are written once for all three."""
+"""A number, an array of numbers or a SymPy expression; the same formula serves all three."""
 Choose = Callable[[Any, Any, Any], Any]
-"""``choose(condition, value, other)``, of arrays or of nodes of a program."""
+"""Function ``choose(condition, value, other)``: `np.where`, or a selection between nodes of a program."""
 
 
 class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like the SymPy functions it stands beside
-    """asinh(x exp(y)), evaluated without overflow for large y (regularised rate-and-state friction)."""
+    """The function asinh(x exp(y)) of regularised rate-and-state friction, evaluated without overflow for large y."""
 
     nargs = 2
 
@@ -45,14 +45,15 @@ class asinh_exp(sp.Function):  # type: ignore[misc]  # noqa: N801  # named like 
 
 
 def numpy_asinh_exp(x: Any, y: Any) -> Any:
-    """NumPy counterpart of `asinh_exp`."""
+    """Values of asinh(x exp(y)) for arrays, without overflow."""
     size, half = np.abs(x), np.exp(np.clip(0.5 * y, -700.0, 700.0))
-    product = size * half * half  # neither overflows nor vanishes unless x e^y does
+    product = size * half * half  # two factors of e^(y/2), so that none overflows or vanishes unless x e^y does
+    # asinh(z) = log(2 z) to rounding for z > 1e8; above 1e150 its logarithm is used, as the product may overflow
     return np.sign(x) * np.where(product > 1e150, np.log(size) + y + np.log(2.0), np.arcsinh(product))
 
 
 _PYTHON = frozenset((int, float, bool))
-"""Numbers that raise where NumPy's become inf or NaN."""
+"""Types whose arithmetic raises exceptions where NumPy's gives inf or NaN."""
 _NUMPY = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
     sp.tanh: "tanh", sp.asin: "arcsin", sp.acos: "arccos", sp.atan: "arctan", sp.atan2: "arctan2", sp.asinh: "arcsinh",
@@ -67,11 +68,11 @@ _WORLD = {
 }
 
 FEW = 8
-"""Rows up to which numbers one by one are faster than arrays."""
+"""Number of rows up to which evaluation row by row with floats is faster than with arrays; chosen by trial."""
 
 
 def _of_numbers(function: Callable[..., Any]) -> Callable[..., float]:
-    """NumPy's function for a number, which gives the last digit that it gives for an array."""
+    """A NumPy function of floats, so that results agree bit for bit with those of arrays; raises on inf and NaN."""
 
     def own(*values: float) -> float:
         found = float(function(*values))
@@ -89,7 +90,7 @@ _PLAIN: dict[str, Any] = {
     "maximum": lambda x, y: x if x >= y or x != x else y, "minimum": lambda x, y: x if x <= y or x != x else y,
     "where": lambda condition, x, y: x if condition else y, "nan": math.nan, "inf": math.inf,
 }  # fmt: skip
-"""The same for Python's numbers, which raise where NumPy's become inf or NaN."""
+"""Functions of Python floats by NumPy name; they raise where NumPy's give inf or NaN."""
 
 
 _PRECISE: dict[str, Any] = {
@@ -100,11 +101,11 @@ _PRECISE: dict[str, Any] = {
     "nan": mpmath.nan, "inf": mpmath.inf, "asinh_exp": lambda x, y: mpmath.asinh(x * mpmath.exp(y)), "mpf": mpmath.mpf,
     **{name: _PLAIN[name] for name in ("absolute", "square", "logical_not", "maximum", "minimum", "where")},
 }  # fmt: skip
-"""The same for numbers of mpmath."""
+"""Functions of mpmath numbers by NumPy name."""
 
 
 def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
-    """All parts of expressions, and how often each is needed if every part is computed once."""
+    """Number of uses of each subexpression if every subexpression is computed once."""
     found: dict[sp.Basic, int] = {}
     waiting = list(expressions)
     while waiting:
@@ -116,7 +117,7 @@ def occurrences(expressions: Iterable[sp.Basic]) -> dict[sp.Basic, int]:
 
 
 class _Text:
-    """Expressions as lines of Python for NumPy; what occurs several times is computed once."""
+    """Writes expressions as lines of Python source; common subexpressions become assignments ``t0 = ...``."""
 
     def __init__(
         self, names: Mapping[sp.Symbol, str], expressions: Sequence[sp.Basic], number: Callable[[Any], str]
@@ -204,7 +205,7 @@ class _Text:
             return f"square({self._of(base)})"
         if exponent.is_Integer:
             return f"({self._of(base)}**{exponent})"
-        return f"power({self._of(base)}, {self._of(exponent)})"  # Python's own is complex where NumPy's is NaN
+        return f"power({self._of(base)}, {self._of(exponent)})"  # ** of Python floats is complex where NumPy's is NaN
 
 
 def _number(e: Any) -> str:
@@ -221,10 +222,10 @@ def _precise_number(e: Any) -> str:
 
 
 class ArrayFunction:
-    """A function of the arguments' values that returns the values of all expressions.
+    """Numeric function of the arguments that returns the list of values of all expressions.
 
-    Common subexpressions are computed once; every argument may be a scalar or an array. What leaves the range of
-    floating point is inf or NaN, without a warning: Python's own floats would raise instead.
+    Common subexpressions are computed once; every argument may be a scalar or an array. Overflow and invalid
+    operations give inf or NaN without a warning.
 
     Raises
     ------
@@ -241,15 +242,15 @@ class ArrayFunction:
             return self._arrays(*[np.float64(v) if type(v) in _PYTHON else v for v in values])
 
     def rows(self, arguments: np.ndarray) -> np.ndarray:
-        """Values of all expressions, (rows, expressions), for rows of arguments, (rows, arguments).
+        """Values of all expressions, shape (rows, expressions), for arguments of shape (rows, arguments).
 
-        Few rows are computed one by one in Python's numbers, of which an operation takes a tenth of NumPy's.
+        Up to `FEW` rows are computed one by one with Python floats, whose operations take a tenth of NumPy's time.
         """
         if len(arguments) <= FEW:
             try:
                 with np.errstate(all="ignore"):
                     return np.array([self._numbers(*row) for row in arguments.tolist()], dtype=float)
-            except (ArithmeticError, ValueError, TypeError):  # something is inf, NaN or complex
+            except (ArithmeticError, ValueError, TypeError):  # a value is inf, NaN or complex: NumPy represents it
                 pass
         found = self(*arguments.T)
         table = np.empty((len(arguments), len(found)))
@@ -266,7 +267,7 @@ def _made(code: Any, world: Mapping[str, Any]) -> Callable[..., list[Any]]:
 
 
 class PreciseFunction:
-    """The same to as many digits as mpmath works with: a function of numbers of mpmath that returns such numbers.
+    """Function of mpmath numbers that returns the list of values of all expressions, with mpmath's current precision.
 
     Raises
     ------
@@ -289,13 +290,13 @@ def _compiled(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr], nu
 
 
 def replaced(e: sp.Expr, found: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """What ``e.xreplace(found)`` gives, going through what occurs several times once, here and in later calls."""
+    """Same result as ``e.xreplace(found)``, faster: each common subexpression is replaced once, also across calls."""
     return _replaced(e, _seen(tuple(found.items()))) if found else e
 
 
 @lru_cache(maxsize=64)
 def _seen(found: tuple[tuple[sp.Symbol, sp.Expr], ...]) -> dict[sp.Basic, sp.Basic]:
-    """Expressions, and what becomes of them."""
+    """Cache of replaced subexpressions for one substitution; starts with the substitution itself."""
     return dict(found)
 
 
@@ -313,9 +314,9 @@ def _replaced(e: Any, seen: dict[sp.Basic, sp.Basic]) -> Any:
 
 @lru_cache(maxsize=2**15)
 def derivative(e: sp.Expr, x: sp.Symbol) -> sp.Expr:
-    """The derivative, as `sympy.diff` gives it.
+    """Derivative of an expression with respect to a symbol, equal to `sympy.diff` but faster and cached.
 
-    That asks of every factor beside one whose derivative is zero whether it is finite, which takes most of its time.
+    `sympy.diff` checks every cofactor of a vanishing derivative for finiteness, which takes most of its time.
     """
     if e == x:
         return sp.S.One

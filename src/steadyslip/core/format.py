@@ -1,4 +1,4 @@
-"""Quantities for people: the unit and the digits in which they read best, or the unit that the user writes."""
+"""Formatting of quantities for people: units with suitable prefixes or the user's own, few digits."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ _own: ContextVar[Mapping[Dimension, tuple[str, ...]]] = ContextVar("own units", 
 
 @contextmanager
 def display_units(names: Iterable[str]) -> Iterator[None]:
-    """Tell people quantities in units of their own, such as rpm, bar, mm^2 or N/um; of several the one that reads best.
+    """Context in which quantities are formatted in the user's units, such as rpm, bar, mm^2 or N/um.
 
-    Units with a prefix in front alone, such as kN or um/s, are no reason: they are told as reads best in any case.
+    Of several units of a dimension the one is used whose number is closest to 10. Units that differ from the default
+    by a leading prefix alone, such as kN or um/s, have no effect, since a suitable prefix is chosen in any case.
 
     >>> with display_units(["rpm", "kN", "MPa", "bar", "N/um"]):
     ...     format_quantity(10.0, "rad/s"), format_quantity(2e4, "N"), format_quantity(2e5, "Pa")
@@ -40,7 +41,7 @@ def display_units(names: Iterable[str]) -> Iterator[None]:
 
 
 def _is_own(name: str) -> bool:
-    """Whether a unit is another than a prefix alone makes of that in which everybody would be told."""
+    """True if a unit differs from the default one by more than a leading prefix."""
     return any(
         word not in PREFIXABLE or (word not in PLAIN_WORDS and (power < 0 or power > 1))
         for word, power in factors(name)
@@ -48,22 +49,22 @@ def _is_own(name: str) -> bool:
 
 
 def _best(value: float, names: tuple[str, ...]) -> str | None:
-    """The unit in which a value reads best: between 1 and 100, if there is one; None without any."""
+    """Of several units the one in which an SI value is closest to 10 on a log scale; None for 0 or no units."""
     return min(names, key=lambda name: abs(math.log10(abs(value) / unit(name)[0]) - 1), default=None) if value else None
 
 
-_SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # of a power, a prefix would be one of the base; ms/m reads as m/s
+_SCALED = re.compile(r"(?:Pa|N|m|s(?!/))(?!\^)")  # takes a prefix; not m^2 (it would scale m), nor s/m (ms/m misleads)
 _SHOWN_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
 
 def _few(value: float, digits: int) -> str:
-    """A number with a few digits, without a power of ten up to five places."""
+    """Format a number with a few digits, without an exponent below 1e5."""
     text = f"{value:.{digits}g}"
     return f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < 1e5 else text
 
 
 def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | None = None) -> str:
-    """A value for people: prefixed unit, a few digits, angles in degrees, leads in turns, totals if there is an `area`.
+    """Format an SI value: prefixed unit, few digits, angles in degrees, leads per turn, totals if there is an `area`.
 
     >>> format_quantity(8.72093e9, "Pa/m"), format_quantity(-0.7853981633974483, "rad"), format_quantity(0.0145, "1")
     ('8.721 GPa/m', '-45 deg', '0.0145')
@@ -93,7 +94,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
         return f"{_few(value, digits)} {si_unit}"
     size = abs(value)
     for factor, prefix in _SHOWN_PREFIXES:
-        long = prefix == "T" and size < 1e14  # faults are told in GN and GN/m
+        long = prefix == "T" and size < 1e14  # G is kept up to 1e14: faults are customarily given in GN, GN/m
         if size >= 0.9999 * factor and not long and (prefix not in ("T", "G", "M", "k") or scaled[0] in ("Pa", "N")):
             break
     if not 1e-3 <= size / factor < 1e5:
@@ -102,7 +103,7 @@ def format_quantity(value: float, si_unit: str, digits: int = 4, area: float | N
 
 
 def format_with_error(value: float, error: float, si_unit: str, area: float | None = None) -> str:
-    """A value and its error for people, both in the unit in which the value reads best.
+    """Format a value and its error, both in the unit chosen for the value.
 
     >>> format_with_error(1.009e-5, 8.7e-7, "m"), format_with_error(0.00696, 0.00043, "1")
     ('10.09 ± 0.87 um', '0.00696 ± 0.00043')
@@ -115,7 +116,7 @@ def format_with_error(value: float, error: float, si_unit: str, area: float | No
 
 
 def format_range(low: float, high: float, si_unit: str, area: float | None = None) -> str:
-    """Two values for people, in the unit in which the second reads best.
+    """Format a range, both values in the unit chosen for the second.
 
     >>> format_range(8.52e-6, 1.195e-5, "m")
     '8.52 to 11.95 um'
@@ -129,7 +130,7 @@ def format_range(low: float, high: float, si_unit: str, area: float | None = Non
 
 
 def format_percent(share: float) -> str:
-    """A share in percent with three digits, or as many as it takes to tell it from 0 and 100.
+    """Format a fraction as percent with three digits, or more if it would otherwise read as 0 or 100 %.
 
     >>> format_percent(0.123456), format_percent(0.99981), format_percent(1.0)
     ('12.3 %', '99.981 %', '100 %')
@@ -139,7 +140,7 @@ def format_percent(share: float) -> str:
 
 
 def typeset(text: str) -> str:
-    """Words with units as they are set in print: µm, m², kg/m³.
+    """Replace ASCII units in a text by typeset ones: µm, m², kg/m³.
 
     >>> typeset("9.2 us, 3 um/s, 2 uN m at 5 m^2: ours")
     '9.2 µs, 3 µm/s, 2 µN m at 5 m²: ours'

@@ -1,9 +1,9 @@
-"""Names that users give, and dotted names of parameters that they write in short."""
+"""User-given names, mappings of records by them, and abbreviated dotted names of parameters."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from steadyslip.core.errors import UnknownNameError
@@ -12,19 +12,19 @@ _PLAIN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 def unfit_name(name: Any) -> str:
-    """Why a name cannot be that of a member, part of dotted names; empty if it can."""
+    """Reason why a name cannot be used as a part of dotted names; empty if it can."""
     if isinstance(name, str) and _PLAIN_NAME.fullmatch(name) and len(name) <= 40:
         return ""
     return "is no name; allowed: up to 40 letters from a to z, digits, hyphens and underscores, a letter first"
 
 
 def resolve(name: str, known: Mapping[str, Any]) -> str:
-    """The full dotted name for `name`, which may leave out leading or middle parts where that is unique.
+    """Full dotted name of a parameter whose leading or middle parts may be left out if the rest is unique.
 
     Raises
     ------
     UnknownNameError
-        If nothing, or more than one parameter, has that name.
+        If no parameter, or more than one, has that name.
     """
     if not isinstance(name, str):
         raise UnknownNameError("parameter", name, known)
@@ -38,3 +38,25 @@ def resolve(name: str, known: Mapping[str, Any]) -> str:
     if ends:
         raise UnknownNameError("parameter (it is ambiguous)", name, ends)
     raise UnknownNameError("parameter", name, known)
+
+
+class Members(Mapping[str, Any]):
+    """Immutable, hashable mapping of user-given names to records, in order."""
+
+    def __init__(self, of: Mapping[str, Any] | None = None) -> None:
+        self._of = dict(of or {})
+
+    def __getitem__(self, name: str) -> Any:
+        return self._of[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._of)
+
+    def __len__(self) -> int:
+        return len(self._of)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._of.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._of)

@@ -1,4 +1,4 @@
-"""Options of public functions: what each may hold is a role, as of the fields of records; checked before the call."""
+"""Argument checks of public functions: each argument has a `Role`, like a field of a record."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from steadyslip.core.errors import ParameterError, Problem, one
 from steadyslip.core.roles import Role, fault
 
 LARGEST = 1.7e308  # integers may be larger than any float
-MOST = 1e150  # whose square is finite
+MOST = 1e150  # its square is finite
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 @dataclass(frozen=True)
 class Tested(Role):
-    """Whatever passes a test, and what that is in words."""
+    """Role of values that pass a test; `words` describes them in messages."""
 
     words: str
     passes: Callable[[Any], bool]
@@ -39,29 +39,32 @@ class Tested(Role):
         return self.words
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
 def finite(above: float, most: float = math.inf, *, closed: bool = False) -> Role:
-    """A finite number above one and up to another; `closed`: from it on."""
+    """Role of finite numbers above a bound (from it on if `closed`) and up to `most`."""
 
     def passes(value: Any) -> bool:
-        plain = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        return plain and (above < value or (closed and value == above)) and bool(value <= min(most, LARGEST))
+        above_low = _is_number(value) and (above < value or (closed and value == above))
+        return above_low and bool(value <= min(most, LARGEST))
 
     least = "" if math.isinf(above) else f" {'from' if closed else 'above'} {above:g}"
     return Tested(f"a finite number{least}" + (f", up to {most:g}" if math.isfinite(most) else ""), passes)
 
 
 def within(domain: Domain) -> Role:
-    """Numbers of a domain, as a parameter of a record may be one."""
+    """Role of numbers inside a domain."""
 
     def passes(value: Any) -> bool:
-        plain = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        return plain and bool(abs(value) <= LARGEST) and bool(domain.contains(value))
+        return _is_number(value) and bool(abs(value) <= LARGEST) and bool(domain.contains(value))
 
     return Tested(domain.text, passes)
 
 
 def _all_numbers(value: Any) -> bool:
-    """At least one, of a size whose square is finite."""
+    """True for a non-empty array of real numbers, each with a finite square."""
     if type(value) is float:
         return abs(value) <= MOST
     try:
@@ -73,7 +76,7 @@ def _all_numbers(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Made(Tested):
-    """An object that a function gives; `instead` tells what to ask of a machine where a slider is wanted."""
+    """Role of result objects; `instead` names the function for machines if one is given in place of a slider."""
 
     instead: str = ""
 
@@ -84,7 +87,10 @@ class Made(Tested):
 
 
 def _made(names: str, maker: str, instead: str = "") -> Role:
-    """An object of one of some classes, by name, which `maker` gives."""
+    """Role of objects of classes with the given names, which the function `maker` returns.
+
+    Classes are compared by name because core must not import them.
+    """
     wanted = names.split(" | ")
     return Made(
         f"{one(' or '.join(wanted))}, such as {maker} gives",
@@ -94,12 +100,12 @@ def _made(names: str, maker: str, instead: str = "") -> Role:
 
 
 def slider(instead: str) -> Role:
-    """A slider, in functions of which machines have others: `instead` names them."""
+    """Role of a Slider in functions that refuse machines; `instead` names the function for machines."""
     return _made("Slider", "read_rig", instead)
 
 
 def whole(least: int, most: int = 2**31) -> Whole:
-    """Whole numbers from `least` to `most`; truth values are none."""
+    """Role of integers from `least` to `most`; bools are refused."""
     return Whole("", least, most)
 
 
@@ -129,7 +135,7 @@ BY_ANNOTATION: dict[str, Role] = {
 
 
 def role_of(name: str, annotation: str) -> Role | None:
-    """What a name that always means the same, or an annotation, says of the values; None where it is too little."""
+    """Role of an argument, by its name if that always has one meaning, else by its annotation; None if unknown."""
     if name in BY_WORD:
         return BY_WORD[name]
     plain = annotation.removesuffix(" | None")
@@ -139,14 +145,14 @@ def role_of(name: str, annotation: str) -> Role | None:
 
 
 def checked(**roles: Role) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Check arguments of a function before it is called; what it has by default is allowed, given by name too.
+    """Decorator that checks the arguments of a function before it is called; default values always pass.
 
-    `roles` say what names and annotations leave open, such as the range of a number.
+    `roles` are needed where `role_of` cannot tell the role, such as the range of a number.
 
     Raises
     ------
     ParameterError
-        From the function, if a value is not allowed.
+        From the decorated function, if a value is not allowed.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:

@@ -1,6 +1,6 @@
-"""Results as HTML: a result asks here, and the reports say so when they are loaded.
+"""Registry of the functions that turn results into HTML.
 
-Results lie below the reports and know none of them; this table is what they share, as `pictures` is for figures.
+Results must not import the reports above them, so the reports register their functions here when they are loaded.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ _makers: dict[str, Maker] = {}
 
 
 def pages_from(load: Callable[[], object]) -> None:
-    """Name a function that loads the reports; called once, when a page is made for the first time."""
+    """Set a function that imports the reports; it is called once, when the first page is made."""
     _sources.append(load)
 
 
 def register_pages(*, brief: Maker, whole: Maker) -> None:
-    """Say which functions make HTML of a result: a part of a page, and a document."""
+    """Register the functions that make HTML of a result: `brief` a fragment, `whole` a document."""
     _makers.update(brief=brief, whole=whole)
 
 
 def brief(result: Any) -> str:
-    """A result as a part of a page, for notebooks."""
+    """HTML fragment of a result, for notebooks."""
     return _made("brief")(result)
 
 
 def whole(result: Any, **options: Any) -> str:
-    """A result as a document of its own."""
+    """HTML document of a result."""
     return _made("whole")(result, **options)
 
 
@@ -45,7 +45,7 @@ def _made(kind: str) -> Maker:
 
 
 class Displayed:
-    """Base of what notebooks show as HTML."""
+    """Base of objects that notebooks display as HTML."""
 
     def _repr_html_(self) -> str:
         return brief(self)

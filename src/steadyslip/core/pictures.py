@@ -1,6 +1,6 @@
-"""Which figure shows which result: a result asks here, and the figures say so when they are loaded.
+"""Registry of the functions that draw results.
 
-Results lie below the figures and know none of them; this table is what they share.
+Results must not import the figures above them, so the figures register their functions here when they are loaded.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ _sources: list[Callable[[], object]] = []
 
 
 def register_figures(result: type, **figures: Callable[..., Any]) -> None:
-    """Say by which functions a type of result is drawn, by kind; the first kind is drawn unless another is asked for.
+    """Register drawing functions of a result type, by kind of plot; the first kind is the default.
 
-    Each takes the result first, and ``ax``, and returns the Axes. A later registration of a kind replaces it, so that
-    users can put a figure of their own in place of ours.
+    Each function takes the result and ``ax``, and returns the Axes. A later registration of a kind replaces the
+    earlier one, so that users can substitute a figure of their own.
     """
     _figures.setdefault(result, {}).update(figures)
 
 
 def figures_from(load: Callable[[], object]) -> None:
-    """Name a function that loads figures; called once, when something is drawn for the first time."""
+    """Set a function that imports the figures; it is called once, when the first figure is drawn."""
     _sources.append(load)
 
 
 def draw(result: Any, kind: str | None = None, **options: Any) -> Any:
-    """Draw a result; what comes back is what its figure returns.
+    """Draw a result and return what its drawing function returns, usually the Axes.
 
     Raises
     ------
     NotAvailable
-        If there is no such figure of it.
+        If the result type has no figure of this kind.
     """
     while _sources:
         _sources[-1]()

@@ -1,4 +1,4 @@
-"""A bar or a text for long work: how much is done, how fast, how long it will still take."""
+"""Progress bar and status text on the terminal, and deferred Ctrl-C."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_text(text: str, wanted: bool | None = None) -> Iterator[Callable[[str], None]]:
-    """A turning mark and a text while something of unknown length goes on; what it yields changes it.
+    """Show a spinner with a text during work of unknown length; yields a function that changes the text.
 
-    On a terminal unless `wanted` says otherwise.
+    `wanted` switches it on or off; by default it is on if stderr is a terminal.
     """
     if wanted is False or (wanted is None and not sys.stderr.isatty()):
         yield lambda changed: None
@@ -29,18 +29,18 @@ def progress_text(text: str, wanted: bool | None = None) -> Iterator[Callable[[s
 def progress_bar(
     size: int, wanted: bool | None = None, noun: str = "runs", done: int = 0
 ) -> Iterator[Callable[[int], None] | None]:
-    """A bar on a terminal, or where asked for; what it yields is called with the number of newly finished items.
+    """Show a progress bar; yields a function to be called with the number of newly finished items, or None if off.
 
     Parameters
     ----------
     size : int
-        All items.
+        Number of items.
     wanted : bool, optional
-        On a terminal unless given.
+        Switch on or off; by default on if stderr is a terminal.
     noun : str
-        What the items are.
+        Label of the items.
     done : int
-        Items finished before; they do not count for the rate.
+        Number of items finished before; the rate does not count them.
     """
     if wanted is False or (wanted is None and not sys.stderr.isatty()):
         yield None
@@ -58,7 +58,7 @@ def progress_bar(
     from rich.text import Text
 
     class Rate(ProgressColumn):
-        """Items a second, lately."""
+        """Column with the recent rate, items per second."""
 
         def render(self, task: Task) -> Text:
             speed = task.finished_speed or task.speed
@@ -72,7 +72,7 @@ def progress_bar(
 
 @contextmanager
 def interrupts_held() -> Iterator[list[int]]:
-    """Collect Ctrl-C instead of raising, for work that is whole or nothing, such as a chunk of a map."""
+    """Collect Ctrl-C signals in the yielded list instead of raising, for work that must finish, such as a map chunk."""
     received: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield received

@@ -1,7 +1,7 @@
-"""Text such as ``"9 GPa/m"`` to SI numbers.
+"""Parsing of text such as ``"9 GPa/m"`` to SI numbers.
 
-Numbers inside the package are plain SI floats. Text is read only at the edges (files, command line,
-constructors), and nothing in it is evaluated.
+Numbers inside the package are plain SI floats. Only files, the command line and constructors take text, and none
+of it is evaluated as code.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _NONZERO = re.compile(r"[^eE]*[1-9]")
 
 
 def parse(text: str, expected: str) -> float:
-    """Read a quantity.
+    """Parse text with a number and a unit to an SI value.
 
     Parameters
     ----------
     text : str
-        A number and a unit, such as ``"5 MPa"``; a bare number where `expected` is ``"1"``.
+        A number and a unit, such as ``"5 MPa"``; a number alone if `expected` is ``"1"``.
     expected : str
         SI unit of the parameter; only its dimension matters.
 
@@ -83,11 +83,11 @@ def parse(text: str, expected: str) -> float:
 
 
 def _scaled(digits: str, factor: float) -> float:
-    """Number times factor, rounded once: ``10 um`` is 1e-05, not the next float below."""
+    """Product of a decimal number and a unit factor, rounded once: ``10 um`` is 1e-05, not the next float below."""
     plain = float(digits)
     if plain == 0 and _NONZERO.match(digits):
         raise QuantityError(f"{digits!r} is too small for floating point")
-    if not math.isfinite(plain) or abs(plain) < 1e-290:
+    if not math.isfinite(plain) or abs(plain) < 1e-290:  # close to underflow: exact rounding is not needed
         return plain * factor
     try:
         return float(Fraction(digits) * Fraction(repr(factor)))
@@ -96,16 +96,16 @@ def _scaled(digits: str, factor: float) -> float:
 
 
 def numbers(values: Any, expected: str, read: Callable[[str, str], float] = parse) -> tuple[float, ...]:
-    """Read a column of quantities.
+    """Convert a column of quantities to SI values.
 
     Parameters
     ----------
     values : list, tuple or 1-D array
-        Numbers in SI units, or texts.
+        SI numbers, or texts with units.
     expected : str
         SI unit of the column.
     read : callable, optional
-        What reads a text, given `expected`.
+        Function of a text and `expected` that returns its value.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
     Raises
     ------
     QuantityError
-        If this is no such column; names the place, from 1, and the value of the first fault.
+        If it is no such column; the message has position (from 1) and value of the first fault.
     """
     if isinstance(values, np.ndarray) and values.ndim == 1:
         values = values.tolist()
@@ -136,8 +136,8 @@ def numbers(values: Any, expected: str, read: Callable[[str, str], float] = pars
 
 
 def _plain(value: Any) -> float:
-    """A number as a float; truth values, complex numbers and whatever else are none."""
-    if type(value) is float:  # long columns are of these
+    """Convert a real number to float; bools, complex numbers and arrays are refused."""
+    if type(value) is float:  # fast path for long columns
         return value
     if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__") or np.ndim(value) != 0:
         raise QuantityError(f"got {repr_short(value)}; allowed: a finite number or text with a unit")
@@ -166,12 +166,12 @@ _EXAMPLES = {
 
 
 def example(expected: str) -> str:
-    """A quoted example of a quantity of this unit."""
+    """A quoted example of a quantity with this unit, for messages."""
     if expected == "1":
         return "0.5"
     return repr(_EXAMPLES.get(expected, f"1 {expected}"))
 
 
 def described(expected: str) -> str:
-    """The unit in words for messages."""
+    """Description of a quantity with this unit, for messages."""
     return "a number without unit" if expected == "1" else f"a quantity in {expected}"

@@ -1,6 +1,6 @@
-"""Questions that are answered once: the answer is kept with what was asked, and goes when that goes.
+"""Cached functions of immutable objects: each result is stored on the object and dies with it.
 
-Everybody gets the same answer, so nobody may write to it: arrays are read-only, and so are dictionaries.
+All callers share one result, so arrays and dictionaries in it are made read-only.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ _K = TypeVar("_K", bound="Keeper")
 
 
 class Keeper:
-    """Base of objects that never change, with the answers to the questions they were asked."""
+    """Base of immutable objects that store the cached results of functions decorated with `question`."""
 
     _answers: dict[Any, Any]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the answers: they can be had again, and compiled functions do not travel."""
+        """State for pickling, without cached results: compiled functions among them cannot be pickled."""
         return {name: value for name, value in self.__dict__.items() if name != "_answers"}
 
 
 def question(ask: Callable[Concatenate[_K, _P], _A]) -> Callable[Concatenate[_K, _P], _A]:
-    """Make a function of a `Keeper`, and of hashable particulars if it has any, one that is answered once."""
+    """Decorator that caches a function of a `Keeper` and hashable further arguments; results are made read-only."""
 
     @wraps(ask)
     def answered(whom: _K, /, *about: _P.args, **named: _P.kwargs) -> _A:

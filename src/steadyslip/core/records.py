@@ -5,8 +5,8 @@ A record declares each parameter once, with unit, domain and meaning::
     class Constant(ContactLaw, name="constant"):
         stress: float = parameter("Pa", positive, "normal stress")
 
-From that one line come the constructor and its checks, reading and writing of rig files, the JSON
-schema, the reference page, the symbol in the equations and the range searched for stability edges.
+The constructor and its checks, reading and writing of rig files, the JSON schema, the reference page, the symbol in
+the equations and the search range for stability edges are all derived from that line.
 """
 
 from __future__ import annotations
@@ -21,18 +21,17 @@ from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import Domain
 from steadyslip.core.entries import Option
 from steadyslip.core.errors import ParameterError, Problem, one, repr_short
-from steadyslip.core.members import Members
-from steadyslip.core.names import unfit_name
+from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.pages import Displayed
 from steadyslip.core.roles import Entry, Parameter, Role, Series, Total, fault
 
 
 @dataclass(frozen=True)
 class Part(Role):
-    """A field that holds another record; ``inline`` puts its parameters beside the owner's.
+    """Role of a field that holds another record; with ``inline`` its parameters are addressed like the owner's own.
 
-    With ``many`` it holds a tuple of them: a list of tables, or with ``by_name`` tables named after their laws.
-    With ``keyed`` it holds `Members`: a table of tables, each under a name that the user gives it.
+    With ``many`` it holds a tuple of records: in files a list of tables, or with ``by_name`` tables named after their
+    laws. With ``keyed`` it holds `Members`: a table of tables, each under a user-given name.
     """
 
     family: type[FrozenRecord]
@@ -77,7 +76,7 @@ class Part(Role):
 
 @dataclass(frozen=True)
 class Named(Role):
-    """A field that holds a record for each of some dotted names; ``listed`` lets a list of values stand for one."""
+    """Role of a field that maps dotted names to records; with ``listed`` a list of values may replace a record."""
 
     family: type[FrozenRecord]
     doc: str
@@ -96,7 +95,7 @@ class Named(Role):
 
 
 Declared = Entry | Part | Named
-"""What a field of a record may be."""
+"""Types of declarations of record fields."""
 _ROLE, _KEY = "steadyslip", "key"
 R = TypeVar("R", bound="FrozenRecord")
 
@@ -117,18 +116,18 @@ def parameter(
     letter: str = "",
     elsewhere: tuple[str, ...] = (),
 ) -> Any:
-    """Declare a numeric parameter; ``default=None`` makes it optional, the rest is as in `Parameter`."""
+    """Declare a numeric field; ``default=None`` makes it optional, the other arguments are those of `Parameter`."""
     role = Parameter(unit, domain, doc, structural, gauge, adds_state, kind, size, standing, letter, idle, elsewhere)
     return field(default=default, metadata={_ROLE: role})
 
 
 def option(*choices: Any, doc: str, default: Any) -> Any:
-    """Declare a choice between words, or between true and false."""
+    """Declare a field with one of several words, or a bool."""
     return field(default=default, metadata={_ROLE: Option(choices, doc)})
 
 
 def samples(unit: str, doc: str) -> Any:
-    """Declare a measured column: a list or array of numbers, or of texts with units."""
+    """Declare a field with a measured column: a list or array of numbers, or of texts with units."""
     return field(metadata={_ROLE: Series(unit, doc)})
 
 
@@ -138,12 +137,12 @@ def part(family: type[FrozenRecord], doc: str, *, default: Any = MISSING, inline
 
 
 def parts(family: type[FrozenRecord], doc: str, *, default: tuple[()], by_name: bool = False) -> Any:
-    """Declare a field that holds a tuple of records; the default is the empty one."""
+    """Declare a field that holds a tuple of records, empty by default."""
     return field(default=default, metadata={_ROLE: Part(family, doc, many=True, by_name=by_name)})
 
 
 def members(family: type[FrozenRecord], doc: str, *, default: Any = MISSING) -> Any:
-    """Declare a field that holds records of `family` by names that the user gives."""
+    """Declare a field that holds records of `family` by user-given names."""
     return field(default=default, metadata={_ROLE: Part(family, doc, keyed=True)})
 
 
@@ -153,7 +152,7 @@ def named(family: type[FrozenRecord], doc: str, *, listed: bool = False) -> Any:
 
 
 def setting(role: Entry, *, default: Any = MISSING, key: str = "") -> Any:
-    """Declare a field of another kind; ``key`` is its name in files where Python keeps that word for itself."""
+    """Declare a field with any other role; ``key`` is its name in files if that is a Python keyword."""
     return field(default=default, metadata={_ROLE: role, _KEY: key})
 
 
@@ -163,26 +162,25 @@ def setting(role: Entry, *, default: Any = MISSING, key: str = "") -> Any:
     field_specifiers=(parameter, option, samples, part, parts, members, named, setting),
 )
 class FrozenRecord(Displayed):
-    """Frozen, checked when built, addressed by dotted names.
+    """Base of frozen records: fields are checked by the constructor, and parameters have dotted names.
 
-    Subclasses become frozen keyword-only dataclasses by themselves. ``name="..."`` registers a law
-    under the word used in rig files; ``family="..."`` starts a new family of interchangeable laws;
-    ``section="..."`` puts a word before the record's own numbers; ``kw_only=False`` lets the
-    constructor take numbers by position.
+    Subclasses become frozen keyword-only dataclasses automatically. ``name="..."`` registers a law under the word used
+    in rig files; ``family="..."`` starts a new family of interchangeable laws; ``section="..."`` is put before the
+    names of the record's own parameters; ``kw_only=False`` allows positional arguments.
     """
 
     name: ClassVar[str] = ""
     family: ClassVar[str] = ""
     section: ClassVar[str] = ""
     short: ClassVar[tuple[str, ...]] = ()
-    """Keys of its table that a single value, or a list of values in their order, stands for."""
+    """Keys of the record's table that may be written as a single value, or as a list in this order."""
     registry: ClassVar[dict[str, type[FrozenRecord]]] = {}
     chosen_by: ClassVar[tuple[str, str | None]] = ("law", None)
-    """Of a family: the key of its tables that names the law, and the law meant where it is absent."""
+    """Key of the family's tables that names the law, and the default law if it is absent."""
     has_area: ClassVar[bool] = False
-    """Whether it is all of a contact, with an `area` or none."""
+    """True if the record is a complete contact with an optional field `area`."""
     in_totals: ClassVar[bool] = False
-    """Whether its table is about a contact of its own `area`: per-area quantities in it are totals for people."""
+    """True if per-area quantities in the record's file table are totals of a contact with its own `area`."""
 
     def __init_subclass__(
         cls, *, name: str = "", family: str = "", section: str = "", kw_only: bool = True, **kwargs: Any
@@ -219,7 +217,7 @@ class FrozenRecord(Displayed):
             raise ParameterError(problems, title=type(self).__name__)
 
     def _settled(self) -> Iterator[Problem]:
-        """Where a contact ends: what was given for the whole of it becomes what it is per unit area."""
+        """Convert totals (N, N/m, ...) of a contact to values per unit area; yield a Problem for each without area."""
         if not self.has_area:
             return
         totals = {name: found for name, found in parameters(self).items() if isinstance(found.value, Total)}
@@ -235,11 +233,11 @@ class FrozenRecord(Displayed):
                 object.__setattr__(self, item.name, getattr(other, item.name))
 
     def inconsistencies(self) -> Iterator[Problem]:
-        """Problems with which fields are given together; called once each field is valid by itself."""
+        """Yield a Problem for each forbidden combination of fields; called if every field is valid by itself."""
         yield from ()
 
     def conditions(self) -> Iterator[Condition]:
-        """Relations between several numbers; valid for single numbers, and for arrays in a copy by `with_values`."""
+        """Yield the conditions between several parameters, for numbers or for arrays in a copy by `with_values`."""
         yield from ()
 
     def __repr__(self) -> str:
@@ -252,7 +250,7 @@ class FrozenRecord(Displayed):
 
 
 def _check_fields(cls: type[FrozenRecord]) -> None:
-    """A field must not take the place of a method or of another attribute of the class, nor of a key in its tables."""
+    """Raise TypeError if a field hides a method or attribute of its bases, or has the name of the law key."""
     known = {name for base in cls.__mro__[1:] for name in getattr(base, "__dataclass_fields__", ())}
     own = [name for name in vars(cls).get("__annotations__", ()) if isinstance(vars(cls).get(name), Field)]
     for name in own:
@@ -265,22 +263,22 @@ def _check_fields(cls: type[FrozenRecord]) -> None:
 
 
 class Settings(FrozenRecord):
-    """Base of tables that say what to do with a rig; what is right in a faulty one helps to find further faults."""
+    """Base of tables about tasks ([map], [fit], ...); valid entries of a faulty one serve to check further tables."""
 
 
 def key_of(item: Field[Any]) -> str:
-    """The key that stands for a field in files."""
+    """Key of a field in files."""
     return item.metadata.get(_KEY) or item.name
 
 
 def given(record: FrozenRecord) -> dict[str, Any]:
-    """The fields of a record that differ from their default."""
+    """Fields of a record that differ from their default, by name."""
     found = {item.name: getattr(record, item.name) for item in fields(record)}  # type: ignore[arg-type]
     return {item.name: found[item.name] for item in fields(record) if found[item.name] != item.default}  # type: ignore[arg-type]
 
 
 def role_of(item: Field[Any]) -> Declared:
-    """The declaration behind a dataclass field."""
+    """Role with which a dataclass field was declared."""
     role: Declared | None = item.metadata.get(_ROLE)
     if role is None:
         raise TypeError(f"field {item.name!r} has no unit or domain; declare it with parameter(), option() or part()")
@@ -288,7 +286,7 @@ def role_of(item: Field[Any]) -> Declared:
 
 
 def _layout(record: FrozenRecord) -> tuple[tuple[str, str, Declared], ...]:
-    """Of every field: name, name in tables, what it may hold."""
+    """Attribute name, own dotted name and role of every field of a record."""
     kind: Any = type(record)
     return _layout_of(kind)
 
@@ -300,12 +298,12 @@ def _layout_of(kind: Any) -> tuple[tuple[str, str, Declared], ...]:
 
 
 def is_required(item: Field[Any]) -> bool:
-    """Whether a field has no default."""
+    """True if a field has no default."""
     return item.default is MISSING
 
 
 def checked(item: Field[Any], value: Any) -> Any:
-    """The value of a field, converted and checked; ParameterError names no field, only the fault."""
+    """Check and convert the value of a field; a ParameterError does not yet name the field."""
     if value is None and item.default is None:
         return None
     role = role_of(item)
@@ -313,7 +311,7 @@ def checked(item: Field[Any], value: Any) -> Any:
 
 
 def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str, FrozenRecord]]:
-    """The records that a field holds, each with what stands before the names of its parameters."""
+    """Yield the records in a field, each with the prefix of its parameters' dotted names."""
     if role.many:
         yield from ((f"{name}.{index}.", member) for index, member in enumerate(value, start=1))
     elif role.keyed:
@@ -323,7 +321,7 @@ def below(role: Part, value: Any, name: str, prefix: str) -> Iterator[tuple[str,
 
 
 def _each(role: Part, value: Any, name: str, prefix: str, change: Callable[[Any, str], Any]) -> Any:
-    """The same with every record changed, given what stands before its names."""
+    """Value of a field with ``change(record, prefix)`` applied to every record in it."""
     changed = [change(member, before) for before, member in below(role, value, name, prefix)]
     if role.many:
         return tuple(changed)
@@ -334,7 +332,7 @@ def _each(role: Part, value: Any, name: str, prefix: str, change: Callable[[Any,
 
 @dataclass(frozen=True)
 class Address:
-    """One parameter of a record: dotted name, declaration and present value (None if not given)."""
+    """A parameter of a record: dotted name, role and value (None if not given)."""
 
     name: str
     role: Parameter
@@ -342,7 +340,7 @@ class Address:
 
 
 def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
-    """All numeric parameters below `record`, by dotted name, in order of declaration."""
+    """Numeric parameters of a record and the records in it, by dotted name, in order of declaration."""
     found: dict[str, Address] = {}
     for field_name, own_name, role in _layout(record):
         value, name = getattr(record, field_name), prefix + own_name
@@ -361,7 +359,7 @@ def parameters(record: FrozenRecord, prefix: str = "") -> dict[str, Address]:
 
 
 def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Condition]]:
-    """Every condition below `record`, with the dotted name of the field that it is about."""
+    """Yield the conditions of a record and the records in it, each with the dotted name of its field."""
     layout = _layout(record)
     own = {field_name: prefix + own_name for field_name, own_name, _ in layout}
     for condition in record.conditions():
@@ -374,7 +372,7 @@ def conditions(record: FrozenRecord, prefix: str = "") -> Iterator[tuple[str, Co
 
 
 def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
-    """A copy with the parameters of the given full dotted names changed; checked like any other."""
+    """Copy of a record with parameters changed by full dotted name; checked by the constructors."""
     own: dict[str, Any] = {}
     for field_name, own_name, role in _layout(record):
         value, name = getattr(record, field_name), prefix + own_name
@@ -386,9 +384,9 @@ def replaced(record: R, changes: Mapping[str, Any], prefix: str = "") -> R:
 
 
 def with_values(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
-    """The same record with other things, usually symbols, in place of its numbers; nothing is checked.
+    """Copy of a record with symbols or arrays in place of its numbers, by dotted name; nothing is checked.
 
-    Law methods read their own fields, so the same method serves numbers and symbols.
+    Methods of laws read the record's fields, so one method serves numbers, arrays and symbols.
     """
     copy: R = object.__new__(type(record))
     for field_name, own_name, role in _layout(record):
@@ -402,7 +400,7 @@ def with_values(record: R, values: Mapping[str, Any], prefix: str = "") -> R:
 
 
 def shape_of(record: FrozenRecord, prefix: str = "") -> tuple[Any, ...]:
-    """A hashable description of everything but the numbers: types, options, which parameters are given."""
+    """Hashable structure of a record without its numbers: types, options, which parameters are given or zero."""
     shape: list[Any] = [type(record)]
     for field_name, _, role in _layout(record):
         value = getattr(record, field_name)

@@ -1,4 +1,4 @@
-"""What results have in common: nobody writes to their arrays."""
+"""Base of results: their arrays are read-only."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _HOLDERS = frozenset((np.ndarray, tuple, dict))
 
 
 class ReadOnly(Displayed):
-    """Base of frozen dataclasses that hold arrays, which become read-only, in tuples and dictionaries too."""
+    """Base of frozen dataclasses that makes arrays in their fields read-only, also inside tuples and dictionaries."""
 
     def __post_init__(self) -> None:
         for name in list(self.__dict__):
@@ -22,7 +22,7 @@ class ReadOnly(Displayed):
 
 
 def read_only(value: Any) -> Any:
-    """A view of an array that cannot be written to; the same for arrays in tuples and dictionaries."""
+    """Replace arrays by read-only views, also inside tuples and dictionaries; other values are returned unchanged."""
     if type(value) is np.ndarray:
         view = value.view()
         view.setflags(write=False)

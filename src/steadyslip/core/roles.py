@@ -1,7 +1,7 @@
-"""What a field of a record, or an option of a call, may hold: each kind checks, explains, reads and writes its values.
+"""Roles: types of record fields and function arguments, which check, describe, read and write values.
 
-Numbers (`Parameter`) and measured columns are here; choices, words, counts and names in `entries`. A layer that needs
-another kind derives one from `Entry`.
+Numbers (`Parameter`) and measured columns (`Series`) are here; choices, text, integers and names are in `entries`.
+Other layers derive their own from `Entry`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ Schema = dict[str, Any]
 
 
 class Role:
-    """What a field or an option may hold."""
+    """Base of types of fields and arguments."""
 
     def checked(self, value: Any) -> Any:
-        """The value as it is kept.
+        """Check a value and convert it to the form that is stored.
 
         Raises
         ------
@@ -37,30 +37,30 @@ class Role:
         raise NotImplementedError
 
     def allowed(self) -> str:
-        """What may be given, in words."""
+        """Description of the allowed values, for messages."""
         raise NotImplementedError
 
     def refused(self, value: Any) -> ParameterError:
-        """The exception for a value that is not allowed."""
+        """Make the exception for a value that is not allowed."""
         return fault(f"got {repr_short(value)}; allowed: {self.allowed()}")
 
 
 def fault(message: str) -> ParameterError:
-    """An exception that names no field yet."""
+    """Make a ParameterError that does not name a field yet."""
     return ParameterError([Problem("", message)])
 
 
 class Entry(Role):
-    """One entry of a table in a file; subclasses are dataclasses that say in a phrase, `doc`, what it means."""
+    """Base of roles that occur in file tables; subclasses are dataclasses whose `doc` describes the entry."""
 
     doc: str
 
     def schema(self) -> Schema:
-        """The JSON schema of what a file may have."""
+        """JSON schema of the entry."""
         raise NotImplementedError
 
     def read(self, raw: Any, area: float | None) -> Any:
-        """The value of a file: where the rig has an area, quantities per unit area are for the whole of it.
+        """Convert a raw value of a file; if the rig has an area (m²), per-area quantities are given as totals.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class Entry(Role):
         return self.checked(raw)
 
     def written(self, value: Any, area: float | None = None) -> str:
-        """The value in TOML, of a rig with that area."""
+        """Format a value as TOML; per-area quantities as totals if the rig has an area (m²)."""
         return json.dumps(value, ensure_ascii=False)
 
 
@@ -85,32 +85,32 @@ PARAMETER_KINDS = {
     "stiffness": "of the spring, or of what acts as one",
     "delay": "time by which something acts late",
 }
-"""What a parameter can be to the stages that look for meaning, not for names."""
+"""Physical meanings by which stages find parameters, since names are free."""
 
 
 class Total(float):
-    """A number given for a whole contact, in N, N/m, ..., in place of one per unit area; it waits for the area."""
+    """Total of a contact (N, N/m, ...) given for a per-area parameter, before it is divided by the contact's area."""
 
 
 class InUnit(float):
-    """A number (SI) from text whose unit only some rigs have, ``"0.05 rpm"``; it waits for the rig."""
+    """SI number from text like ``"0.05 rpm"`` whose `unit` only some rigs allow, before the rig is known."""
 
     unit: str
 
     def __new__(cls, number: float, unit: str) -> InUnit:
-        """A number of a unit."""
+        """Make a float with a unit."""
         found = super().__new__(cls, number)
         found.unit = unit
         return found
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For copies in other processes."""
+        """Pickle with the unit."""
         return InUnit, (float(self), self.unit)
 
 
 @dataclass(frozen=True)
 class Parameter(Entry):
-    """What a numeric field of a record means.
+    """Role of a numeric field: unit, allowed values and meaning.
 
     Attributes
     ----------
@@ -119,27 +119,26 @@ class Parameter(Entry):
     domain : Domain
         Allowed values.
     doc : str
-        Meaning, a phrase.
+        Meaning, in a phrase.
     structural : bool
-        Zero means that the term is absent from the equations (mass, B0, ...), not merely small.
+        Zero removes the term from the equations (mass, B0, ...), so the Model has another structure.
     adds_state : bool
-        Structural, and its presence adds a variable to the model, so that zero is no limit of small values.
+        Structural, and a nonzero value adds a variable, so zero is not the limit of small values.
     gauge : bool
-        Changes no observable result (a reference that only shifts a state), so has no edge.
+        Changes no observable result (a reference that only shifts a state), so it has no stability edge.
     kind : str
-        What it is to those who scale motions or fit records without knowing the law: one of `PARAMETER_KINDS`, or
-        nothing.
+        Physical meaning for scaling and fitting without knowledge of the law: one of `PARAMETER_KINDS`, or empty.
     size : float or None
-        Change that matters, of a parameter that may be zero or of either sign; a positive one has its own size.
+        Typical change of a parameter that may be zero or negative; for positive ones their value is used.
     letter : str
-        Its symbol in equations; its name unless given.
+        Symbol in equations; the name by default.
     standing : float or None
-        Stands for the parameter where it is yet to be fitted.
+        Value used while the parameter is still to be fitted.
     idle : float or None
-        Value at which the parameter, with the others of its own member of a list, does nothing: without it the law is
-        a simpler one.
+        Value at which the parameter has no effect, together with the others of its list member; the law without that
+        member is a simpler one.
     elsewhere : tuple of str
-        SI units that it has for rigs of other kinds: forces, angles.
+        SI units of the parameter for other kinds of rig: forces, angles.
     """
 
     unit: str
@@ -160,7 +159,7 @@ class Parameter(Entry):
             raise TypeError(unknown_name("kind of parameter", self.kind, PARAMETER_KINDS))
 
     def checked(self, value: Any) -> float:
-        """A number or text such as ``"5 MPa"`` as an SI float inside the parameter's domain."""
+        """Convert a number or text such as ``"5 MPa"`` to an SI float inside the domain."""
         if isinstance(value, str):
             try:
                 number = parse(value, self.unit)
@@ -177,10 +176,10 @@ class Parameter(Entry):
                 raise self.refused(value) from error
         if not self.domain.contains(number):
             raise self.refused(value)
-        return number + 0.0  # -0.0 is 0: files do not write what equals a default
+        return number + 0.0  # turns -0.0 into 0.0, which equals the default when files are written
 
     def given(self, value: Any) -> float:
-        """What a constructor takes: as `checked`; or text, a `Total` or `InUnit` where its unit depends on the rig."""
+        """Check a constructor argument; text in a unit that depends on the rig becomes a `Total` or `InUnit`."""
         if isinstance(value, (Total, InUnit)):
             return value
         try:
@@ -210,7 +209,7 @@ class Parameter(Entry):
         return {"description": self.doc + unit, "anyOf": [number, _text(self.unit)]}
 
     def read(self, raw: Any, area: float | None) -> float:
-        """For the whole area a bare number; text may give either."""
+        """Convert a raw value: a bare number is a total if the rig has an area; text is read in its own unit."""
         if area is None or not is_per_area(self.unit):
             return self.checked(raw)
         if isinstance(raw, str):
@@ -232,7 +231,7 @@ class Parameter(Entry):
 
 @dataclass(frozen=True)
 class Series(Entry):
-    """A measured column: a tuple of finite numbers in the SI unit."""
+    """Role of a measured column: a tuple of finite SI numbers."""
 
     unit: str
     doc: str
@@ -251,7 +250,7 @@ class Series(Entry):
         return {"type": "array", "items": member, "description": f"{self.doc}, {self.unit}"}
 
     def read(self, raw: Any, area: float | None) -> tuple[float, ...]:
-        """For the whole area bare numbers; texts may give either."""
+        """Convert a raw column: bare numbers are totals if the rig has an area; texts are read in their own unit."""
         if area is None or not is_per_area(self.unit):
             return self.checked(raw)
         try:
@@ -261,10 +260,10 @@ class Series(Entry):
         return tuple(v if isinstance(given, str) else v / area for given, v in zip(raw, found, strict=True))
 
     def written(self, value: Any, area: float | None = None) -> str:
-        """A list of numbers, on as many lines as it needs."""
+        """Format the column as a TOML list, wrapped."""
         factor, unit = outside(self.unit, area)
         each = [repr(v * factor) if _reads_back(v, factor) else f'"{v!r} {self.unit}"' for v in value]
-        each = [one.replace(" ", "\xa0") for one in each]  # a line ends between two, not inside of a text
+        each = [one.replace(" ", "\xa0") for one in each]  # so that lines break between items only
         text = [line.replace("\xa0", " ") for line in wrap(", ".join(each), 100, break_on_hyphens=False)]
         return "[\n    " + "\n    ".join(text) + f",\n]  # {unit}" if len(text) > 1 else f"[{''.join(text)}]  # {unit}"
 
@@ -274,7 +273,7 @@ def _text(unit: str) -> Schema:
 
 
 def _per_area(text: str, unit: str, area: float) -> float:
-    """Text for the whole area, or per unit area, as the latter."""
+    """Per-area value of a text that gives a total or a per-area quantity."""
     try:
         return parse(text, total_unit(unit)) / area
     except QuantityError as error:
@@ -285,5 +284,5 @@ def _per_area(text: str, unit: str, area: float) -> float:
 
 
 def _reads_back(value: float, factor: float) -> bool:
-    """Whether a total gives the same number per unit area again; otherwise that number is written, with its unit."""
+    """True if value times factor (area), divided by factor, gives the value bit for bit."""
     return float(value) * factor / factor == float(value)

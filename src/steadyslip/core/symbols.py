@@ -1,8 +1,8 @@
-"""Symbols that stand in equations: one factory for all of them.
+"""Factory of the SymPy symbols in equations, and their display letters.
 
-A name that a user gives (of a parameter, a memory, a body) is never the name of a symbol: it is a letter, which people
-are shown (`steadyslip.model.equations.Model.written`), while the symbol is called by its place. So no name meets one of
-the package's own, and names change neither the order of terms nor the last bit of a number.
+User-given names (of parameters, memory variables, bodies) are never names of symbols. A symbol is named after its
+position; the user's name is only its display letter (`steadyslip.model.equations.Model.written`). So names cannot
+collide with the package's own, and change neither the order of terms nor the last bit of a result.
 """
 
 from __future__ import annotations
@@ -15,30 +15,30 @@ import sympy as sp
 from steadyslip.core.errors import InternalError
 
 _PLACE = 1
-"""`dummy_index` of all of them: SymPy's own are above a million, and differ from process to process."""
+"""`dummy_index` of all symbols; SymPy's automatic indices are above a million and differ between processes."""
 
 
 @cache
 def inner_symbol(name: str, **assumptions: bool | None) -> sp.Dummy:
-    """Symbol of the equations, the same object for the same name and assumptions, alike in every process.
+    """Symbol for equations: one object per name and assumptions, reproducible across processes.
 
-    It equals no `sympy.Symbol`, whatever that is called, and no `sympy.Dummy` made elsewhere.
+    It is unequal to every `sympy.Symbol` and to every `sympy.Dummy` made elsewhere, whatever their names.
     """
     return sp.Dummy(name, _PLACE, **{key: value for key, value in assumptions.items() if value is not None})
 
 
 def inner_symbols(names: str, **assumptions: bool | None) -> tuple[sp.Dummy, ...]:
-    """One `inner_symbol` for each word."""
+    """Symbols by `inner_symbol` for the words of a text, such as ``"T tau sigma"``."""
     return tuple(inner_symbol(name, **assumptions) for name in names.split())
 
 
 class Letters:
-    """By what people know symbols: no letter is used twice.
+    """Unique display letters of symbols.
 
     Attributes
     ----------
     known : dict of sympy.Symbol to str
-        Letters of symbols that are not known by their own names.
+        Letters of the symbols whose letter differs from their name.
     """
 
     def __init__(self, taken: Iterable[str], known: Mapping[sp.Symbol, str] | None = None) -> None:
@@ -46,7 +46,7 @@ class Letters:
         self._taken = set(taken)
 
     def symbol(self, name: str, dotted: str, letter: str = "", **assumptions: bool | None) -> sp.Symbol:
-        """`inner_symbol` of a name, with a letter, or else an unused one for a dotted name that a user gave."""
+        """Make a symbol and give it a letter: `letter`, or else an unused one made from the user's dotted name."""
         found = inner_symbol(name, **assumptions)
         if found in self.known:
             raise InternalError("a symbol stands for one thing")
@@ -54,9 +54,9 @@ class Letters:
         return found
 
     def unused(self, dotted: str) -> str:
-        """The last part of a dotted name, with as many earlier parts behind it as make it unique, or else a number.
+        """Make a unique letter: the last part of a dotted name, followed by earlier parts or a number if needed.
 
-        A body and a contact may have the same name, and ``a-b`` and ``a_b`` are two.
+        Collisions happen: a body and a contact may have the same name, and ``a-b`` and ``a_b`` are different names.
         """
         *before, letter = dotted.replace("-", "_").split(".")
         if before and before[-1].isdigit():

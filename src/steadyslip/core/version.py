@@ -1,4 +1,4 @@
-"""Which program this is: its release, and a digest of the files that it consists of."""
+"""Version of the program: release number and a digest of its source files."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 
 RELEASE = "0.2.0"
 KINDS = (".py", ".pyi", ".js", ".css", ".json")
-"""Endings of the files that the package consists of."""
+"""Extensions of the package's source files."""
 
 
 @lru_cache(maxsize=1)
 def version() -> str:
-    """The release and a digest, such as ``0.2.0+s3f9c12ab``: another one as soon as a file of the package is another.
+    """Release and digest, such as ``0.2.0+s3f9c12ab``; any change of a source file changes the digest.
 
-    Alike in a checkout, a wheel and a source distribution, on every system; kept from the first call on.
+    Equal in a checkout, a wheel and a source distribution, on every system; cached.
     """
     return f"{RELEASE}+s{digest(Path(__file__).parents[1])}"
 
 
 def digest(folder: Path) -> str:
-    """Eight letters that stand for the names and contents of a package's files, however their lines end."""
+    """First eight hexadecimal digits of the SHA-256 of file names and contents, independent of line endings."""
     from hashlib import sha256  # slow to import
 
     found = sha256()
@@ -46,12 +46,12 @@ def _files(folder: str, above: str) -> list[str]:
 
 
 def stamped(answer: Any) -> Any:
-    """An answer as plain data, with the version that gave it unless it says that itself; lists are left as they are."""
+    """Add the program version to a dict of results unless it has one; lists are returned unchanged."""
     return {"version": version()} | answer if isinstance(answer, dict) else answer
 
 
 def of_another(made: str) -> str:
-    """What to say of an answer that another version gave, which may have been right to another digit or wrong."""
+    """Note that a result was computed by another version, empty if by this one."""
     from steadyslip import __version__
 
     return "" if made == __version__ else f"computed by steadyslip {made}, this is {__version__}"

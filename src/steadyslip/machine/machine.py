@@ -11,7 +11,7 @@ import numpy as np
 from steadyslip.core.areas import is_per_area, stress_name, total_unit
 from steadyslip.core.conditions import Condition
 from steadyslip.core.errors import Problem, unknown_name
-from steadyslip.core.members import Members
+from steadyslip.core.names import Members
 from steadyslip.core.records import Address, members, part
 from steadyslip.machine.bodies import Body
 from steadyslip.machine.ends import floats, unnamed

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from steadyslip.core.arrays import brief
-from steadyslip.core.errors import InternalError, ParameterError, Problem, unknown_name
+from steadyslip.core.errors import InternalError, ParameterError, Problem, repr_short, unknown_name
 from steadyslip.core.expressions import ArrayFunction, derivative
 from steadyslip.core.questions import question
 from steadyslip.model.equations import HELD, Model
@@ -189,7 +188,7 @@ def _checked_initial(given: Mapping[str, Any], model: Model) -> dict[str, np.nda
         except (TypeError, ValueError, OverflowError):
             array = np.array(np.nan)
         if not array.size or not np.all(np.isfinite(array)) or np.asarray(value).dtype == bool:
-            problems.append(Problem(f"initial.{name}", f"got {brief(value)}; allowed: finite numbers in SI units"))
+            problems.append(Problem(f"initial.{name}", f"got {repr_short(value)}; allowed: finite numbers in SI units"))
         found[name] = array
     if problems:
         raise ParameterError(problems)

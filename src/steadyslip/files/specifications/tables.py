@@ -11,8 +11,7 @@ from typing import Any
 from steadyslip.core.areas import is_per_area, total_unit
 from steadyslip.core.domains import positive
 from steadyslip.core.errors import ParameterError, Problem, legible, repr_short, unknown_name
-from steadyslip.core.members import Members
-from steadyslip.core.names import unfit_name
+from steadyslip.core.names import Members, unfit_name
 from steadyslip.core.records import Declared, FrozenRecord, Named, Part, Settings, is_required, key_of, role_of
 from steadyslip.core.roles import Entry, Parameter
 from steadyslip.files.specifications.layout import find_law, has_choice, own_fields, selector, ways

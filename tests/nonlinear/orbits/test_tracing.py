@@ -222,3 +222,15 @@ def test_a_run_that_leads_nowhere_is_cut_short():
     with pytest.raises(Failure, match="too many steps"):
         flow.run(setting, start, np.array([1e6]))
     assert flow.steps - before <= 2 * flow_module.FEW_STEPS
+
+
+def test_a_run_that_leads_nowhere_does_not_change_those_after_it():
+    """Sensitivities keep their accuracy after a trial far off the branch, which no choice of steps ends in time."""
+    flow = Flow(unit_rig("slip", 0.5, 0.4, damping=1e-3, mass=1.0), "slider.stiffness")
+    setting, start, time = flow.setting(0.4 * A), flow.steady(0.4 * A)[None] + 0.1, np.array([1.0])
+    before = flow.run(setting, start, time)
+    with pytest.raises(Failure, match="too many steps"):
+        flow.run(setting, start, np.array([1e6]))
+    assert not flow.led
+    for now, own in zip(flow.run(setting, start, time), before, strict=True):
+        np.testing.assert_array_equal(now, own)

@@ -241,7 +241,11 @@ class Runs:
             if failure.status != "too many steps" or not self.stiff or self.led:
                 raise
             self.led = True
-            final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
+            try:
+                final = self._advanced(setting, self._sensitive_settings(setting, amplitude), initial, times)
+            except FlowFailure:  # the motion itself needs them: a point far off the curve, mostly
+                self.led = False
+                raise
         matrix = final[:, n : n + n * n].reshape(count, n, n).transpose(0, 2, 1)
         return final[:, :n], matrix, final[:, n + n * n :]
 

@@ -1,4 +1,4 @@
-"""Laws of `friction` and of `contact`: frozen records whose methods are expressions.
+"""Friction and contact laws: frozen records whose methods return SymPy expressions.
 
-Know nothing of where they are used: rigs, Models, files, anything that is computed of them.
+Laws do not depend on their users: rigs, Models, files or anything computed from them.
 """

@@ -1,7 +1,7 @@
-"""Protocols: what the load point, the normal stress and a disturbance do in the course of an experiment.
+"""Protocols: time histories of load point, normal stress and disturbances in an experiment.
 
-pieces -> Protocol -> segments (one lane or many) -> kernels. Knows neither laws nor rigs: what is done is told in
-channels, whatever it is done to.
+pieces -> Protocol -> segments (one lane or many) -> kernels. A protocol drives numbered channels; it does not depend
+on laws or rigs.
 """
 
 from steadyslip.protocol.inputs import evaluate

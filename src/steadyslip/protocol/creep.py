@@ -1,4 +1,4 @@
-"""Creep as a part of a run: for how long a drive is let go, and with which force it pulls then."""
+"""Creep during a part of a run: time spans in which the drive is released and pulls with an imposed force."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from steadyslip.core.errors import Problem
 from steadyslip.protocol.curves import Array, Curve, Jump, Wave, column
 
 LOADING, FREE, SWITCH = 1, 3, 4
-"""Channels of a run in which a drive is let go, the first disturbances: the force of the drive, whether it is free, and
-at the start of a segment where that changes, 1 if its force goes on, 2 if it is told."""
-ROUNDING = 1e-12  # relative; ends and starts closer than this are meant to be the same time
+"""Disturbance channels of a run with a released drive: force of the drive (Pa, N or N m); 1 while it is released;
+and at segments where that changes, 1 to keep its present force, 2 to take the imposed one."""
+ROUNDING = 1e-12  # relative difference of two times that counts as zero: some thousand roundings of a sum of times
 
 
 class PieceLike(Protocol):
-    """What pieces of a protocol say of themselves here; see `steadyslip.protocol.Piece`."""
+    """Interface of `steadyslip.protocol.Piece` used here, which cannot be imported because it imports this module."""
 
     name: ClassVar[str]
     channel: ClassVar[int]
@@ -33,16 +33,16 @@ class PieceLike(Protocol):
 
 @dataclass(frozen=True)
 class Release:
-    """A time in which a drive pulls with a force of its own.
+    """A time span in which the drive is released and pulls with an imposed force.
 
     Attributes
     ----------
     begin, end : ndarray (lanes or 1, 1)
         s.
     to : ndarray (lanes or 1, 1) or None
-        The force, Pa or as the rig has it; None for that with which it is let go.
+        Force (Pa, or N, N m of a machine); None to keep the force at release.
     changes : tuple of Curve
-        What is added to it.
+        Changes added to the force.
     """
 
     begin: Array
@@ -51,21 +51,24 @@ class Release:
     changes: tuple[Curve, ...] = ()
 
     def holds(self, time: Array) -> bool:
-        """Whether it goes on at a time, in every lane."""
+        """True if the span contains a time (s) in every lane."""
         return bool(np.all((self.begin <= time) & (time < self.end)))
 
     def breakpoints(self) -> Iterator[Array]:
-        """Times at which something begins or ends."""
+        """Yield the times (s) at which the span begins or ends or its force changes."""
         yield from (self.begin, self.end, *(curve.times for curve in self.changes))
 
     def numbers(self) -> Iterator[Array]:
-        """What may differ between lanes beside times."""
+        """Yield the force values, which may differ between lanes."""
         yield from (part for curve in self.changes for part in (curve.left, curve.right))
         if self.to is not None:
             yield self.to
 
-    def tell(self, start: Array, value: Array, slope: Array) -> None:
-        """Write the channels on segments that begin at `start`, (lanes or 1, n); of earlier spans before later ones."""
+    def add_to(self, start: Array, value: Array, slope: Array) -> None:
+        """Add the span's channels to `value` and `slope` (lanes, n, channels) of segments with `start` (lanes or 1, n).
+
+        Earlier spans must be added first: where one ends and the next begins, the later one sets `SWITCH`.
+        """
         within = (self.begin <= start) & (start < self.end)
         value[:, :, FREE] += within
         value[:, :, SWITCH][np.broadcast_to(start == self.end, value.shape[:2])] = 1.0
@@ -75,20 +78,20 @@ class Release:
         if self.to is not None:
             value[:, :, LOADING] += within * self.to
         for curve in self.changes:
-            level, rate = curve.on(start)
+            level, rate = curve.value_and_slope(start)
             value[:, :, LOADING] += within * level
             slope[:, :, LOADING] += within * rate
 
 
 def spans_of(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> tuple[list[Release], list[Problem]]:
-    """When a drive is let go, in the order of time, and what pieces do then that they cannot.
+    """Spans in which the drive is released, in order of time, and Problems with pieces that conflict with them.
 
     Parameters
     ----------
     pieces : sequence of Piece
-        Their numbers may be arrays with one value for each lane.
+        Pieces of the protocol; numbers may be arrays with one value for each lane.
     drive : sequence of Curve
-        Of the pieces that set the velocity, those that let the drive go among them.
+        Velocity curves of the pieces that set the velocity, including those that release the drive.
     """
     spans = _spans(pieces, drive)
     added: list[list[Curve]] = [[] for _ in spans]
@@ -102,7 +105,7 @@ def spans_of(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> tuple[list[
                 continue
             message = f"{piece.name} begins where nothing creeps; give it a time while the drive is let go (creep)"
             problems.append(Problem(where, message))
-        elif piece.channel == 0 and _moves_within(piece, spans):
+        elif piece.channel == 0 and _overlaps(piece, spans):
             message = f"{piece.name} moves the load point while creep leaves it to the force of the drive"
             problems.append(Problem(where, f"{message}; allowed: before or after it"))
     return [Release(one.begin, one.end, one.to, tuple(own)) for one, own in zip(spans, added, strict=True)], problems
@@ -120,15 +123,15 @@ def _spans(pieces: Sequence[PieceLike], drive: Sequence[Curve]) -> list[Release]
         later = drive[k + 1].times[:, :1] if k + 1 < len(drive) else np.full((1, 1), np.inf)
         end = later
         if times.shape[1] > 1:
-            own = times[:, 1:]  # the next piece begins no earlier, whatever rounding says of their sum
+            own = times[:, 1:]  # at + duration may round to just beyond the start of the next piece
             end = np.where(np.abs(later - own) <= ROUNDING * np.abs(own), np.maximum(later, own), own)
         told = getattr(piece, "to", None)
         found.append(Release(times[:, :1], end, None if told is None else column(told)))
     return found
 
 
-def _moves_within(piece: PieceLike, spans: Sequence[Release]) -> bool:
-    """Whether a wave or a jump of the load point meets a time in which it is free, in any lane."""
+def _overlaps(piece: PieceLike, spans: Sequence[Release]) -> bool:
+    """True if a wave or jump of the load point overlaps a span with a released drive, in any lane."""
     wave, jump = piece.wave(), piece.jump()
     if wave is not None:
         return any(bool(np.any((wave.start < span.end) & (span.begin < wave.stop))) for span in spans)

@@ -1,7 +1,7 @@
-"""What a piece of a protocol consists of: piecewise-linear curves and sine waves, in one lane or many.
+"""Elements of protocol pieces: piecewise-linear curves, sine waves and jumps, in one lane or many.
 
-Numbers are plain, or 1-D arrays with one value for each lane. Inside they are columns: arrays (lanes, knots)
-whose first length is 1 where all lanes agree.
+Parameters are floats, or 1-D arrays with one value per lane. Internally they are columns: arrays of shape
+(lanes, knots), or (1, knots) if all lanes agree.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ Array = NDArray[np.float64]
 
 
 def column(value: Any) -> Array:
-    """A number, or one for each lane, as an array (lanes, 1)."""
+    """Array of shape (lanes, 1) made from a number or from one number per lane."""
     return np.asarray(value, dtype=float).reshape(-1, 1)
 
 
-def side_by_side(columns: Sequence[Array]) -> Array:
-    """Columns put beside one another, those common to all lanes repeated."""
+def join_columns(columns: Sequence[Array]) -> Array:
+    """Concatenate columns along the knots; columns common to all lanes are repeated."""
     lanes = max(len(part) for part in columns)
     return np.concatenate([np.broadcast_to(part, (lanes, part.shape[1])) for part in columns], axis=1)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A function of time, linear between knots, that may jump at them.
+    """Piecewise-linear function of time that may jump at its knots.
 
     Parameters
     ----------
@@ -44,27 +44,27 @@ class Curve:
     left: Array
     right: Array
 
-    def on(self, start: Array) -> tuple[Array, Array]:
-        """Value just after `start` (lanes or 1, n), and the slope there."""
+    def value_and_slope(self, start: Array) -> tuple[Array, Array]:
+        """Value and slope (per s) just after times `start` (s), each of shape (lanes or 1, n)."""
         before, after = self.times[:, :1], self.times[:, 1:]
         gap = after - self.times[:, :-1]
         rise = self.left[:, 1:] - self.right[:, :-1]
         rates = np.zeros(np.broadcast_shapes(rise.shape, gap.shape))
         with np.errstate(over="ignore"):
             np.divide(rise, gap, out=rates, where=gap > 0)
-        rates[~np.isfinite(rates)] = 0.0  # too steep to be told from a step
+        rates[~np.isfinite(rates)] = 0.0  # an overflowing slope counts as a step
         flat = np.zeros((1, 1))
         passed = _passed(self.times, start)
-        value = _picked(side_by_side([self.left[:, :1], self.right]), passed)
+        value = _take(join_columns([self.left[:, :1], self.right]), passed)
         if not rates.any():
             return value, flat
-        slope = _picked(side_by_side([flat, rates, flat]), passed)
-        anchor = _picked(side_by_side([before, self.times]), passed)
+        slope = _take(join_columns([flat, rates, flat]), passed)
+        anchor = _take(join_columns([before, self.times]), passed)
         return value + slope * (start - anchor), slope
 
 
 def _passed(times: Array, start: Array) -> NDArray[np.intp]:
-    """How many knots lie at or before each of `start`."""
+    """Number of knots at or before each time, (lanes or 1, n)."""
     if len(times) == 1:
         return np.searchsorted(times[0], start, side="right")
     passed = np.zeros(np.broadcast_shapes((len(times), 1), start.shape), dtype=np.intp)
@@ -73,7 +73,7 @@ def _passed(times: Array, start: Array) -> NDArray[np.intp]:
     return passed
 
 
-def _picked(columns: Array, index: NDArray[np.intp]) -> Array:
+def _take(columns: Array, index: NDArray[np.intp]) -> Array:
     if len(columns) == 1:
         columns = np.broadcast_to(columns, (len(index), columns.shape[1]))
     elif len(index) == 1:
@@ -83,24 +83,24 @@ def _picked(columns: Array, index: NDArray[np.intp]) -> Array:
 
 
 def knots(*points: tuple[Any, Any, Any]) -> Curve:
-    """The curve through points (time, value before, value after)."""
-    times, left, right = (side_by_side([column(value) for value in row]) for row in zip(*points, strict=True))
+    """Make the Curve through points (time, value before, value after)."""
+    times, left, right = (join_columns([column(value) for value in row]) for row in zip(*points, strict=True))
     return Curve(times, left, right)
 
 
 def chain(curves: Sequence[Curve]) -> Curve:
-    """Curves that follow one another in time as one; a start that rounding puts too early is moved to its place."""
-    times = side_by_side([curve.times for curve in curves])
+    """Join Curves in order of time; knots that rounding puts before their predecessor are moved onto it."""
+    times = join_columns([curve.times for curve in curves])
     return Curve(
         np.maximum.accumulate(times, axis=1),
-        side_by_side([curve.left for curve in curves]),
-        side_by_side([curve.right for curve in curves]),
+        join_columns([curve.left for curve in curves]),
+        join_columns([curve.right for curve in curves]),
     )
 
 
 @dataclass(frozen=True)
 class Wave:
-    """amplitude · sin(ω (t − start) + phase) from `start` to `stop`, else zero; all columns (lanes or 1, 1)."""
+    """Sine wave amplitude · sin(ω (t − start) + phase) from `start` to `stop`, else zero; columns (lanes or 1, 1)."""
 
     start: Array
     stop: Array
@@ -111,7 +111,7 @@ class Wave:
 
 @dataclass(frozen=True)
 class Jump:
-    """A sudden displacement `by` of the load point at a time; columns (lanes or 1, 1)."""
+    """Sudden displacement `by` (m or rad) of the load point at `time` (s); columns (lanes or 1, 1)."""
 
     time: Array
     by: Array

@@ -1,8 +1,8 @@
-"""What channels do at a moment: the one place where lines and sine waves are evaluated.
+"""Evaluation of channels: lines plus sine waves on each segment.
 
-The formulas serve whatever has arithmetic: arrays of NumPy here, nodes of a compiled program in
-`steadyslip.kernels.record`. On a segment a channel is ``value + slope t + Σ amplitude sin(ω t + phase)`` with t counted
-from the segment's start.
+The formulas use arithmetic operators only, so they serve NumPy arrays here and nodes of compiled programs in
+`steadyslip.kernels.record`. On a segment a channel is ``value + slope t + Σ amplitude sin(ω t + phase)``, t in s from
+the segment's start.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from steadyslip.protocol.curves import Array
 from steadyslip.protocol.segments import Segments
 
 Waves = Iterable[tuple[Any, Any, Any]]
-"""Amplitude, angular frequency and phase of each."""
+"""Amplitude, angular frequency (rad/s) and phase (rad) of each wave."""
 Function = Callable[[Any], Any]
 Indices = NDArray[np.intp]
 
 
 def level_at(t: Any, value: Any, slope: Any, waves: Waves, sine: Function) -> Any:
-    """A channel at t."""
+    """Value of a channel at time t."""
     found = value + slope * t
     for amplitude, omega, phase in waves:
         found = found + amplitude * sine(omega * t + phase)
@@ -33,30 +33,30 @@ def level_at(t: Any, value: Any, slope: Any, waves: Waves, sine: Function) -> An
 
 
 def slope_at(t: Any, slope: Any, waves: Waves, cosine: Function) -> Any:
-    """Its rate of change."""
+    """Time derivative of a channel at time t."""
     for amplitude, omega, phase in waves:
         slope = slope + amplitude * omega * cosine(omega * t + phase)
     return slope
 
 
 def integral_to(t: Any, value: Any, slope: Any, waves: Waves, cosine: Function) -> Any:
-    """Its integral from the start of the segment: for the load point, how far it has moved."""
+    """Integral of a channel from the segment's start to t; for the load point its displacement."""
     found = value * t + 0.5 * slope * t * t
     for amplitude, omega, phase in waves:
         found = found + amplitude / omega * (cosine(phase) - cosine(omega * t + phase))
     return found
 
 
-# -- of segments
+# -- evaluation on Segments
 
 
 def segment_of(segments: Segments, lane: Any, time: Array) -> Indices:
-    """Index of the segment at each time, the later one at a breakpoint, the last one at the end.
+    """Index of the segment at each time: the later one at a breakpoint, the last one at the end.
 
     Parameters
     ----------
     lane : ndarray of int
-        Of each time.
+        Lane of each time.
     time : ndarray (points,)
         s.
     """
@@ -70,7 +70,7 @@ def segment_of(segments: Segments, lane: Any, time: Array) -> Indices:
 
 
 def _parts(segments: Segments, lane: Any, segment: Any) -> tuple[Any, Array, Array, list[tuple[Array, Array, Array]]]:
-    """Where to look, lines and waves; the channels are the last axis."""
+    """Index arrays, values, slopes and waves at given lanes and segments; channels are the last axis."""
     where = (lane if len(segments.start) > 1 else np.zeros_like(lane), segment)
     if not segments.amplitude.shape[-1]:
         return where, segments.value[where], segments.slope[where], []
@@ -80,14 +80,14 @@ def _parts(segments: Segments, lane: Any, segment: Any) -> tuple[Any, Array, Arr
 
 
 def inputs_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
-    """Load-point velocity (m/s), disturbances and added normal stresses (Pa): (..., channels).
+    """Channels at given times: load-point velocity (m/s), disturbances and added normal stresses (Pa), (..., channels).
 
     Parameters
     ----------
     lane, segment : ndarray of int
-        Of each time, broadcast with it.
+        Lane and segment of each time, broadcast with it.
     time : ndarray
-        Since the start of the run, s; beyond the segment its line and waves go on.
+        Since the start of the run, s; outside the segment its line and waves are extrapolated.
     """
     where, value, slope, waves = _parts(segments, lane, segment)
     found: Array = level_at((time - segments.start[where])[..., None], value, slope, waves, np.sin)
@@ -95,7 +95,7 @@ def inputs_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array
 
 
 def rates_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
-    """How fast they change, per s; see `inputs_at`."""
+    """Time derivatives of the channels (per s), (..., channels); arguments as in `inputs_at`."""
     where, _, slope, waves = _parts(segments, lane, segment)
     return np.asarray(slope_at((time - segments.start[where])[..., None], slope, waves, np.cos))
 
@@ -103,7 +103,7 @@ def rates_at(segments: Segments, lane: Any, segment: Any, time: Array) -> Array:
 def evaluate(segments: Segments, t: Any) -> tuple[Array, Array, Array]:
     """Load-point velocity (m/s), disturbance stress (Pa) and added normal stress (Pa) of the first lane at times `t`.
 
-    Just after a jump where `t` is that of a jump; at the end, just before.
+    At the time of a jump the value just after it is returned; at the end, the value just before.
 
     Raises
     ------

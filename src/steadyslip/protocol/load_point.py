@@ -1,4 +1,4 @@
-"""Pieces that move the load point. Until the first of them its velocity is that of the rig's drive."""
+"""Protocol pieces that move the load point; before the first one its velocity is that of the rig's drive."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steadyslip.core.conditions import Condition
 from steadyslip.core.domains import count, nonnegative, positive, real
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.records import parameter, samples
-from steadyslip.protocol.curves import Array, Curve, Jump, column, knots, side_by_side
+from steadyslip.protocol.curves import Array, Curve, Jump, column, join_columns, knots
 from steadyslip.protocol.protocol import Piece
 from steadyslip.protocol.shapes import FORCES, Harmonic, table_problems
 
@@ -64,11 +64,11 @@ class SlideHoldSlide(Piece, name="slide-hold-slide"):
     def curve(self, before: Any) -> Curve:
         times = self._times()
         holds = times.shape[1] // 2
-        sliding = side_by_side([column(before), np.zeros((1, 1))])
+        sliding = join_columns([column(before), np.zeros((1, 1))])
         return Curve(times, np.tile(sliding, holds), np.tile(sliding[:, ::-1], holds))
 
     def _times(self) -> Array:
-        """Start and end of every hold, in turn."""
+        """Start and end of the holds in turn (s), (lanes, 2 holds)."""
         holds = np.unique(np.asarray(self.repeats, dtype=int))
         if holds.size != 1:
             raise ParameterError([Problem("repeats", "differs between lanes; all need the same number of holds")])
@@ -135,5 +135,5 @@ class LoadPointTable(Piece, name="load-point-table"):
 
     def curve(self, before: Any) -> Curve:
         velocity = np.diff([self.displacement]) / np.diff([self.time])
-        left = side_by_side([column(before), velocity])
+        left = join_columns([column(before), velocity])
         return Curve(np.array([self.time]), left, np.append(velocity, velocity[:, -1:], axis=1))

@@ -1,4 +1,4 @@
-"""The base of the pieces of an experiment, and the protocol that they make up."""
+"""Base class of protocol pieces, and the Protocol made of them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from steadyslip.protocol.curves import Curve, Jump, Wave
 
 LOAD_POINT, DISTURBANCE, NORMAL_STRESS = range(3)
 CHANNELS = 3
-"""That are always there: load point, first disturbance, first normal stress."""
+"""Number of channels of every run: load point, first disturbance, first normal stress."""
 
 
 def channel_of(kind: int, number: int, disturbances: int) -> int:
-    """Which channel is disturbance or normal stress number 0, 1, ... of a run: further ones follow the first of each.
+    """Channel index of disturbance or normal stress number 0, 1, ... of a run.
+
+    Number 0 has the channel of its kind; other disturbances follow from `CHANNELS` on, then other normal stresses.
 
     Parameters
     ----------
@@ -29,7 +31,7 @@ def channel_of(kind: int, number: int, disturbances: int) -> int:
         `DISTURBANCE` or `NORMAL_STRESS`.
     number : int
     disturbances : int
-        How many there are in the run.
+        Number of disturbances in the run.
     """
     if number == 0:
         return kind
@@ -37,35 +39,34 @@ def channel_of(kind: int, number: int, disturbances: int) -> int:
 
 
 class Piece(FrozenRecord, family="protocol piece"):
-    """Base of the pieces of a protocol: something that happens to one channel at some time.
+    """Base of protocol pieces: each acts on one channel.
 
-    A subclass is registered under a name, says which kind of `channel` it acts on (load-point velocity,
-    disturbance stress or normal stress; a run has one of the latter two for whatever is acted on), and
-    returns what it consists of from one of the methods. Fields may be plain numbers or 1-D arrays with one
-    value for each lane.
+    A subclass is registered under a name, sets the kind of `channel` it acts on (load-point velocity, disturbance
+    stress or normal stress; a run has one of the latter two for each body or contact acted on), and overrides one of
+    the methods `curve`, `wave` and `jump`. Fields may be floats or 1-D arrays with one value per lane.
     """
 
     chosen_by: ClassVar[tuple[str, str | None]] = ("kind", None)
     channel: ClassVar[int] = LOAD_POINT
     frees_load_point: ClassVar[bool] = False
-    """Whether it tells a force of the drive's own, by which this pulls however the load point moves."""
+    """True if the piece imposes the force of the drive in place of its motion (creep)."""
     lets_go: ClassVar[bool] = False
-    """Whether the drive does that for the time of the piece, and moves before and after it."""
+    """True if the drive is released for the duration of the piece only, and moves before and after it."""
 
     def curve(self, before: Any) -> Curve | None:
-        """The part that is linear between knots.
+        """Piecewise-linear part of the piece; None if it has none.
 
-        For the load point this is the velocity itself, which is `before` (m/s) until then. For the other
-        channels it is what the piece adds, and `before` has no meaning.
+        For the load point this is the velocity, which is `before` (m/s) until the piece begins. For other channels
+        it is added to the channel, and `before` is ignored.
         """
         return None
 
     def wave(self) -> Wave | None:
-        """The sine wave that the piece adds to its channel."""
+        """Sine wave added to the channel; None if there is none."""
         return None
 
     def jump(self) -> Jump | None:
-        """A sudden displacement of the load point."""
+        """Sudden displacement of the load point; None if there is none."""
         return None
 
     def __add__(self, other: Piece | Protocol) -> Protocol:
@@ -73,7 +74,7 @@ class Piece(FrozenRecord, family="protocol piece"):
 
 
 class Protocol(FrozenRecord):
-    """What is done to a rig in an experiment: its pieces, and when it ends.
+    """Loading history of an experiment: pieces and end time.
 
     Pieces that set the load-point velocity (steps, ramps, holds, a measured table) are given in the order of
     time and do not overlap; all others add up in any order. ``a + b`` of pieces or protocols joins them, and the
@@ -91,12 +92,12 @@ class Protocol(FrozenRecord):
 
     @classmethod
     def of(cls, given: Any) -> Protocol:
-        """A protocol from what a caller may give: None, a piece, a sequence of pieces or a protocol.
+        """Convert None, a piece, a sequence of pieces or a Protocol to a Protocol.
 
         Raises
         ------
         ParameterError
-            If `given` is none of these, or pieces overlap.
+            If `given` has another type, or pieces overlap.
         """
         if given is None:
             return _NOTHING
@@ -111,16 +112,16 @@ class Protocol(FrozenRecord):
 
     @property
     def frees_load_point(self) -> bool:
-        """Whether the force of the drive is imposed in place of its motion throughout: creep."""
+        """True if the force of the drive is imposed in place of its motion during the whole run (creep)."""
         return any(piece.frees_load_point for piece in self.pieces) and not self.lets_go
 
     @property
     def lets_go(self) -> bool:
-        """Whether the drive is let go for some time: creep as a part of a run."""
+        """True if the drive is released during a part of the run."""
         return any(piece.lets_go for piece in self.pieces)
 
     def varied(self, changes: Mapping[str, Any]) -> Protocol:
-        """The protocol with arrays in place of some of its numbers, for many lanes at once.
+        """Copy of the protocol with arrays in place of some of its numbers, for many lanes at once.
 
         Parameters
         ----------
@@ -159,7 +160,7 @@ class Protocol(FrozenRecord):
             yield from spans_of(self.pieces, [curve for curve in own if curve is not None])[1]
 
     def _order(self) -> Iterator[Problem]:
-        """Pieces that set the velocity must follow each other."""
+        """Yield Problems with pieces that set the velocity and overlap or are not in order of time."""
         earlier, last_end = "", -np.inf
         for number, piece in enumerate(self.pieces, start=1):
             curve = piece.curve(0.0) if piece.channel == LOAD_POINT else None
@@ -170,9 +171,8 @@ class Protocol(FrozenRecord):
                 yield Problem(
                     f"pieces.{number}",
                     f"{piece.name or type(piece).__name__} starts at {format_quantity(start, 's')}, before "
-                    f"{earlier} ends at "
-                    f"{format_quantity(last_end, 's')}; give the pieces that set the velocity in the order of time, "
-                    "without overlap",
+                    f"{earlier} ends at {format_quantity(last_end, 's')}; give the pieces that set the "
+                    "velocity in the order of time, without overlap",
                 )
             earlier, last_end = f"piece {number} ({piece.name or type(piece).__name__})", max(end, last_end)
 

@@ -1,4 +1,4 @@
-"""A protocol cut into segments, on each of which every channel is a line plus sine waves; for the kernels."""
+"""Segments of a protocol, on each of which every channel is a line plus sine waves; input of the kernels."""
 
 from __future__ import annotations
 
@@ -14,30 +14,29 @@ from numpy.typing import NDArray
 from steadyslip.core.errors import ParameterError, Problem
 from steadyslip.core.results import read_only
 from steadyslip.protocol.creep import ROUNDING, SWITCH, Release, spans_of
-from steadyslip.protocol.curves import Array, Curve, Jump, Wave, chain, column, knots, side_by_side
+from steadyslip.protocol.curves import Array, Curve, Jump, Wave, chain, column, join_columns, knots
 from steadyslip.protocol.protocol import CHANNELS, LOAD_POINT, Protocol
 
 
 @dataclass(frozen=True)
 class Segments:
-    """Consecutive spans of time for each lane, and the channels on them.
+    """Consecutive time spans of each lane, and the channels on them.
 
-    The channels are, in this order, the load-point velocity (m/s), the disturbance stress q (Pa) and the
-    added normal stress p (Pa), then further ones of these two (`steadyslip.protocol.protocol.channel_of`). On a
-    segment a channel is ``value + slope (t - start)`` plus the sum of
-    ``amplitude sin(angular_frequency (t - start) + phase)`` over the last axis.
+    The channels are load-point velocity (m/s), disturbance stress q (Pa) and added normal stress p (Pa), then further
+    disturbances and normal stresses (`steadyslip.protocol.protocol.channel_of`). On a segment a channel is
+    ``value + slope (t - start)`` plus the sum of ``amplitude sin(angular_frequency (t - start) + phase)`` over the last
+    axis.
 
     Parameters
     ----------
     start, end : ndarray (lanes, n)
-        s; the first segment starts at 0. A lane with fewer segments than others is filled up with
-        empty ones at its end.
+        s; the first segment starts at 0. Lanes with fewer segments than others are padded with empty ones at their end.
     jump : ndarray (lanes, n)
         Displacement step of the load point at the start of the segment, m.
     value, slope : ndarray (lanes, n, channels)
-        Lines.
+        Value at the start and slope (per s) of the linear part.
     amplitude, angular_frequency, phase : ndarray (lanes, n, channels, h)
-        Sine waves, as many as are present at once at most; the rest are zero.
+        Sine waves; h is the largest number of simultaneous waves of a channel, unused ones are zero.
     """
 
     start: Array
@@ -50,22 +49,25 @@ class Segments:
     phase: Array
 
     def level(self) -> str:
-        """The least that a kernel has to know: ``"constant"``, ``"linear"`` or ``"harmonic"``."""
+        """Class of inputs that a kernel must support: ``"constant"``, ``"linear"`` or ``"harmonic"``."""
         if self.amplitude.shape[-1]:
             return "harmonic"
         return "linear" if np.any(self.slope) else "constant"
 
     def divisors(self) -> Array:
-        """Angular frequencies, 1 where there is no wave."""
+        """Angular frequencies (rad/s), 1 where there is no wave, so that one may divide by them."""
         return np.where(self.amplitude == 0, 1.0, self.angular_frequency)
 
     def rows(self, start: int, stop: int) -> Array:
-        """Those of some lanes as the kernels read them: start, end, jump, values, slopes, waves."""
+        """Segments of lanes `start` to `stop` in the layout of the kernels, (lanes or 1, n, columns).
+
+        The columns are start, end, jump, values, slopes, amplitudes, angular frequencies and phases.
+        """
         return self._rows(slice(start, stop)) if len(self.start) > 1 else self._shared_rows
 
     @cached_property
     def _shared_rows(self) -> Array:
-        """Those that all lanes share."""
+        """Kernel rows if all lanes have the same segments, (1, n, columns)."""
         return self._rows(slice(None))
 
     def _rows(self, lanes: slice) -> Array:
@@ -79,7 +81,7 @@ class Segments:
 
 @dataclass
 class _Terms:
-    """What the pieces consist of, by kind."""
+    """Curves and waves with their channel, jumps and creep spans of all pieces of a protocol."""
 
     curves: list[tuple[int, Curve]] = field(default_factory=list)
     waves: list[tuple[int, Wave]] = field(default_factory=list)
@@ -97,7 +99,7 @@ class _Terms:
             yield from span.breakpoints()
 
     def lanes(self, *others: Array) -> int:
-        """Number of lanes that all arrays agree on."""
+        """Number of lanes; raises ParameterError if arrays have different lengths other than 1."""
         lengths = {len(part) for part in (*others, *self.breakpoints())}
         lengths |= {len(part) for _, curve in self.curves for part in (curve.left, curve.right)}
         lengths |= {len(part) for _, w in self.waves for part in (w.amplitude, w.angular_frequency, w.phase)}
@@ -118,9 +120,9 @@ def pack(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...
     velocity : float or 1-D array
         Velocity of the rig's drive, m/s.
     until : float or 1-D array
-        End of each lane, s; what comes later, or at this very time, is cut.
+        End of each lane, s; the protocol is cut there, and changes at this very time have no effect.
     channels : tuple of int, optional
-        That of each piece; the first of its kind unless given.
+        Channel of each piece; by default the first one of its kind.
 
     Returns
     -------
@@ -134,11 +136,11 @@ def pack(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...
     try:
         hash((protocol, velocity, until))
     except TypeError:  # arrays
-        return _packed(protocol, velocity, until, channels)
-    return _packed_before(protocol, velocity, until, channels)
+        return _segments(protocol, velocity, until, channels)
+    return _cached_segments(protocol, velocity, until, channels)
 
 
-def _packed(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...] | None) -> Segments:
+def _segments(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, ...] | None) -> Segments:
     final = column(until)
     if not np.all((final > 0) & np.isfinite(final)):
         raise ParameterError([Problem("until", f"got {until!r}; allowed: a finite number > 0 in s")])
@@ -152,20 +154,20 @@ def _packed(protocol: Protocol, velocity: Any, until: Any, channels: tuple[int, 
     for step in terms.jumps:
         jump += np.where((start == step.time) & (start < end), step.by, 0.0)
     for channel, curve in terms.curves:
-        level, rate = curve.on(start)
+        level, rate = curve.value_and_slope(start)
         value[:, :, channel] += level
         slope[:, :, channel] += rate
     for span in terms.spans:
-        span.tell(start, value, slope)
+        span.add_to(start, value, slope)
     waves = _waves(terms.waves, start, end, (*shape, count))
-    return Segments(_full(start, shape), _full(end, shape), jump, value, slope, *waves)
+    return Segments(_broadcast(start, shape), _broadcast(end, shape), jump, value, slope, *waves)
 
 
 @lru_cache(maxsize=32)
-def _packed_before(
+def _cached_segments(
     protocol: Protocol, velocity: float, until: float, channels: tuple[int, ...] | None
 ) -> Segments:  # fmt: skip
-    return Segments(*map(read_only, vars(_packed(protocol, velocity, until, channels)).values()))
+    return Segments(*map(read_only, vars(_segments(protocol, velocity, until, channels)).values()))
 
 
 def _terms(protocol: Protocol, velocity: Any, channels: tuple[int, ...]) -> _Terms:
@@ -197,8 +199,8 @@ def _terms(protocol: Protocol, velocity: Any, channels: tuple[int, ...]) -> _Ter
 
 
 def _grid(breakpoints: list[Array], final: Array) -> tuple[Array, Array]:
-    """Start and end of the segments between breakpoints; empty ones last, and only where a lane needs them."""
-    points = np.clip(side_by_side([np.zeros((1, 1)), *breakpoints, final]), 0, final)
+    """Start and end (s) of the segments between breakpoints, each (lanes, n); empty segments are last."""
+    points = np.clip(join_columns([np.zeros((1, 1)), *breakpoints, final]), 0, final)
     points.sort(axis=1)
     repeated = points[:, 1:] == points[:, :-1]
     points[:, 1:] = np.where(repeated, final, points[:, 1:])
@@ -208,7 +210,10 @@ def _grid(breakpoints: list[Array], final: Array) -> tuple[Array, Array]:
 
 
 def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, sizes: tuple[int, ...]) -> tuple[Array, ...]:
-    """Amplitude, angular frequency and phase of the waves on each segment, each channel's own from the first place."""
+    """Amplitude, angular frequency and phase on each segment, each (lanes, n, channels, h).
+
+    The waves that are present on a segment take the slots 0, 1, ... of their channel.
+    """
     *shape, channels = sizes
     if not terms:
         return tuple(np.zeros((*sizes, 0)) for _ in range(3))
@@ -220,7 +225,7 @@ def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, sizes: tuple
         taken[channel] += present
     found = tuple(np.zeros((*sizes, int(taken.max(initial=0)))) for _ in range(3))
     for (channel, wave), present, place in zip(terms, active, places, strict=True):
-        lane, segment = np.nonzero(_full(present, tuple(shape)))
+        lane, segment = np.nonzero(_broadcast(present, tuple(shape)))
         slot = place[lane, segment]
         phase = wave.angular_frequency * (start - wave.start) + wave.phase
         for array, numbers in zip(found, (wave.amplitude, wave.angular_frequency, phase), strict=True):
@@ -228,5 +233,5 @@ def _waves(terms: list[tuple[int, Wave]], start: Array, end: Array, sizes: tuple
     return found
 
 
-def _full(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def _broadcast(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     return np.ascontiguousarray(np.broadcast_to(array, shape))

@@ -1,4 +1,4 @@
-"""The shapes in time that a change of stress may have, for any channel: step, pulse, ramp, wave and table."""
+"""Base classes of stress pieces by shape in time, for any channel: step, pulse, ramp, wave and table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from steadyslip.protocol.curves import Curve, Wave, column, knots
 from steadyslip.protocol.protocol import Piece
 
 FORCES = ("N", "N m")
-"""What stresses are of a rig with an area, or of a machine."""
+"""Units in which rigs with an area and machines give stresses."""
 
 
 class StressStep(Piece):
@@ -93,7 +93,7 @@ class StressTable(Piece):
 
 
 def table_problems(time: Sequence[float], name: str, values: Sequence[float]) -> Iterator[Problem]:
-    """What is wrong with two columns that are each right by themselves."""
+    """Yield Problems with a table: lengths, order of times, or changes too fast for floating point."""
     if len(time) < 2:
         yield Problem("time", f"got {len(time)} samples; allowed: two or more")
     if len(values) != len(time):

@@ -1,4 +1,4 @@
-"""Pieces that act on the block: a disturbance stress, normal stress added to the contact law's, creep, injection."""
+"""Protocol pieces that act by stresses: disturbance of the block, added normal stress, creep, injection."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steadyslip.protocol.shapes import Harmonic, StressPulse, StressRamp, Stress
 
 
 class OnNormalStress(Piece):
-    """Base of what is added to the normal stress of the contact law; of a machine, to the force on one contact."""
+    """Base of pieces that add to the normal stress of the contact law, or the normal force of a machine's contact."""
 
     channel: ClassVar[int] = NORMAL_STRESS
 
@@ -19,7 +19,7 @@ class OnNormalStress(Piece):
 
 
 class OnBlock(Piece):
-    """Base of the disturbance stress q, which pushes the block forward; of a machine, a force or torque on one body."""
+    """Base of pieces with a disturbance stress q that pushes the block, or a force or torque on a machine's body."""
 
     channel: ClassVar[int] = DISTURBANCE
 
@@ -27,7 +27,7 @@ class OnBlock(Piece):
 
 
 class OnPores(Piece):
-    """Base of what changes the pressure around a contact with pore fluid (theory 4), as injection does."""
+    """Base of pieces that change the pressure around a contact with pore fluid (theory 4), such as injection."""
 
     channel: ClassVar[int] = NORMAL_STRESS
 
@@ -35,9 +35,10 @@ class OnPores(Piece):
 
 
 class OnDrive(Piece):
-    """Base of loading at imposed stress, creep: the drive pulls as much more as the piece says, whatever the block
-    does; nothing holds its motion back. Beside pieces that let the drive go this lasts until it moves on, and is beyond
-    the force with which it was let go; without them it is throughout the run, and beyond that of steady sliding.
+    """Base of creep pieces: the stress of the drive is imposed, and its motion is free.
+
+    The piece adds to the stress at the drive's release if another piece releases the drive, and lasts until it moves
+    again; otherwise it adds to the stress in steady sliding, and the drive is free during the whole run.
     """
 
     channel: ClassVar[int] = DISTURBANCE

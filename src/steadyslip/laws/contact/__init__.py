@@ -1,4 +1,4 @@
-"""Contact laws: the normal stress as a function of displacement, velocity, acceleration and forces."""
+"""Contact laws: normal stress as a function of displacement, velocity, acceleration and forces."""
 
 from steadyslip.laws.contact.basic import Constant, Linear, Prescribed, pressed_at
 from steadyslip.laws.contact.compliant import Compliant
@@ -16,7 +16,7 @@ from steadyslip.laws.contact.mechanisms import (
 )
 
 USUAL = Constant.name
-"""The law of files that name none."""
+"""Default contact law of rig files."""
 
 __all__ = [
     "USUAL",

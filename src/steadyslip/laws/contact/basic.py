@@ -1,4 +1,4 @@
-"""Contacts described by their normal stress alone: constant, prescribed in time, general linear."""
+"""Contact laws without a mechanism: constant, prescribed in time, general linear."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Constant(PreloadedContact, name="constant"):
 
 
 def pressed_at(stress: float) -> Constant:
-    """The contact of a press that holds a normal stress (Pa)."""
+    """Contact with a constant normal stress (Pa)."""
     return Constant(steady_normal_stress=stress)
 
 

@@ -1,4 +1,4 @@
-"""A contact that gives: its normal stress follows from how far the surfaces are pressed together."""
+"""Compliant contact: normal stress from the approach of the surfaces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class Compliant(ContactLaw, name="compliant"):
     """Surfaces with a normal stiffness and damping: σ = −k_n u − c_n u̇ with u their distance (theory 11).
 
     For bodies of a machine that move away from the surface (`PlanarBody`), so that normal and tangential vibration
-    couple. What presses the surfaces together in steady sliding follows from the balance of forces.
+    couple. The steady normal force follows from the balance of forces.
     """
 
     normal_stiffness: float = parameter("Pa/m", positive, "normal stiffness k_n", kind="stiffness", letter="k_n")

@@ -1,4 +1,4 @@
-"""A contact whose pores hold a fluid: slip dilates them, the fluid is sucked in, and presses less for a while."""
+"""Contact with pore fluid: dilatancy lowers pore pressure, which drainage restores."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from steadyslip.laws.contact.law import Expression, Motion, PreloadedContact
 class PoreFluid(PreloadedContact, name="pore-fluid"):
     """Pore fluid with dilatancy and drainage (Segall & Rice 1995; theory 4): σ' = σ0 − p, the effective normal stress.
 
-    Porosity φ follows slip, φ̇ = −(v/d_c)[φ − φ0 − ε ln(v/v_ref)], and pore pressure p, counted from that around,
-    ṗ = −c* p − φ̇/β. Here both are pressures, D = (φ − φ0)/β and p, and `suction` is ε/β: by so much the pressure would
-    fall for each e-fold of velocity if nothing drained. What is injected changes the pressure around, p∞, by a part of
-    the protocol: ṗ = −c* (p − p∞) − φ̇/β. `preload` is the effective one.
+    Porosity φ follows slip, φ̇ = −(v/d_c)[φ − φ0 − ε ln(v/v_ref)], and pore pressure p, relative to the surroundings,
+    ṗ = −c* p − φ̇/β. The states are both pressures, D = (φ − φ0)/β and p, and `suction` is ε/β, the undrained fall of
+    pressure per e-fold of velocity. Injection (a piece of the protocol) changes the surrounding pressure p∞:
+    ṗ = −c* (p − p∞) − φ̇/β. `preload` is an effective stress.
     """
 
     suction: float = parameter("Pa", real, "fall of pore pressure ε/β per e-fold of velocity, undrained")

@@ -1,4 +1,4 @@
-"""What every contact law provides: the normal stress as a function of the motion."""
+"""Base classes of contact laws, and the motion that they depend on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Expression = Any  # SymPy expression, or a plain number when a law is evaluated 
 
 @dataclass(frozen=True)
 class Motion:
-    """Everything that a normal stress may depend on; the symbols handed to a contact law.
+    """Variables that a normal stress may depend on; passed to the methods of a contact law.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class Motion:
     steady_velocity
         v0 (m/s): velocity of slip in steady sliding.
     separation, steady_separation, separation_rate
-        Distance (m) of the surfaces from where they just touch, in steady sliding too, and its rate (m/s). Only bodies
-        of a machine that move away from the surface have one; a law that depends on it is `is_compliant`.
+        Distance (m) of the surfaces from first touch, its steady value and its rate (m/s). Nonzero only for bodies of
+        a machine that move away from the surface; a law that depends on it returns True from `is_compliant`.
     memory, steady_memory
-        The law's own states, in steady sliding too; empty for most.
+        States of the law and their steady values; empty for most laws.
     outside
-        Change (Pa) of the pressure around the contact, of laws that have pores.
+        Change (Pa) of the pressure around the contact, for laws with pores.
     """
 
     slip: Expression
@@ -58,7 +58,7 @@ class Motion:
 
     @property
     def steady(self) -> Motion:
-        """The same contact in steady sliding."""
+        """Values of all variables in steady sliding."""
         return replace(
             self,
             slip=0,
@@ -75,7 +75,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Shape:
-    """How a mechanism is sketched.
+    """Shape of the sketch of a mechanism.
 
     Attributes
     ----------
@@ -84,11 +84,11 @@ class Shape:
     tilt : float
         Angle (rad) by which the surface rises in the direction of sliding.
     between : str
-        What is between the surfaces: ``film``, ``layer`` or nothing.
+        Material between the surfaces: ``film``, ``layer`` or empty.
     part : str
-        What there is besides: ``wedge``, ``crank`` or nothing.
+        Additional part: ``wedge``, ``crank`` or empty.
     load : str
-        Letter of what presses the block from above; empty where nothing does.
+        Letter of the load from above; empty if there is none.
     """
 
     rise: float = 0.0
@@ -101,10 +101,9 @@ class Shape:
 class ContactLaw(FrozenRecord, family="contact law"):
     """Base of contact laws: normal stress σ (Pa, compression positive) from the motion.
 
-    σ = `load` + `coupling`(motion): a part that does not depend on the motion, and one that does. Where
-    the law is given by its steady normal stress instead of its load, the coupling counts from its
-    steady value. σ <= 0 is loss of contact. Laws are pure, read their own fields, return SymPy
-    expressions.
+    σ = `load` + `coupling`(motion): a constant part and one that depends on the motion. If the steady normal stress is
+    given instead of the load, σ is that plus the change of the coupling from its steady value. σ <= 0 is loss of
+    contact. Methods are pure, read the record's own fields and return SymPy expressions.
     """
 
     def load(self) -> Expression | None:
@@ -112,7 +111,7 @@ class ContactLaw(FrozenRecord, family="contact law"):
         raise NotImplementedError
 
     def steady_stress(self) -> Expression | None:
-        """Normal stress in steady sliding, σss (Pa), where it is given instead of the load."""
+        """Normal stress in steady sliding, σss (Pa), if given instead of the load; else None."""
         return None
 
     def coupling(self, motion: Motion) -> Expression:
@@ -120,60 +119,63 @@ class ContactLaw(FrozenRecord, family="contact law"):
         return 0
 
     def memory(self) -> tuple[str, ...]:
-        """Names of the law's own states, which are continuous; empty for a law without."""
+        """Names of the law's states, which are continuous in time; empty if there are none."""
         return ()
 
     def memory_units(self) -> tuple[str, ...]:
-        """SI units of the states."""
+        """SI units of the states; Pa unless overridden."""
         return tuple("Pa" for _ in self.memory())
 
     def rates(self, motion: Motion) -> tuple[Expression, ...]:
-        """Time derivatives of the states."""
+        """Time derivatives of the states (their unit per s)."""
         return ()
 
     def steady_memory(self, velocity: Expression) -> tuple[Expression, ...]:
-        """The states in steady sliding at a `velocity` > 0."""
+        """States in steady sliding at a `velocity` > 0 (m/s)."""
         return ()
 
     def is_imposed(self) -> bool:
-        """Whether the normal stress is given from outside, whatever the block does."""
+        """True if the normal stress does not depend on the motion."""
         return type(self).coupling is ContactLaw.coupling
 
     def has_pores(self) -> bool:
-        """Whether fluid in its pores feels the pressure around, `Motion.outside`."""
+        """True if the law depends on the surrounding pore pressure, `Motion.outside`."""
         return False
 
     def is_compliant(self) -> bool:
-        """Whether it depends on the distance of the surfaces, so that bodies must be able to move apart."""
+        """True if the law depends on the distance of the surfaces, so that its body must be able to move away."""
         return False
 
     def imposed(self, time: Expression) -> Expression:
-        """Prescribed change of normal stress with time (Pa), zero on average."""
+        """Prescribed change of normal stress (Pa) as a function of `time` (s), zero on average."""
         return 0
 
     def normal_stress(self, motion: Motion) -> Expression:
-        """Normal stress σ (Pa), the imposed part left out."""
+        """Normal stress σ (Pa) without the `imposed` part."""
         load = self.load()
         if load is not None:
             return load + self.coupling(motion)
         return self.steady_stress() + self.coupling(motion) - self.coupling(motion.steady)
 
     def sliding_stiffness(self, axial_stiffness: Expression) -> Expression:
-        """Stiffness along the sliding direction of a spring with the given stiffness along its axis."""
+        """Stiffness k (Pa/m) along the slide of a spring with the given stiffness (Pa/m) along its axis.
+
+        Raises NotAvailable for laws without an inclined axis.
+        """
         raise NotAvailable(
             f"the contact {self.name!r} has no axis at an angle; give stiffness instead of axial_stiffness"
         )
 
     def has_axis(self) -> bool:
-        """Whether `sliding_stiffness` is defined."""
+        """True if `sliding_stiffness` is defined."""
         return type(self).sliding_stiffness is not ContactLaw.sliding_stiffness
 
     def lock_up(self, friction_coefficient: float) -> str:
-        """The lock-up condition in this law's own terms, empty if it has none to add."""
+        """Lock-up condition in terms of the law's parameters, for messages; empty if there is none."""
         return ""
 
     def shape(self) -> Shape:
-        """How the mechanism is sketched: a block on a plane, pulled along it."""
+        """Shape of the law's sketch; a block pulled along a plane unless overridden."""
         return Shape()
 
 

@@ -1,7 +1,7 @@
-"""Mechanisms whose geometry makes the normal stress depend on the motion.
+"""Contact laws of mechanisms whose geometry makes the normal stress depend on the motion.
 
-Each docstring gives geometry, sign convention and the coefficients B0...B3 of eq. 12 that it comes
-down to (theory 3); the tests derive them from `coupling`. Sketches: docs/explanation/contacts.md.
+Each docstring gives geometry, sign convention and the equivalent coefficients B0...B3 of eq. 12 (theory 3), which
+the tests derive from `coupling`. Sketches: docs/explanation/contacts.md.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class SliderCrank(PreloadedContact, name="slider-crank"):
         yield Condition("rod_length", longer, message, (self.rod_length, self.crank_radius))
 
     def _tangent(self) -> Expression:
-        """tan ψ from the geometry."""
+        """Tangent of the rod angle ψ, from the crank's geometry."""
         sine = self.crank_radius / self.rod_length * sp.sin(self.crank_angle)
         tangent = sine / sp.sqrt(1 - sine**2)
         return tangent if self.stroke == "pull" else -tangent

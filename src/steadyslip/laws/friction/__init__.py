@@ -1,4 +1,4 @@
-"""Friction laws: τ(v, σ, memory), the evolution of the memory, and the steady state."""
+"""Friction laws: friction stress τ(v, σ, memory), rates of the memory variables, and the steady state."""
 
 from steadyslip.laws.friction.bristle import CoulombStribeck, LuGre
 from steadyslip.laws.friction.evolution import PRZ, Aging, Evolution, Nagata, Slip
@@ -8,7 +8,7 @@ from steadyslip.laws.friction.rate_state import RateState
 from steadyslip.laws.friction.state import State
 
 USUAL = RateState.name
-"""The law of files that name none."""
+"""Default friction law of rig files."""
 
 __all__ = [
     "PRZ",

@@ -1,4 +1,4 @@
-"""Laws of machine friction: LuGre bristles, and the memoryless Coulomb–Stribeck curve."""
+"""Friction laws of machines: LuGre bristles, and Coulomb–Stribeck friction without memory."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from steadyslip.core.records import parameter
 from steadyslip.laws.friction.law import Expression, FrictionLaw
 
 REST = sp.Rational(1, 10**12)
-"""Of the Stribeck velocity: below it friction no longer follows a curve whose slope at rest may be infinite."""
+"""Fraction of v_S below which the Stribeck curve is flat, as its slope at rest would be infinite for δ_S < 1.
+Chosen by trial, far below any velocity of interest."""
 
 
 class StribeckCurve(FrictionLaw):
     """Base of laws with the Stribeck curve g(v) = μ_C + (μ_S − μ_C) exp(−|v/v_S|^δ_S).
 
-    The exponent δ_S is 2 unless given (Gauss). Lubricated and dry pairs were measured from 0.5 to 2 and more
-    (Armstrong-Hélouvry 1991): with 2 friction hardly falls far below v_S, with 1 and less it falls most at rest.
+    The exponent δ_S is 2 unless given (Gauss). Measured exponents of lubricated and dry pairs range from 0.5 to over 2
+    (Armstrong-Hélouvry 1991): with 2, friction is almost flat far below v_S; with 1 or less it falls most at rest.
     """
 
     mu_coulomb: float = parameter("1", positive, "Coulomb friction coefficient μ_C")
@@ -28,7 +29,7 @@ class StribeckCurve(FrictionLaw):
     )
 
     def _curve(self, v: Expression) -> Expression:
-        """g(v), the falling part of the friction coefficient."""
+        """Stribeck curve g(v): friction coefficient without the viscous part."""
         fast = (v / self.v_stribeck) ** 2
         if self.stribeck_exponent is not None:
             fast = (fast + REST**2) ** (self.stribeck_exponent / 2)
@@ -36,13 +37,13 @@ class StribeckCurve(FrictionLaw):
 
 
 class CoulombStribeck(StribeckCurve, name="coulomb-stribeck"):
-    """Friction that depends on velocity only, on the present one or on that of a moment ago.
+    """Friction as a function of velocity only, of the present one or of the one a time lag ago.
 
     τ = σ[g(v) + σ2 v], g as in `StribeckCurve`. Without a memory there is no critical stiffness: where friction falls
-    with velocity, the quasistatic problem is ill-posed and with mass no stiffness stabilises. Here to show just that.
+    with velocity, the quasistatic problem is ill-posed, and with mass no stiffness stabilises.
 
-    With a `lag` δ the curve follows velocity late, τ = σ[g(v(t − δ)) + σ2 v(t)]: the frictional memory of
-    Hess & Soom (1990) and Armstrong-Hélouvry (1991). Then stiffnesses are stable and unstable by turns.
+    With a `lag` δ the curve depends on the earlier velocity, τ = σ[g(v(t − δ)) + σ2 v(t)]: the frictional memory of
+    Hess & Soom (1990) and Armstrong-Hélouvry (1991). Intervals of stable and unstable stiffness then alternate.
     """
 
     lag: float = parameter(

@@ -1,7 +1,7 @@
-"""How the state of rate-and-state friction evolves with slip and time at constant normal stress.
+"""Evolution laws of the state of rate-and-state friction at constant normal stress.
 
-Θ is the dimensionless state, −ln(v/v*) in steady sliding for every law, so that slip, aging and PRZ
-share one linearisation and differ only beyond it.
+Θ is the dimensionless state, −ln(v/v*) in steady sliding for every law, so slip, aging and PRZ laws have the same
+linearisation and differ only in higher order.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from steadyslip.laws.friction.state import State
 
 
 class Evolution(FrozenRecord, family="evolution law"):
-    """Base of evolution laws: dΘ/dt at constant normal stress."""
+    """Base of evolution laws: rate dΘ/dt at constant normal stress."""
 
     def rate(self, v: Expression, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
         """Rate of Θ (1/s) at slip rate `v` >= 0, slip distance `d_c` and reference rate `v_ref`."""
@@ -29,31 +29,31 @@ class Evolution(FrozenRecord, family="evolution law"):
     def scaled_rate(
         self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
     ) -> Expression:
-        """Rate of bΘ (1/s) from bΘ itself."""
+        """Rate of bΘ (1/s) as a function of bΘ; override if it is defined for b = 0."""
         return b * self.rate(v, b_theta / b, d_c, v_ref)
 
     def divides(self) -> bool:
-        """Whether `scaled_rate` divides by b."""
+        """True if `scaled_rate` divides by b."""
         return type(self).scaled_rate is Evolution.scaled_rate
 
     def offset(self, sigma: Expression, tau: Expression) -> Expression:
-        """What the memory variable Ψ holds beside bΘ, as a function of the stresses, integrated exactly that way."""
+        """Difference Ψ − bΘ as a function of the stresses: a part of the state that responds to them at once."""
         return sp.Integer(0)
 
     def has_offset(self) -> bool:
-        """Whether the state follows the stresses."""
+        """True if `offset` is overridden: the state responds to stresses."""
         return type(self).offset is not Evolution.offset
 
     def problems(self, states: Sequence[State], memory: NormalMemory) -> Iterator[Problem]:
-        """Problems with what is given together; names are those of the friction law's fields."""
+        """Yield Problems with forbidden combinations; names are those of the friction law's fields."""
         yield from ()
 
     def conditions_with(self, b: Expression) -> Iterator[Condition]:
-        """Relations that numbers must obey together; `b` is the friction law's, if it has one state."""
+        """Yield conditions between parameters; `b` is that of the friction law if it has one state."""
         yield from ()
 
     def state_time(self, state: Expression, d_c: Expression, v_ref: Expression) -> Expression:
-        """The usual state θ in seconds that belongs to Θ: Θ = ln(v* θ/d_c) unless stated otherwise."""
+        """State θ (s) in its usual form, from Θ = ln(v* θ/d_c) unless overridden."""
         return d_c / v_ref * sp.exp(state)
 
 
@@ -66,7 +66,7 @@ class Slip(Evolution, name="slip"):
     def scaled_rate(
         self, v: Expression, b_theta: Expression, b: Expression, d_c: Expression, v_ref: Expression
     ) -> Expression:
-        return -v / d_c * (b * sp.log(v / v_ref) + b_theta)  # without division by b, which may be zero
+        return -v / d_c * (b * sp.log(v / v_ref) + b_theta)  # no division by b, which may be zero
 
 
 class Aging(Evolution, name="aging"):
@@ -89,7 +89,7 @@ class PRZ(Evolution, name="prz"):
 class Nagata(Aging, name="nagata"):
     """Nagata law (Nagata et al. 2012): aging with an extra −(c_N θ/b) d(τ/σ)/dt.
 
-    The extra term is integrated exactly by the memory variable Ψ = bΘ + c_N τ/σ; `rate` is the aging part.
+    The memory variable Ψ = bΘ + c_N τ/σ integrates the extra term exactly; `rate` is the aging part.
     """
 
     c_nagata: float = parameter("1", nonnegative, "stress-weakening coefficient c_N", idle=0.0)

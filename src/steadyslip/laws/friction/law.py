@@ -1,4 +1,4 @@
-"""What every friction law provides: strength, memory, and the steady state."""
+"""Base class of friction laws: strength, memory variables, and the steady state."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ Expression = Any  # SymPy expression, or a plain number when a law is evaluated 
 
 
 class FrictionLaw(FrozenRecord, family="friction law"):
-    """Base of friction laws: τ(v, σ, memory) and the evolution of the memory.
+    """Base of friction laws: stress τ(v, σ, memory) and rates of the memory variables.
 
-    A law works in *memory variables*: combinations of its states that stay continuous when velocity
-    or normal stress jump (theory: Φ, σ_e, z). Every method is pure, reads the record's own fields and
-    returns SymPy expressions; the same methods serve numbers and symbols.
+    Memory variables are combinations of the states that stay continuous when velocity or normal stress jump (theory:
+    Φ, σ_e, z). Every method is pure, reads the record's own fields and returns SymPy expressions; the same methods
+    serve numbers and symbols.
 
-    Subclasses set ``memory`` and define `strength`, `rates` and `steady_memory`; the rest has defaults.
-    Stresses are in Pa per unit nominal area, velocity in m/s, positive in the direction of loading.
+    Subclasses define `memory`, `strength`, `rates` and `steady_memory`; all other methods have defaults. Stresses are
+    in Pa per unit nominal area, velocity in m/s, positive in the direction of loading.
     """
 
     compared: ClassVar[tuple[str, ...]] = ()
 
     def memory(self) -> tuple[str, ...]:
-        """Names of the memory variables, in the order used everywhere; empty for a law without."""
+        """Names of the memory variables, in the order of all other methods; empty if there are none."""
         return ()
 
     def memory_units(self) -> tuple[str, ...]:
@@ -37,14 +37,14 @@ class FrictionLaw(FrozenRecord, family="friction law"):
     def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         """Friction stress τ (Pa).
 
-        `tau` is the stress itself, for the rare law (Nagata) whose state depends on it; others ignore it.
+        `tau` is the friction stress itself, for laws whose state depends on it (Nagata); others ignore it.
         """
         raise NotImplementedError
 
     def rates(
         self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
     ) -> tuple[Expression, ...]:
-        """Time derivatives of the memory variables (1/s times their unit)."""
+        """Time derivatives of the memory variables (their unit per s)."""
         return ()
 
     def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
@@ -56,47 +56,47 @@ class FrictionLaw(FrozenRecord, family="friction law"):
         return self.strength(v, sigma, self.steady_memory(v, sigma), sp.nan)
 
     def lateness(self) -> Expression:
-        """Time (s) by which friction follows velocity late; 0 for laws whose memory fades with slip or not at all."""
+        """Time delay (s) of friction behind velocity; 0 for laws without a delay."""
         return 0
 
     def late_strength(
         self, v: Expression, late: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
     ) -> Expression:
-        """`strength` of a law with a `lateness`: `late` is the velocity that long ago."""
+        """Friction stress (Pa) of a law with a delay; `late` is the velocity (m/s) a time `lateness` ago."""
         return self.strength(v, sigma, memory, tau)
 
     def direction(self, v: Expression, velocity: Expression) -> Expression:
-        """What motion takes for sign(v), wherever the law says sign: a step at rest cannot be integrated.
+        """Smooth replacement of sign(v) in simulations, which cannot integrate a step at rest.
 
-        Unless overridden a smooth step: the block creeps at below a millionth of the drive's `velocity` where it would
-        stick. A law whose strength has no step at rest has no use for this.
+        By default tanh(v/w) with w a millionth of the drive's `velocity` (m/s), so that a block that should stick
+        creeps more slowly than w. The smaller w, the stiffer the equations; a millionth is chosen by trial.
         """
         return sp.tanh(v / (1e-6 * velocity))
 
     def completed_by(self, other: FrictionLaw) -> FrictionLaw:
-        """This law, as fitted to records, with what they cannot tell taken from `other`."""
+        """Copy of this fitted law with parameters that the records cannot determine taken from `other`."""
         return self
 
     def alternatives(self) -> Mapping[str, FrictionLaw]:
-        """Laws of the same kind that records may speak for instead, by label; `compared` are tried by default."""
+        """Alternative laws to compare in a fit, by label; those listed in `compared` are fitted by default."""
         return {}
 
     def runs_away(self) -> bool:
-        """Whether friction alone, without mass or damping, lets velocity grow beyond all bounds in finite time."""
+        """True if velocity can become infinite in finite time under this law without mass and damping."""
         return False
 
     def motion_conditions(self) -> Iterator[Condition]:
-        """Relations between numbers that motion needs beyond small perturbations; as `conditions`, named likewise."""
+        """Yield conditions between parameters that simulation needs in addition to `conditions`."""
         yield from ()
 
     def observables(
         self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
     ) -> dict[str, tuple[Expression, str]]:
-        """What the field calls the states, from the memory variables: name to (expression, SI unit)."""
+        """States in the literature's form as functions of the memory variables: name to (expression, SI unit)."""
         return {
             name: (value, unit) for name, value, unit in zip(self.memory(), memory, self.memory_units(), strict=True)
         }
 
     def meanings(self) -> dict[str, str]:
-        """What `observables` mean, in a few words for people who do not know the law, by name; none must be told."""
+        """Short explanations of `observables`, by name, for readers who do not know the law; may be incomplete."""
         return {}

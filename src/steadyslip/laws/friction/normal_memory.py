@@ -1,4 +1,4 @@
-"""How friction remembers its normal-stress history. One class is one memory: strength, rate or offset."""
+"""Laws for the memory of normal stress: the response of friction to its history; one class per law."""
 
 from __future__ import annotations
 
@@ -17,75 +17,75 @@ from steadyslip.laws.friction.state import State
 class NormalMemory(FrozenRecord, family="memory of normal stress"):
     """Base of the laws for the memory of normal stress.
 
-    A memory acts in one of two ways, or both. It may put another stress in the place of σ in τ = σ μ(v, bΘ):
-    `strength`, of memory variables of its own that follow `rates`. Or it may shift the state when σ changes: the memory
-    variable is then Ψ = bΘ + `offset`(σ), which stays continuous when σ jumps, so that no rate of σ is needed. Methods
-    are pure, read the record's own fields and return SymPy expressions.
+    A memory acts in one of two ways, or both. Either `strength`, a function of additional memory variables with
+    `rates`, replaces σ in τ = σ μ(v, bΘ). Or the state shifts when σ changes: the memory variable is then
+    Ψ = bΘ + `offset`(σ), which stays continuous when σ jumps, so that no rate of σ is needed. Methods are pure, read
+    the record's own fields and return SymPy expressions.
     """
 
-    # A strength of its own.
+    # strength
 
     def memory(self) -> tuple[str, ...]:
-        """Names of its own memory variables; none unless overridden."""
+        """Names of the additional memory variables; none by default."""
         return ()
 
     def memory_units(self) -> tuple[str, ...]:
-        """Their SI units; stresses unless overridden."""
+        """SI units of the additional memory variables; Pa by default."""
         return tuple("Pa" for _ in self.memory())
 
     def meanings(self) -> dict[str, str]:
-        """What its own memory variables mean, in a few words, by name; none must be told."""
+        """Short explanations of the additional memory variables, by name; may be incomplete."""
         return {}
 
     def strength(self, sigma: Expression, own: tuple[Expression, ...]) -> Expression:
-        """The stress (Pa) that friction is proportional to, from σ and its own memory variables."""
+        """Stress (Pa) that friction is proportional to, from σ and the additional memory variables."""
         return sigma
 
     def rates(
         self, speed: Expression, sigma: Expression, own: tuple[Expression, ...], distance: Expression
     ) -> tuple[Expression, ...]:
-        """Time derivatives of its own memory variables, at slip rate `speed` >= 0.
+        """Time derivatives of the additional memory variables at slip rate `speed` >= 0 (m/s).
 
-        `distance` is the slip distance of friction, None where that has several.
+        `distance` is the slip distance d_c (m) of the friction law, None if it has several.
         """
         return ()
 
     def steady_memory(self, sigma: Expression) -> tuple[Expression, ...]:
-        """Its own memory variables in steady sliding."""
+        """Additional memory variables in steady sliding."""
         return ()
 
     def steady_strength(self, sigma: Expression) -> Expression:
-        """`strength` in steady sliding; override it where that is shorter."""
+        """Value of `strength` in steady sliding (Pa); override if a shorter expression exists."""
         return self.strength(sigma, self.steady_memory(sigma))
 
     def has_strength(self) -> bool:
-        """Whether friction is proportional to anything but σ."""
+        """True if `strength` is overridden: friction is proportional to a stress other than σ."""
         return type(self).strength is not NormalMemory.strength
 
-    # A shift of the state.
+    # shift of the state
 
     def offset(self, sigma: Expression) -> Expression:
-        """Ψ − bΘ: what the memory variable holds beside the state, as a function of σ."""
+        """Difference Ψ − bΘ of memory variable and state, as a function of σ (Pa)."""
         return sp.Integer(0)
 
     def parts(self, states: Sequence[State]) -> tuple[Expression, ...]:
-        """Parts of `offset` that belong to each of several states: as their b unless overridden."""
+        """Shares of `offset` for each of several states: proportional to their b by default."""
         total = sum(state.b for state in states)
         return tuple(state.b / total for state in states)
 
     def has_offset(self) -> bool:
-        """Whether it shifts the state."""
+        """True if `offset` is overridden: normal stress shifts the state."""
         return type(self).offset is not NormalMemory.offset
 
-    # What it needs of the friction law; names are those of the friction law's fields.
+    # requirements on the friction law; names are those of its fields
 
     def problems(self, states: Sequence[State]) -> Iterator[Problem]:
-        """Problems with what is given together; `states` are those of the friction law, if it has several."""
+        """Yield Problems with forbidden combinations; `states` are those of the friction law, if it has several."""
         if any(state.alpha is not None for state in states):
             yield Problem("states", "alpha needs normal_memory linker-dieterich")
 
     def conditions_with(self, states: Sequence[State]) -> Iterator[Condition]:
-        """Relations that numbers must obey together."""
+        """Yield conditions between parameters."""
         if self.has_offset() and states:
             total = sum(state.b for state in states)
             yield Condition("states", total != 0, "Σb = 0 leaves no way to share the memory of normal stress", (total,))
@@ -111,7 +111,7 @@ class LinkerDieterich(NormalMemory, name="linker-dieterich"):
     )
 
     def offset(self, sigma: Expression) -> Expression:
-        alpha = 1 if self.alpha is None else self.alpha  # else the states' own
+        alpha = 1 if self.alpha is None else self.alpha  # None: `parts` are the states' own alpha
         return alpha * sp.log(sigma / self.sigma_ref)
 
     def parts(self, states: Sequence[State]) -> tuple[Expression, ...]:
@@ -134,7 +134,7 @@ class LinkerDieterich(NormalMemory, name="linker-dieterich"):
 
 
 class PrakashClifton(NormalMemory, name="prakash-clifton"):
-    """Prakash & Clifton (1993): friction follows an effective normal stress σ_e that lags behind σ.
+    """Prakash & Clifton (1993): friction is proportional to an effective normal stress σ_e that lags behind σ.
 
     τ = [gσ + (1 − g)σ_e] μ(v, Θ) and σ̇_e = −(v/d_σ)(σ_e − σ); g = 0 is the classic law without an
     instantaneous response.

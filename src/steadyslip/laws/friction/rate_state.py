@@ -82,17 +82,17 @@ class RateState(FrictionLaw, name="rate-state"):
     def conditions(self) -> Iterator[Condition]:
         yield from self.evolution.conditions_with(self.b)
         yield from self.normal_memory.conditions_with(self.states)
-        for name, b, cutoff in self._named_effects() if self._is_scaled() else ():
+        for name, b, cutoff in self._named_effects() if self._has_offset() else ():
             if cutoff is not None:
                 message = "got 0; a state whose effect fades at speed has b > 0 or b < 0: leave b_cutoff_velocity out"
                 yield Condition(name, np.asarray(b) != 0, message, (b,))
 
     def runs_away(self) -> bool:
-        """Unless the direct effect outlasts every other."""
+        """True unless only evolution effects have cut-off velocities, so that the direct effect outlasts them."""
         return self.a_cutoff_velocity is not None or any(cutoff is None for cutoff in self._state_cutoffs())
 
     def motion_conditions(self) -> Iterator[Condition]:
-        if not self._is_scaled() or not self.evolution.divides():
+        if not self._has_offset() or not self.evolution.divides():
             return
         message = (
             f"got {{}}, with memory of normal stress; the rate of {self.evolution.name} divides by b: use a small b"
@@ -101,13 +101,13 @@ class RateState(FrictionLaw, name="rate-state"):
             yield Condition(name, np.asarray(b) != 0, message, (b,))
 
     def completed_by(self, other: FrictionLaw) -> FrictionLaw:
-        """With the memory of normal stress of `other`, of which records at constant normal stress say nothing."""
+        """Copy with the memory of normal stress of `other`: records at constant normal stress cannot determine it."""
         if isinstance(other, RateState) and isinstance(self.normal_memory, NoMemory):
             return replace(self, normal_memory=other.normal_memory)
         return self
 
     def alternatives(self) -> Mapping[str, FrictionLaw]:
-        """Every evolution law without parameters of its own, with one state and with two."""
+        """Laws with every evolution law that has no parameters, each with one state and with two."""
         b, d_c = (self.states[0].b, self.states[0].d_c) if self.states else (self.b, self.d_c)
         if b is None or d_c is None:
             raise InternalError("b and d_c of a state")
@@ -119,10 +119,10 @@ class RateState(FrictionLaw, name="rate-state"):
                 found |= {name: one, f"{name}, two states": replace(one, states=pair, b=None, d_c=None)}
         return found
 
-    # The parts of the law; each is valid for numbers and for symbols.
+    # parts of the law, valid for numbers and symbols
 
     def _cutoffs(self) -> dict[str, Expression]:
-        """Every cut-off velocity by the name of its field, None where there is none."""
+        """Cut-off velocities (m/s) by field name, None if not given."""
         found: dict[str, Expression] = {
             "a_cutoff_velocity": self.a_cutoff_velocity, "b_cutoff_velocity": self.b_cutoff_velocity
         }  # fmt: skip
@@ -131,51 +131,51 @@ class RateState(FrictionLaw, name="rate-state"):
         }
 
     def _named_effects(self) -> Iterator[tuple[str, Expression, Expression]]:
-        """Name of the field, b and v_b of every state."""
+        """Yield field name, b and cut-off velocity v_b of every state."""
         for number, ((b, _), cutoff) in enumerate(zip(self._all_states(), self._state_cutoffs(), strict=True), start=1):
             yield (f"states.{number}.b" if self.states else "b"), b, cutoff
 
     def _state_cutoffs(self) -> tuple[Expression, ...]:
-        """v_b of every state, None where there is none."""
+        """Cut-off velocity v_b of every state, None if not given."""
         return tuple(s.b_cutoff_velocity for s in self.states) if self.states else (self.b_cutoff_velocity,)
 
-    def _direct(self, v: Expression) -> Expression:
-        """What a multiplies: ln(v/v*), or less above the cut-off velocity."""
+    def _direct_factor(self, v: Expression) -> Expression:
+        """Factor of a in the coefficient: ln(v/v*), limited above the cut-off velocity v_a."""
         effect, cutoff = sp.log(v / self.v_ref), self.a_cutoff_velocity
         return effect if cutoff is None else effect - sp.log((v + cutoff) / (self.v_ref + cutoff))
 
-    def _evolved(self, theta: Expression, cutoff: Expression) -> Expression:
-        """What b multiplies: Θ, or ln((v* + v_b e^Θ)/(v* + v_b)), which ends falling at speed."""
+    def _evolution_factor(self, theta: Expression, cutoff: Expression) -> Expression:
+        """Factor of b in the coefficient: Θ, or ln((v* + v_b e^Θ)/(v* + v_b)) with a cut-off velocity v_b."""
         return theta if cutoff is None else sp.log((self.v_ref + cutoff * sp.exp(theta)) / (self.v_ref + cutoff))
 
     def _all_states(self) -> tuple[tuple[Expression, Expression], ...]:
-        """(b, d_c) of every state."""
+        """Pairs (b, d_c) of all states."""
         return tuple((s.b, s.d_c) for s in self.states) if self.states else ((self.b, self.d_c),)
 
-    def _is_scaled(self) -> bool:
-        """Whether memory variables are Ψ = bΘ + ... (also right for b = 0) rather than Θ itself."""
+    def _has_offset(self) -> bool:
+        """True if the memory variables are Ψ = bΘ + offset, which is also valid for b = 0, rather than Θ."""
         return self.normal_memory.has_offset() or self.evolution.has_offset()
 
     def _offsets(self, sigma: Expression, tau: Expression) -> tuple[Expression, ...]:
-        """Ψ_i − b_iΘ_i: what makes the memory variables continuous when stresses jump."""
+        """Offsets Ψ_i − b_iΘ_i of all states, by which the memory variables stay continuous when stresses jump."""
         whole = self.normal_memory.offset(sigma)
         if not self.states:
             return (whole + self.evolution.offset(sigma, tau),)
         return tuple(part * whole for part in self.normal_memory.parts(self.states))
 
-    def _own(self, memory: tuple[Expression, ...]) -> tuple[Expression, ...]:
-        """The memory variables that belong to the memory of normal stress; they come last."""
+    def _stress_memory(self, memory: tuple[Expression, ...]) -> tuple[Expression, ...]:
+        """Memory variables of the memory of normal stress, which are the last ones."""
         return memory[len(self._all_states()) :]
 
     def _b_theta(self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> tuple[Expression, ...]:
-        """b_iΘ_i of every state."""
+        """Products b_iΘ_i of all states, from the memory variables."""
         states = self._all_states()
-        if not self._is_scaled():
+        if not self._has_offset():
             return tuple(b * theta for (b, _), theta in zip(states, memory, strict=False))
         return tuple(psi - off for psi, off in zip(memory, self._offsets(sigma, tau), strict=False))
 
     def _effects(self, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Iterator[Expression]:
-        """What every state adds to the coefficient: b_iΘ_i, or less where that fades at speed."""
+        """Yield the contribution of every state to the coefficient: b_iΘ_i, less with a cut-off velocity."""
         states = zip(self._all_states(), self._state_cutoffs(), strict=True)
         for ((b, _), cutoff), b_theta, stored in zip(
             states, self._b_theta(sigma, memory, tau), memory, strict=False
@@ -183,19 +183,19 @@ class RateState(FrictionLaw, name="rate-state"):
             if cutoff is None:
                 yield b_theta
             else:
-                yield b * self._evolved(b_theta / b if self._is_scaled() else stored, cutoff)
+                yield b * self._evolution_factor(b_theta / b if self._has_offset() else stored, cutoff)
 
     def _slip_rate(self, v: Expression) -> Expression:
         return sp.Abs(v) if self.regularised else v
 
     def _coefficient(self, v: Expression, b_theta: Expression) -> Expression:
-        """μ(v, bΘ): logarithmic or regularised."""
+        """Friction coefficient μ(v, Σ bΘ): logarithmic or regularised."""
         if self.regularised:
             return self.a * asinh_exp(v / (2 * self.v_ref), (self.mu_ref + b_theta) / self.a)
-        return self.mu_ref + self.a * self._direct(v) + b_theta
+        return self.mu_ref + self.a * self._direct_factor(v) + b_theta
 
     def memory(self) -> tuple[str, ...]:
-        letter = "Psi" if self._is_scaled() else "Theta"
+        letter = "Psi" if self._has_offset() else "Theta"
         count = len(self._all_states())
         names = (letter,) if count == 1 else tuple(f"{letter}_{i}" for i in range(1, count + 1))
         return names + self.normal_memory.memory()
@@ -205,7 +205,7 @@ class RateState(FrictionLaw, name="rate-state"):
 
     def strength(self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression) -> Expression:
         coefficient = self._coefficient(v, sum(self._effects(sigma, memory, tau)))
-        return self.normal_memory.strength(sigma, self._own(memory)) * coefficient
+        return self.normal_memory.strength(sigma, self._stress_memory(memory)) * coefficient
 
     def rates(
         self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
@@ -215,16 +215,16 @@ class RateState(FrictionLaw, name="rate-state"):
         for (b, d_c), b_theta, stored in zip(
             self._all_states(), self._b_theta(sigma, memory, tau), memory, strict=False
         ):
-            if self._is_scaled():
+            if self._has_offset():
                 rates.append(self.evolution.scaled_rate(speed, b_theta, b, d_c, self.v_ref))
             else:
                 rates.append(self.evolution.rate(speed, stored, d_c, self.v_ref))
-        return (*rates, *self.normal_memory.rates(speed, sigma, self._own(memory), self.d_c))
+        return (*rates, *self.normal_memory.rates(speed, sigma, self._stress_memory(memory), self.d_c))
 
     def steady_memory(self, v: Expression, sigma: Expression) -> tuple[Expression, ...]:
         theta = -sp.log(v / self.v_ref)
         states = self._all_states()
-        if self._is_scaled():
+        if self._has_offset():
             offsets = self._offsets(sigma, self.steady_strength(v, sigma))
             steady = tuple(b * theta + off for (b, _), off in zip(states, offsets, strict=True))
         else:
@@ -232,30 +232,34 @@ class RateState(FrictionLaw, name="rate-state"):
         return steady + self.normal_memory.steady_memory(sigma)
 
     def steady_strength(self, v: Expression, sigma: Expression) -> Expression:
-        felt = self.normal_memory.steady_strength(sigma)
+        stress = self.normal_memory.steady_strength(sigma)
         if all(cutoff is None for cutoff in self._cutoffs().values()):
             total = sum(b for b, _ in self._all_states())
             if self.regularised:
-                return felt * self._coefficient(v, -total * sp.log(v / self.v_ref))
-            return felt * (self.mu_ref + (self.a - total) * sp.log(v / self.v_ref))
+                return stress * self._coefficient(v, -total * sp.log(v / self.v_ref))
+            return stress * (self.mu_ref + (self.a - total) * sp.log(v / self.v_ref))
         theta = -sp.log(v / self.v_ref)
         states = zip(self._all_states(), self._state_cutoffs(), strict=True)
-        return felt * self._coefficient(v, sum(b * self._evolved(theta, cutoff) for (b, _), cutoff in states))
+        return stress * self._coefficient(
+            v, sum(b * self._evolution_factor(theta, cutoff) for (b, _), cutoff in states)
+        )
 
     def observables(
         self, v: Expression, sigma: Expression, memory: tuple[Expression, ...], tau: Expression
     ) -> dict[str, tuple[Expression, str]]:
-        """Θ (dimensionless) and θ (s) of every state; what the memory of normal stress has of its own."""
+        """Θ (dimensionless) and θ (s) of every state, and the variables of the memory of normal stress."""
         found: dict[str, tuple[Expression, str]] = {}
         states = self._all_states()
         b_thetas = self._b_theta(sigma, memory, tau)
         for index, ((b, d_c), b_theta) in enumerate(zip(states, b_thetas, strict=True), start=1):
             suffix = "" if len(states) == 1 else f"_{index}"
-            theta = b_theta / b if self._is_scaled() else memory[index - 1]
+            theta = b_theta / b if self._has_offset() else memory[index - 1]
             found["Theta" + suffix] = (theta, "1")
             found["theta" + suffix] = (self.evolution.state_time(theta, d_c, self.v_ref), "s")
         own = self.normal_memory
-        found |= {n: (e, u) for n, e, u in zip(own.memory(), self._own(memory), own.memory_units(), strict=True)}
+        found |= {
+            n: (e, u) for n, e, u in zip(own.memory(), self._stress_memory(memory), own.memory_units(), strict=True)
+        }
         return found
 
     def meanings(self) -> dict[str, str]:
